@@ -2,23 +2,30 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fixtures import bundles, firefox_start, paint_pages
 from fixtures.land_covers import write_cover_bundle
 from fixtures.page_visit import VIEWER, Visit
 
+from dav_gswt.files import read_json, write_json
+from dav_gswt.images.jpeg import encode_jpeg
 from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.page import write_page
+from dav_gswt.terrain.page_front import Front
 
 
 @pytest.fixture(scope="session")
 def page_of(tmp_path_factory):
-    """Make the page folder of a synthetic ground."""
+    """Make the page folder of a synthetic ground. edit: changes its manifest in place."""
 
-    def make(ground: bundles.Ground, rows_of=None, surface=None) -> Path:
+    def make(ground: bundles.Ground, rows_of=None, surface=None, edit=None) -> Path:
         folder = tmp_path_factory.mktemp("page")
         bundles.write_bundle(folder / "bundle", ground, rows_of)
         write_page(folder / "bundle", VIEWER, folder / "page", surface)
+        if edit:
+            edit(manifest := read_json(folder / "page/davgswt.json"))
+            write_json(folder / "page/davgswt.json", manifest)
         return folder / "page"
 
     return make
@@ -32,13 +39,48 @@ def plain(page_of):
 
 
 @pytest.fixture(scope="session")
-def modules(chromium, plain):
-    """A tab beside the viewer's modules that shows no page: for tests that import one and call it."""
-    with chromium.new_context() as context:
-        tab = context.new_page()
+def blank(chromium):
+    """Open tabs beside the viewer's modules that show no page: for tests that import one and call it."""
+    contexts = []
+
+    def start(address: str):
+        contexts.append(chromium.new_context())
+        tab = contexts[-1].new_page()
         tab.route("**/blank.html", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
-        tab.goto(f"{plain}blank.html")
-        yield tab
+        tab.goto(f"{address}blank.html")
+        return tab
+
+    yield start
+    for context in contexts:
+        context.close()
+
+
+@pytest.fixture(scope="session")
+def modules(blank, plain):
+    """A tab beside the modules of the page of plain colours."""
+    return blank(plain)
+
+
+@pytest.fixture(scope="session")
+def call(modules):
+    """Call a function of one of the viewer's modules."""
+
+    def run(module: str, name: str, *given):
+        act = "async ([module, name, given]) => (await import(`./${module}`))[name](...given)"
+        return modules.evaluate(act, [module, name, list(given)])
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def fronted(tmp_path_factory):
+    """The address of a page with a front; its still is magenta."""
+    folder = tmp_path_factory.mktemp("fronted")
+    bundles.write_bundle(folder / "bundle", bundles.Ground())
+    still = encode_jpeg(np.full((90, 160, 3), [1.0, 0.0, 1.0]), 80)
+    write_page(folder / "bundle", VIEWER, folder / "page", front=Front("My meadow", "From 7 photos", still))
+    with served(folder / "page") as address:
+        yield address
 
 
 @pytest.fixture(scope="session")
@@ -80,6 +122,16 @@ def visit(chromium):
     yield start
     for context in contexts:
         context.close()
+
+
+@pytest.fixture(scope="session")
+def slow_device():
+    """A script that makes a device of the browser on which every slice of a picture takes long: fences pass late."""
+    return """const ask = WebGL2RenderingContext.prototype.getSyncParameter, born = new WeakMap();
+    WebGL2RenderingContext.prototype.getSyncParameter = function (sync, name) {
+      if (!born.has(sync)) born.set(sync, performance.now());
+      return performance.now() - born.get(sync) < 150 ? this.UNSIGNALED : ask.call(this, sync, name);
+    };"""
 
 
 @pytest.fixture(scope="module")

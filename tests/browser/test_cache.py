@@ -45,6 +45,7 @@ def test_at_rest_no_chunk_is_read_twice_and_the_nearest_ground_is_fine(visit, la
     assert seen.page.evaluate("davgswt.grab().then(([width]) => width)") == 320
 
 
+@pytest.mark.slow
 def test_on_a_walk_no_chunk_is_read_more_than_three_times(visit, large):
     seen = visit(160, 100)
     asked = watch(seen)
@@ -59,6 +60,7 @@ def test_on_a_walk_no_chunk_is_read_more_than_three_times(visit, large):
     assert max(n for url, n in asked.items() if "lod2" in url) == 1  # the coarsest level is never evicted
 
 
+@pytest.mark.slow
 def test_a_still_waits_for_the_chunks_of_its_view(visit, large):
     seen = visit(320, 200)
     asked = watch(seen)
@@ -68,6 +70,7 @@ def test_a_still_waits_for_the_chunks_of_its_view(visit, large):
     assert max(asked.values()) == 1
 
 
+@pytest.mark.slow
 def test_a_phone_asks_before_it_loads_a_large_set(visit, large):
     """The threshold of 50 MB is replaced by one of 1 MB."""
     seen = visit(**PHONE)

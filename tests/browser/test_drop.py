@@ -1,16 +1,17 @@
-"""Bundles, sets for the public renderer and fly paths that are dropped onto the page; zips that nobody should trust."""
+"""Bundles, sets for the public renderer and fly paths that are dropped onto the page; files nobody should trust."""
 
 import hashlib
 import json
 import struct
 import zipfile
-from pathlib import Path
+from base64 import b64encode
 
 import numpy as np
 import pytest
-from fixtures import bundles
+from fixtures import bundles, paint_pages
 from fixtures.bundles import Ground
-from fixtures.dropped_files import drop, files_of, said, with_values, zipped
+from fixtures.dropped_files import drop, files_of, with_values, zipped
+from fixtures.land_covers import write_cover_bundle
 
 from dav_gswt.bundle import gswt
 from dav_gswt.bundle.encoding import Encoding
@@ -19,42 +20,316 @@ from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.study.terrain.browser import served
 
-SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 OTHER = Ground(discs=8, salt=99, speckle=20)
+READ = """async text => {
+  // what the page says against a zip: null if all of it is read
+  const { initialChunks, readChunks } = await import("./data/bundle.js");
+  const { PageError } = await import("./data/errors.js");
+  const { openSource } = await import("./data/open.js");
+  const { readTerrain } = await import("./scene/open_terrain.js");
+  const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
+  try {
+    const { source, manifest } = await readTerrain(await openSource(new Blob([bytes])));
+    await readChunks(initialChunks(manifest), source, { take: () => {} });
+    return null;
+  } catch (error) {
+    if (error instanceof PageError) return error.message;
+    throw error;
+  }
+}"""
 
 
 @pytest.fixture(scope="module")
 def other(tmp_path_factory):
-    """The folder of another bundle."""
+    """The folder of another bundle than the page's own."""
     folder = tmp_path_factory.mktemp("other") / "bundle"
     bundles.write_bundle(folder, OTHER)
     return folder
 
 
-@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
-def test_a_dropped_bundle_takes_the_place_of_the_pages_own(visit, plain, page_of, other, method):
-    seen = visit(160, 100).open(f"{plain}?still")
-    before = seen.at(**OBLIQUE)
-    drop(seen, "bundle.zip", zipped(files_of(other, "folder/"), method))
-    seen.until("davgswt.state.opened === 2")
-    after = seen.at(**OBLIQUE)
-    assert (after != before).any()
-    assert not seen.page.locator("#error").is_visible()
-    with served(page_of(OTHER)) as address:
-        assert (visit(160, 100).open(f"{address}?still").at(**OBLIQUE) == after).all()
+@pytest.fixture(scope="module")
+def grown(tmp_path_factory):
+    """The folder of a bundle of two materials with an object."""
+    folder = tmp_path_factory.mktemp("grown") / "bundle"
+    write_cover_bundle(folder, paint_pages.SCHEMA)
+    return folder
 
 
-def test_a_gswt_zip_of_the_public_renderer_is_shown(visit, plain, other, tmp_path):
-    manifest = json.loads((other / "davgswt.json").read_text())
-    gswt.write_gswt(Bundle(other, Manifest.from_dict(manifest)).fields(), OTHER.side, tmp_path / "gswt.zip")
-    seen = visit(160, 100).open(f"{plain}?still")
-    drop(seen, "gswt.zip", (tmp_path / "gswt.zip").read_bytes())
-    seen.until("davgswt.state.opened === 2")
-    picture = seen.at(x=2.0, y=2.0, eye=1.5, yaw=90, pitch=-90)
-    # the set's own eye floor keeps the eye so high that hundreds of tiles are in the picture: it has their mean colour
-    assert np.abs(picture.mean((0, 1)) - np.mean([bundles.colour_of(t) for t in range(16)], 0)).max() < 4
-    assert picture.std() > 5
+def told(modules, data: bytes) -> str | None:
+    return modules.evaluate(READ, b64encode(data).decode())
+
+
+def changed(folder, where: str, value) -> bytes:
+    """The bundle as a zip, with the value at a path of its manifest replaced: "tiles 3 z"."""
+    return with_values(*(int(key) if key.isdigit() else key for key in where.split()), value=value)(folder)
+
+
+HILLS = dict(kind="hills", height=1.0, wavelength=9.0, octaves=3, salt=5)
+RELIEF = dict(kind="image", file="heights.bin", rows=4, columns=4, width=8.0, bytes=64)
+FIRST = "tiles 0 chunks 0"
+
+
+def planet(radius: float, cells: float) -> dict:
+    return {"kind": "sphere", "radius": radius, "cells": cells}
+
+
+@pytest.mark.parametrize(
+    "where, value, words",
+    [
+        ("provenance", {"anything": [1]}, None),
+        ("format", "ply", "this is not a terrain"),
+        ("version", 1, "version 1, this page reads version 2 and 3"),
+        ("unit", {}, "“unit” is missing or makes no sense"),
+        ("tile_side", 1e300, "“tile_side”"),
+        ("eye_floor", -1, "“eye_floor”"),
+        ("salt", 2**32, "“salt”"),
+        ("ground_colour", [1e30] * 3, "“ground_colour”"),
+        ("sky zenith", None, "“sky”"),
+        ("sky sun", {"direction": [0, 0, 0]}, "“sky”"),
+        ("encoding log_scale", [0, 9], "“encoding”"),
+        ("encoding origin", [0, 0, 1e308], "“encoding”"),
+        ("encoding step", [-1, 1, 1], "“encoding”"),
+        ("directions 2", [0, 0, 0], "“directions”"),
+        ("directions", [[0, 0, -1]] * 256, "“directions”"),
+        ("levels", [None], "“levels”"),
+        ("levels 0 band", "1e999", "“levels”"),
+        ("levels 0 distance", None, "“levels”"),
+        ("levels 1 distance", 9.0, "“levels”"),
+        ("tiles", [{}] * 4096, "“tiles”"),
+        ("tiles", [{}] * 15, "“tiles”"),
+        ("tiles 3 tile", 4, "tile 3 is missing or makes no sense"),
+        ("tiles 3 z", [2, 1], "tile 3 is missing"),
+        ("tiles 3 uncertainty", 2, "tile 3 is missing"),
+        ("tiles 3 chunks", [None], "tile 3 does not have one chunk for each of 2 levels"),
+        ("materials", [], "“materials”"),
+        ("objects", [{}], "“objects”"),
+        ("heights", HILLS, None),
+        ("heights", HILLS | {"octaves": 0}, "“heights”"),
+        ("heights", RELIEF | {"bytes": 63}, "“heights”"),
+        ("heights", RELIEF | {"rows": 4097, "bytes": 4 * 4 * 4097}, "“heights”"),
+        ("heights", planet(24.0, 9), None),
+        ("heights", planet(24.0, 11), "“heights”"),
+        ("heights", planet(24.0, 9.5), "“heights”"),
+        ("heights", planet(4e-9, 1), "“heights”"),
+        (f"{FIRST} count", -64, "contradicts itself"),
+        (f"{FIRST} bytes", 7, "contradicts itself"),
+        (f"{FIRST} orders", [0] * 9, "contradicts itself"),
+        (f"{FIRST} orders", [*range(8), 9], "contradicts itself"),
+        (f"{FIRST} sha256", "none", "contradicts itself"),
+        (f"{FIRST} sha256", "0" * 64, "lod0_tile_00.bin is damaged"),
+        (f"{FIRST} file", "https://example.org/x.bin", "“https://example.org/x.bin” contradicts itself"),
+        (f"{FIRST} file", "chunks/x.bin", "x.bin is not among the dropped files"),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_a_manifest_is_read_or_what_contradicts_itself_is_named(modules, other, where, value, words):
+    message = told(modules, changed(other, where, value))
+    assert message is None if words is None else words in message
+
+
+PICTURE = dict(kind="image", weight=1.0, file="classes0.bin", rows=2, columns=3, width=9.0, beyond="clamp", bytes=6)
+RANGE = dict(kind="slope", weight=1.0, material=1, low=None, high=0.3, soft=0.1)
+
+
+@pytest.mark.parametrize(
+    "where, value, words",
+    [
+        ("materials 0 share", 2, "“materials” is missing or makes no sense"),
+        ("materials 1 first_tile", 17, "“materials”"),
+        ("materials 1 name", "", "“materials”"),
+        ("classes", None, "“classes”"),
+        ("classes salt", -1, "“classes”"),
+        ("classes rule", [], "“classes”"),
+        ("classes rule", [RANGE], None),
+        ("classes rule", [RANGE] * 65, "“classes”"),
+        ("classes rule 0 kind", "magic", "“classes”"),
+        ("classes rule 0 weight", "1e999", "“classes”"),
+        ("classes rule 0 octaves", [2, 1000], "“classes”"),
+        ("classes rule 0 wavelengths", [3], "“classes”"),
+        ("classes rule 0 wavelengths", [0, 1], "“classes”"),
+        ("classes rule", [RANGE | {"material": 2}], "“classes”"),
+        ("classes rule", [RANGE | {"soft": 0}], "“classes”"),
+        ("classes rule", [RANGE | {"low": "x"}], "“classes”"),
+        ("classes rule", [PICTURE], "classes0.bin is not among the dropped files"),
+        ("classes rule", [PICTURE | {"bytes": 7}], "“classes”"),
+        ("classes rule", [PICTURE | {"rows": 8192, "bytes": 24576}], "“classes”"),
+        ("classes rule", [PICTURE, PICTURE], "“classes”"),
+        ("classes painted", [[0, 0, 2**60, 0]], "“classes”"),
+        ("classes jitter cells", 2**31, "“classes”"),
+        ("classes jitter octaves", 60, "“classes”"),
+        ("classes jitter amplitude", "1e999", "“classes”"),
+        ("classes rise ground", [0.0], "“classes”"),
+        ("classes rise most", -1, "“classes”"),
+        ("heights", planet(24.0, 9), "“heights”"),
+        ("objects", [], "“objects”"),
+        ("objects", [{}] * 257, "“objects”"),
+        ("objects 0 radius", 1e6, "“objects”"),
+        ("objects 0 material", 2, "“objects”"),
+        ("objects 0 probability", 1.5, "“objects”"),
+        ("objects 0 z", [1, 0], "“objects”"),
+        ("objects 0 chunks 1 count", 31, "contradicts itself"),
+        ("objects 0 chunks", [], "object 0 does not have one chunk for each"),
+        ("scatter", None, "“scatter”"),
+        ("scatter cells", 1e6, "“scatter”"),
+        ("scatter cells", 64, "820 objects stand on a tile"),
+        ("scatter size", 1, "“scatter”"),
+        ("scatter turn", "1e999", "“scatter”"),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_what_contradicts_itself_in_materials_and_objects_is_named(modules, grown, where, value, words):
+    message = told(modules, changed(grown, where, value))
+    assert message is None if words is None else words in message
+
+
+def with_chunk(folder, change) -> bytes:
+    """The bundle as a zip, with a changed first chunk of 64 Gaussians and nine orders, and the digest of that."""
+    files, manifest = files_of(folder), json.loads((folder / "davgswt.json").read_text())
+    entry = manifest["tiles"][0]["chunks"][0]
+    data = bytearray(files[entry["file"]])
+    change(np.frombuffer(data, "<u2", offset=16 * entry["count"]).reshape(-1, entry["count"]))
+    files[entry["file"]] = bytes(data)
+    entry["sha256"] = hashlib.sha256(data).hexdigest()
+    return zipped(files | {"davgswt.json": json.dumps(manifest).encode()})
+
+
+def go_beyond(orders):
+    orders[3, 5] = 65535
+
+
+def repeat(orders):
+    orders[3, :] = np.roll(np.arange(orders.shape[1]) // 2 * 2, 1)
+
+
+def with_hole(folder) -> bytes:
+    """A height map with a height that is no number."""
+    pixels = np.full((4, 4), 0.5, "<f4")
+    pixels[2, 1] = np.nan
+    manifest = json.loads((folder / "davgswt.json").read_text()) | {"heights": RELIEF}
+    files = {"heights.bin": pixels.tobytes(), "davgswt.json": json.dumps(manifest).encode()}
+    return zipped(files_of(folder) | files)
+
+
+def with_file(folder, change) -> bytes:
+    """The bundle as a zip, with other bytes in a chunk; None: without it."""
+    files, name = files_of(folder), "chunks/lod1_tile_03.bin"
+    data = change(files.pop(name))
+    return zipped(files if data is None else files | {name: data})
+
+
+def patched(at: int, form: str, value: int, content: bytes = b" " * 9000, record: bytes = b"PK\x01\x02") -> bytes:
+    """A zip of one file with another number in its entry in the table, or in the record of its end."""
+    data = bytearray(zipped({"davgswt.json": content}))
+    struct.pack_into(form, data, data.rindex(record) + at, value)
+    return bytes(data)
+
+
+def with_end(at: int, form: str, value: int) -> bytes:
+    return patched(at, form, value, record=b"PK\x05\x06")
+
+
+def flip(data: bytes) -> bytes:
+    found = bytearray(data)
+    found[found.index(b'"format"') + 30] ^= 1
+    return bytes(found)
+
+
+def ply_header(count: int, *properties: str) -> bytes:
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {count}"]
+    return "\n".join([*lines, *(f"property float {name}" for name in properties), "end_header\n"]).encode()
+
+
+def tiles_of(content: bytes, many: int = 16, first: bytes | None = None) -> bytes:
+    return zipped({f"lod0_tile_{t:02d}.ply": content if t or first is None else first for t in range(many)})
+
+
+PLY_NAMES = ["x", "y", "z", "opacity", *(f"f_dc_{k}" for k in range(3)), *(f"scale_{k}" for k in range(3))]
+PLY_NAMES += [f"rot_{k}" for k in range(4)]
+
+
+def splat(**values) -> bytes:
+    return ply_header(1, *PLY_NAMES) + struct.pack("<14f", *(values.get(name, 0.5) for name in PLY_NAMES))
+
+
+@pytest.mark.parametrize(
+    "spoil, words",
+    [
+        pytest.param(lambda f: zipped(files_of(f, "folder/"), zipfile.ZIP_STORED), None, id="sound"),
+        pytest.param(lambda f: with_chunk(f, go_beyond), "an order does not hold every splat once", id="beyond"),
+        pytest.param(lambda f: with_chunk(f, repeat), "an order does not hold every splat once", id="loop"),
+        pytest.param(with_hole, "heights.bin: a height is not finite", id="NaN in the relief"),
+        pytest.param(lambda f: with_file(f, lambda data: data[:-9]), "lod1_tile_03.bin is cut short: 535", id="cut"),
+        pytest.param(lambda f: with_file(f, lambda data: data + b"x"), "lod1_tile_03.bin is too long", id="long"),
+        pytest.param(lambda f: with_file(f, lambda data: None), "is not among the dropped files", id="no chunk"),
+        pytest.param(lambda f: zipped({"davgswt.json": b"{"}), "davgswt.json is not readable as JSON", id="no JSON"),
+        pytest.param(lambda f: zipped({"davgswt.json": b" " * (2**26 + 1)}), "is too large for what it is", id="bomb"),
+        pytest.param(lambda f: zipped({"readme.txt": b"hello"}), "There is no terrain in what was dropped", id="other"),
+        pytest.param(lambda f: zipped(files_of(f))[:-400], "its end is missing", id="truncated"),
+        pytest.param(lambda f: b"no zip at all", "its end is missing", id="no zip"),
+        pytest.param(lambda f: with_end(10, "<H", 0xFFFF), "of the large kind", id="zip64"),
+        pytest.param(lambda f: with_end(10, "<H", 5000), "5000 entries, at most 4096", id="too many entries"),
+        pytest.param(lambda f: with_end(10, "<H", 4000), "its table is damaged", id="more entries than there are"),
+        pytest.param(lambda f: with_end(12, "<I", 2**31), "its table lies outside of it", id="table beyond the file"),
+        pytest.param(lambda f: with_end(16, "<I", 7), "its table is damaged", id="table elsewhere"),
+        pytest.param(lambda f: patched(8, "<H", 1), "is locked with a password", id="password"),
+        pytest.param(lambda f: patched(10, "<H", 12), "is packed in a way (12)", id="method"),
+        pytest.param(lambda f: patched(16, "<I", 7), "its checksum is another", id="checksum"),
+        pytest.param(lambda f: patched(24, "<I", 10), "is larger than the table says", id="more than promised"),
+        pytest.param(lambda f: patched(24, "<I", 9001), "is cut short", id="less than promised"),
+        pytest.param(lambda f: patched(24, "<I", 2_000_000_000), "contradicts its own size", id="declared size"),
+        pytest.param(lambda f: patched(42, "<I", 1), "is not where the table says", id="elsewhere"),
+        pytest.param(lambda f: flip(zipped(files_of(f), zipfile.ZIP_STORED)), "is damaged", id="flipped"),
+        *(
+            pytest.param(lambda f, name=name: zipped({name: b"{}"}), "leads out of it", id=name)
+            for name in ("a\\..\\davgswt.json", "c:davgswt.json", "../davgswt.json", "/etc/davgswt.json")
+        ),
+        pytest.param(lambda f: tiles_of(splat()), None, id="set"),
+        pytest.param(lambda f: tiles_of(splat(), 272), "272 tiles, this page shows 256", id="tiles of a set"),
+        pytest.param(lambda f: tiles_of(splat(), 1), "1 tiles, a multiple of 16 is needed", id="one tile"),
+        pytest.param(lambda f: zipped({"lod0_tile_15.ply": splat()}), "Tile 0 of level 0 is missing", id="no tile"),
+        pytest.param(lambda f: zipped({"lod9_tile_15.ply": splat()}), "10 levels, this page shows 8", id="levels"),
+        pytest.param(lambda f: tiles_of(b"ply\n"), "it has no PLY header", id="no header"),
+        pytest.param(lambda f: tiles_of(splat().replace(b"little", b"big")), "not in binary_little_endian", id="order"),
+        pytest.param(lambda f: tiles_of(splat().replace(b"float x", b"uchar x")), "a property is no float", id="uchar"),
+        pytest.param(lambda f: tiles_of(splat().replace(b"rot_3", b"rot_4")), "property rot_3 is missing", id="rot_3"),
+        pytest.param(lambda f: tiles_of(ply_header(10**12, *PLY_NAMES)), "cut short or too long", id="PLY count"),
+        pytest.param(lambda f: tiles_of(ply_header(-1, *PLY_NAMES)), "it has no splats", id="PLY without splats"),
+        pytest.param(lambda f: tiles_of(splat(), first=splat(x=1e30)), "too far away or too large", id="PLY afar"),
+        pytest.param(lambda f: tiles_of(splat(), first=splat(x=1e5)), "dozens of tile sides from the", id="PLY apart"),
+        pytest.param(lambda f: tiles_of(splat(), first=splat(scale_1=700)), "too far away or too la", id="PLY haze"),
+        pytest.param(lambda f: tiles_of(splat(), first=splat(x=np.nan)), "a value that is not finite", id="PLY NaN"),
+    ],
+)
+def test_a_zip_is_read_or_refused_with_what_is_wrong(modules, other, spoil, words):
+    message = told(modules, spoil(other))
+    assert message is None if words is None else words in message
+
+
+@pytest.mark.parametrize(
+    "answer, size, found",
+    [
+        ("new Response(new Uint8Array(5))", 5, 5),
+        ("new Response(new Uint8Array(5))", None, 5),
+        ("new Response(new Uint8Array(4))", 5, "a.bin is cut short: 4 bytes came, 5 were promised"),
+        ("new Response(new Uint8Array(6))", 5, "a.bin is too long: 6 bytes came"),
+        ("new Response('', { status: 404 })", 5, "a.bin is not there (the server answered 404)"),
+        ("Promise.reject(new TypeError())", 5, "a.bin cannot be reached. Is “make view” still running?"),
+        ("new Response(new ReadableStream({ start: c => c.error(new Error()) }))", 5, "a.bin is cut short: 0 bytes"),
+        ("new Response(new Uint8Array(2 ** 26 + 1))", None, "a.bin is too large for what it is"),
+    ],
+)
+def test_a_file_of_the_web_has_the_size_that_was_promised(modules, answer, size, found):
+    told = modules.evaluate(
+        f"""async size => {{
+          const {{ webSource }} = await import("./data/source.js"), usual = globalThis.fetch;
+          globalThis.fetch = async () => {answer};
+          const read = webSource(new URL("https://a.test/")).read("a.bin", size);
+          return read.then(b => b.byteLength, e => e.message).finally(() => {{ globalThis.fetch = usual; }});
+        }}""",
+        size,
+    )
+    assert told == found if isinstance(found, int) else found in told
 
 
 def test_the_page_rounds_a_set_as_the_library_does(modules):
@@ -103,212 +378,63 @@ def bytes_of(field: GaussianField) -> list[int]:
     return np.rint(255 * np.concatenate([field.base_colours, opacity[:, None]], 1)).astype(int).ravel().tolist()
 
 
-def test_a_folder_is_found_wherever_its_manifest_lies(modules):
-    found = modules.evaluate(
-        """async () => {
-          const { sourceOf } = await import("./data/open.js");
-          const bytes = (size) => ({ size, open: async () => new ArrayBuffer(size) });
-          const files = new Map([["a/b/davgswt.json", bytes(1)], ["a/b/chunks/x.bin", bytes(5)], ["c.txt", bytes(9)]]);
-          const source = await sourceOf(files);
-          const size = (name) => source.read(name, null).then(b => b.byteLength, e => e.message);
-          return [await size("davgswt.json"), await size("chunks/x.bin"), await size("c.txt")];
-        }"""
-    )
-    assert found[:2] == [1, 5] and "c.txt is not among the dropped files" in found[2]
-
-
-def with_manifest(folder, **changes) -> bytes:
-    files = files_of(folder)
-    files["davgswt.json"] = json.dumps(json.loads(files["davgswt.json"]) | changes).encode()
-    return zipped(files)
-
-
-def without(folder, name) -> bytes:
-    return zipped({n: data for n, data in files_of(folder).items() if n != name})
-
-
-def shrunk(folder) -> bytes:
-    """A zip whose table promises fewer bytes than an entry unpacks to."""
-    data = bytearray(zipped({"davgswt.json": b" " * 100_000}))
-    at = data.rindex(b"PK\x01\x02")
-    data[at + 24 : at + 28] = struct.pack("<I", 10)
-    return bytes(data)
-
-
-def flipped(folder) -> bytes:
-    data = bytearray(zipped(files_of(folder), zipfile.ZIP_STORED))
-    data[data.index(b'"format"') + 30] ^= 1
-    return bytes(data)
-
-
-def with_chunk(**changes):
-    """The bundle as a zip, with other keys of its first chunk."""
-    return lambda folder: with_values("tiles", 0, "chunks", 0, value=first_chunk(folder) | changes)(folder)
-
-
-def first_chunk(folder) -> dict:
-    return json.loads((folder / "davgswt.json").read_text())["tiles"][0]["chunks"][0]
-
-
-def with_order(change):
-    """The bundle as a zip, with changed orders of its first chunk and the digest of that."""
-
-    def spoil(folder) -> bytes:
-        files, entry = files_of(folder), first_chunk(folder)
-        data = bytearray(files[entry["file"]])
-        orders = np.frombuffer(data, "<u2", offset=16 * entry["count"]).reshape(-1, entry["count"])
-        change(orders)
-        files[entry["file"]] = bytes(data)
-        manifest = json.loads(files["davgswt.json"])
-        manifest["tiles"][0]["chunks"][0]["sha256"] = hashlib.sha256(data).hexdigest()
-        files["davgswt.json"] = json.dumps(manifest).encode()
-        return zipped(files)
-
-    return spoil
-
-
-def beyond(orders):
-    orders[3, 5] = 65535
-
-
-def in_a_loop(orders):
-    orders[3, :] = np.roll(np.arange(orders.shape[1]) // 2 * 2, 1)
-
-
-def with_relief(folder) -> bytes:
-    """A height map with a height that is no number."""
-    pixels = np.full((4, 4), 0.5, "<f4")
-    pixels[2, 1] = np.nan
-    entry = dict(kind="image", file="heights.bin", rows=4, columns=4, width=8.0, bytes=64)
-    files = files_of(folder) | {"heights.bin": pixels.tobytes()}
-    files["davgswt.json"] = json.dumps(json.loads(files["davgswt.json"]) | {"heights": entry}).encode()
-    return zipped(files)
-
-
-def patched(at: int, form: str, value: int):
-    """A zip with another number in the record of its end."""
-
-    def spoil(folder) -> bytes:
-        data = bytearray(zipped(files_of(folder)))
-        struct.pack_into(form, data, len(data) - 22 + at, value)
-        return bytes(data)
-
-    return spoil
-
-
-def boastful(folder) -> bytes:
-    """A zip whose manifest claims two gigabytes in some bytes."""
-    data = bytearray(zipped({"davgswt.json": b"{}"}))
-    struct.pack_into("<I", data, data.rindex(b"PK\x01\x02") + 24, 2_000_000_000)
-    return bytes(data)
-
-
-def ply_header(count: int, *properties: str) -> bytes:
-    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {count}"]
-    return "\n".join([*lines, *(f"property float {name}" for name in properties), "end_header\n"]).encode()
-
-
-def tiles_of(content: bytes, many: int = 16, first: bytes | None = None) -> bytes:
-    return zipped({f"lod0_tile_{t:02d}.ply": content if t or first is None else first for t in range(many)})
-
-
-PLY_NAMES = ["x", "y", "z", "opacity", *(f"f_dc_{k}" for k in range(3)), *(f"scale_{k}" for k in range(3))]
-PLY_NAMES += [f"rot_{k}" for k in range(4)]
-
-
-def splat(**values) -> bytes:
-    return ply_header(1, *PLY_NAMES) + struct.pack("<14f", *(values.get(name, 0.5) for name in PLY_NAMES))
-
-
-@pytest.mark.parametrize(
-    "spoil, message",
-    [
-        pytest.param(with_values("tile_side", value="1e999"), "“tile_side” is missing or makes no", id="infinite side"),
-        pytest.param(with_values("tile_side", value=1e300), "“tile_side” is missing or makes no", id="huge side"),
-        pytest.param(with_values("eye_floor", value=-1), "“eye_floor” is missing or makes no", id="negative eye"),
-        pytest.param(with_values("ground_colour", value=[1e30] * 3), "“ground_colour” is missing", id="bright ground"),
-        pytest.param(with_values("encoding", "log_scale", value=[0, 9]), "“encoding” is missing", id="huge splats"),
-        pytest.param(with_values("encoding", "origin", value=[0, 0, 1e308]), "“encoding” is missing", id="far splats"),
-        pytest.param(with_values("encoding", "step", value=[-1, 1, 1]), "“encoding” is missing", id="mirrored grid"),
-        pytest.param(with_values("directions", 2, value=[0, 0, 0]), "“directions” is missing", id="no direction"),
-        pytest.param(with_values("directions", value=[[0, 0, -1]] * 256), "“directions” is missing", id="directions"),
-        pytest.param(with_values("tiles", 3, "z", value=[2, 1]), "tile 3 is missing or makes no", id="z upside down"),
-        pytest.param(with_values("tiles", value=[{}] * 4096), "“tiles” is missing or makes no", id="too many tiles"),
-        pytest.param(with_values("levels", 0, "band", value="1e999"), "“levels” is missing", id="endless band"),
-        pytest.param(with_values("unit", value={}), "“unit” is missing or makes no", id="unit"),
-        pytest.param(with_values("heights", value={"kind": "hills"}), "“heights” is missing", id="hills"),
-        pytest.param(with_values("sky", "zenith", value=None), "“sky” is missing", id="no sky"),
-        pytest.param(with_chunk(count=-64), "contradicts itself", id="negative count"),
-        pytest.param(with_chunk(count=0, bytes=0), "contradicts itself", id="nothing in it"),
-        pytest.param(with_chunk(count=2**40, bytes=2**40 * 52), "more than this page holds", id="huge count"),
-        pytest.param(with_chunk(orders=[0] * 9), "contradicts itself", id="an order nine times"),
-        pytest.param(with_chunk(orders=[*range(8), 9]), "contradicts itself", id="an order of no direction"),
-        pytest.param(with_chunk(sha256="none"), "contradicts itself", id="no digest"),
-        pytest.param(with_chunk(file="../" * 9 + "x"), "contradicts itself", id="a file above"),
-        pytest.param(with_order(beyond), "an order does not hold every splat once", id="order beyond the chunk"),
-        pytest.param(with_order(in_a_loop), "an order does not hold every splat once", id="order with a loop"),
-        pytest.param(with_relief, "heights.bin: a height is not finite", id="NaN in the relief"),
-        pytest.param(boastful, "contradicts its own size", id="declared size"),
-        pytest.param(lambda f: zipped({"davgswt.json": b" " * 2**27}), "is too large for what it is", id="real bomb"),
-        pytest.param(patched(10, "<H", 5000), "5000 entries, at most 4096", id="too many entries"),
-        pytest.param(patched(10, "<H", 4000), "its table is damaged", id="more entries than there are"),
-        pytest.param(patched(12, "<I", 2**31), "its table lies outside of it", id="table beyond the file"),
-        pytest.param(patched(16, "<I", 7), "its table is damaged", id="table elsewhere"),
-        pytest.param(lambda f: zipped({"a\\..\\davgswt.json": b"{}"}), "leads out of it", id="backslash"),
-        pytest.param(lambda f: zipped({"c:davgswt.json": b"{}"}), "leads out of it", id="drive"),
-        pytest.param(lambda f: tiles_of(b"ply\n", 272), "272 tiles, this page shows 256", id="tiles of a set"),
-        pytest.param(lambda f: tiles_of(ply_header(10**12, *PLY_NAMES)), "cut short or too long", id="PLY count"),
-        pytest.param(lambda f: tiles_of(ply_header(-1, *PLY_NAMES)), "it has no splats", id="PLY without splats"),
-        pytest.param(lambda f: tiles_of(splat(), first=splat(x=1e30)), "too far away or too large", id="PLY afar"),
-        pytest.param(lambda f: tiles_of(splat(), first=splat(scale_1=700)), "too far away or too la", id="PLY haze"),
-        pytest.param(lambda f: tiles_of(splat(), first=splat(x=np.nan)), "a value that is not finite", id="PLY NaN"),
-        pytest.param(lambda f: zipped(files_of(f))[:-400], "its end is missing", id="truncated"),
-        pytest.param(lambda f: b"no zip at all", "its end is missing", id="no zip"),
-        pytest.param(lambda f: zipped({"../davgswt.json": b"{}"}), "“../davgswt.json” leads out of it", id="escapes"),
-        pytest.param(lambda f: zipped({"/etc/davgswt.json": b"{}"}), "leads out of it", id="absolute"),
-        pytest.param(lambda f: zipped({"readme.txt": b"hello"}), "There is no terrain in what was dropped", id="other"),
-        pytest.param(lambda f: with_manifest(f, version=99), "version 99, this page reads version", id="version"),
-        pytest.param(lambda f: without(f, "chunks/lod0_tile_03.bin"), "is not among the dropped files", id="no chunk"),
-        pytest.param(lambda f: zipped({"lod0_tile_00.ply": b"ply\n"}), "a multiple of 16 is needed", id="one tile"),
-        pytest.param(shrunk, "is larger than the table says", id="bomb"),
-        pytest.param(flipped, "is damaged", id="flipped"),
-    ],
-)
-def test_what_is_wrong_with_a_dropped_zip_is_said(target, other, spoil, message):
-    assert message in said(target, spoil(other))
-    assert not target.page.get_by_role("alert").is_visible(), "a click takes the message away"
-
-
-def test_the_page_still_opens_what_is_sound(target, other):
-    """After all that was refused; and what a manifest says besides is left aside, however deep it is."""
+def open_dropped(target, data: bytes) -> None:
+    """Drop a zip that the page opens."""
     opened = target.page.evaluate("davgswt.state.opened")
-    files = files_of(other)
-    deep = "[" * 100_000 + "]" * 100_000
-    files["davgswt.json"] = files["davgswt.json"].replace(b'"provenance": {}', f'"provenance": {deep}'.encode())
-    drop(target, "bundle.zip", zipped(files))
+    drop(target, "bundle.zip", data)
     target.until(f"davgswt.state.opened === {opened + 1}")
     assert not target.page.get_by_role("alert").is_visible()
 
 
-@pytest.mark.parametrize("place", ["%", "1e300,-1e300,1,0,0", "NaN,Infinity", "%2c,%2c"])
-def test_an_address_that_is_no_place_is_passed_over(visit, plain, place):
-    seen = visit(160, 100).open(f"{plain}?still#{place}")
-    assert np.isfinite([seen.state[key] for key in ("x", "y", "eye", "yaw", "pitch")]).all()
-    assert max(abs(seen.state["x"]), abs(seen.state["y"])) < 10
+def test_a_broken_zip_is_told_and_a_sound_bundle_takes_the_place_of_the_pages_own(target, still, page_of, other):
+    """What the manifest says besides is left aside, however deep it is."""
+    before = target.at(**OBLIQUE)
+    drop(target, "bundle.zip", b"no zip at all")
+    alert = target.page.get_by_role("alert")
+    alert.wait_for(state="visible")
+    assert "its end is missing" in alert.inner_text()
+    alert.click()
+    assert not alert.is_visible(), "a click takes the message away"
+    files, deep = files_of(other, "folder/"), "[" * 100_000 + "]" * 100_000
+    name = "folder/davgswt.json"
+    files[name] = files[name].replace(b'"provenance": {}', f'"provenance": {deep}'.encode())
+    open_dropped(target, zipped(files))
+    after = target.at(**OBLIQUE)
+    assert (after != before).any()
+    with served(page_of(OTHER)) as address:
+        assert (still(address).at(**OBLIQUE) == after).all()
 
 
-def test_a_dropped_fly_path_is_played(visit, plain):
-    seen = visit(160, 100).open(plain)
+def test_a_gswt_zip_of_the_public_renderer_is_shown(target, other, tmp_path):
+    manifest = json.loads((other / "davgswt.json").read_text())
+    gswt.write_gswt(Bundle(other, Manifest.from_dict(manifest)).fields(), OTHER.side, tmp_path / "gswt.zip")
+    open_dropped(target, (tmp_path / "gswt.zip").read_bytes())
+    picture = target.at(x=2.0, y=2.0, eye=1.5, yaw=90, pitch=-90)
+    # the set's own eye floor keeps the eye so high that hundreds of tiles are in the picture: it has their mean colour
+    assert np.abs(picture.mean((0, 1)) - np.mean([bundles.colour_of(t) for t in range(16)], 0)).max() < 4
+    assert picture.std() > 5
+
+
+def test_classes_by_a_picture_are_shown(target, grown):
+    """West of the picture's middle lies the first material, east of it the second."""
+    files = files_of(grown) | {PICTURE["file"]: bytes([0, 0, 1, 0, 0, 1])}
+    manifest = json.loads(files["davgswt.json"])
+    manifest["classes"]["rule"] = [PICTURE]
+    files["davgswt.json"] = json.dumps(manifest).encode()
+    open_dropped(target, zipped(files))
+    west, east = (target.at(x=x, y=2.0, eye=1.5, yaw=90, pitch=-90).mean((0, 1)) for x in (-20.0, 20.0))
+    assert west[0] > west[1] + 10 and east[1] > east[0] + 10, "sand is reddish, grass green"
+
+
+@pytest.mark.slow
+def test_a_dropped_fly_path_is_played_and_a_broken_one_refused(visit, plain):
+    seen = visit(320, 200).open(plain)
     place = dict(eye=2.0, yaw=20.0, pitch=-30.0)
     path = [dict(seconds=0.0, x=0.0, y=0.0, **place), dict(seconds=0.3, x=8.0, y=4.0, **place)]
     drop(seen, "flight.json", json.dumps({"format": "davgswt-flight", "path": path}).encode())
     seen.until("davgswt.flyPath.path.length === 2")
     seen.page.evaluate("davgswt.flyPath.play()")
     seen.until("davgswt.state.x === 8 && davgswt.state.y === 4 && davgswt.flyPath.mode === 'rest'")
-
-
-def test_a_broken_fly_path_is_refused(visit, plain):
-    seen = visit(320, 200).open(f"{plain}?still")
     drop(seen, "flight.json", b'{"path": 3}')
     alert = seen.page.get_by_role("alert")
     alert.wait_for(state="visible")

@@ -59,6 +59,19 @@ def golden(name):
     return json.loads((FOLDER / f"{name}.json").read_text())
 
 
+def test_tiles_and_hashes_are_the_integers_shared_with_the_library(modules):
+    cells = golden("tile_choice")["cells"]
+    computed = modules.evaluate(
+        """async cells => {
+          const { hashCell, tileAt } = await import("./terrain/choice.js");
+          return cells.map(({ i, j, salt, variants }) => ({ i, j, salt, variants,
+            hashes: [0, 1, 2].map(axis => hashCell(i, j, axis, salt)), tile: tileAt(i, j, salt, variants) }));
+        }""",
+        cells,
+    )
+    assert computed == cells
+
+
 def test_surfaces_have_the_heights_slopes_and_bounds_shared_with_the_library(modules):
     surfaces = golden("heights")["surfaces"]
     computed = modules.evaluate(

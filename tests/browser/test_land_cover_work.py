@@ -18,13 +18,18 @@ OPEN = """
   const { listChunks } = await import("./data/layout.js");
   const manifest = await (await fetch("davgswt.json")).json(), heights = createHeights(manifest.heights);
   const builder = createFrameBuilder(manifest, heights), chunks = listChunks(manifest);
-  for (const { tile, entry: { level, count, file } } of chunks) {
-    builder.add({ tile, level, count, buffer: await (await fetch(file)).arrayBuffer() });
-  }
+  const read = await Promise.all(chunks.map(async ({ tile, entry: { level, count, file } }) => (
+    { tile, level, count, buffer: await (await fetch(file)).arrayBuffer() })));
+  for (const chunk of read) builder.add({ ...chunk, buffer: chunk.buffer.slice() });
   const view = (place, patient = true) => {
     const before = builder.work, frame = builder.build(cameraAt(place, 640, 400, heights), 1e6, patient);
     const { work } = builder, did = name => work[name] - before[name];
     return { frame, tested: did("tested"), sorted: did("sorted"), merged: did("merged") };
+  };
+  const describe = ({ blocks, near, cells }) => {
+    let drawn = 0; // entries
+    for (let k = 1; k < blocks.length; k += 4) drawn += ((blocks[k] >>> 16) & 63) + 1;
+    return { drawn, near: near.length, cells: cells.length };
   };
   const place = { x: 3, y: 5, eye: 0.8, yaw: 60, pitch: -12 };
 """
@@ -44,16 +49,26 @@ WALK = """async () => {
   return { most, ...builder.work };
 }"""
 AHEAD = """async () => {
-  const describe = ({ blocks, near, cells }) => {
-    let drawn = 0;
-    for (let k = 1; k < blocks.length; k += 4) drawn += ((blocks[k] >>> 16) & 63) + 1;
-    return { drawn, near: near.length, cells: cells.length };
-  };
   const first = view(place, false).frame.incomplete;
   while (builder.workAhead(1000));
   const next = view(place, false), patient = view(place, true);
   return { first, second: next.frame.incomplete, tested: next.tested + patient.tested,
     frames: [describe(next.frame), describe(patient.frame)] };
+}"""
+HURRY = """async () => {
+  // frames by a builder in a hurry, until they are complete, and the frame of one that is patient
+  const fill = () => {
+    const filled = createFrameBuilder(manifest, heights);
+    for (const chunk of read) filled.add({ ...chunk, buffer: chunk.buffer.slice() });
+    return filled;
+  };
+  const camera = cameraAt(place, 640, 400, heights), real = performance.now.bind(performance);
+  const hurried = fill(), frames = [], last = fill().build(camera, 1e6, true);
+  let now = 0;
+  performance.now = () => (now += 0.05); // a clock that leaves time for some dozens of batches
+  do frames.push(hurried.build(camera, 1e6, false)); while (frames.at(-1).incomplete && frames.length < 1000);
+  performance.now = real;
+  return { frames: frames.map(describe), patient: describe(last) };
 }"""
 COUNT = """async () => {
   const { createTerrainTables } = await import("./worker/terrain_tables.js");
@@ -117,16 +132,13 @@ MERGE = """async () => {
 
 
 @pytest.fixture(scope="module")
-def page(chromium, tmp_path_factory):
+def page(blank, tmp_path_factory):
     """A tab beside the viewer's modules and a bundle of two materials over hills."""
     folder = tmp_path_factory.mktemp("work")
     write_cover_bundle(folder / "bundle", SCHEMA)
     write_page(folder / "bundle", VIEWER, folder / "page", Hills(1.5 * SIDE, 12.0 * SIDE, 3, 5))
-    with served(folder / "page") as address, chromium.new_context() as context:
-        tab = context.new_page()
-        tab.route("**/blank.html", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
-        tab.goto(f"{address}blank.html")
-        yield tab
+    with served(folder / "page") as address:
+        yield blank(address)
 
 
 def run(page, act: str):
@@ -150,6 +162,15 @@ def test_what_is_late_is_made_between_views(page):
     found = run(page, AHEAD)
     assert found["first"] and not found["second"] and found["tested"] == 0
     assert found["frames"][0] == found["frames"][1]
+
+
+def test_a_hurried_frame_leaves_no_cell_out_and_is_soon_what_a_patient_one_is(page):
+    found = run(page, HURRY)
+    frames, patient = found["frames"], found["patient"]
+    assert 1 < len(frames) < 1000
+    assert all(frame["cells"] == patient["cells"] and frame["near"] == patient["near"] for frame in frames)
+    assert min(frame["drawn"] for frame in frames) > 0.5 * patient["drawn"]
+    assert frames[-1] == patient
 
 
 def test_the_budget_counts_what_stays(page):

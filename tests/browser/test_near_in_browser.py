@@ -9,7 +9,7 @@ from dav_gswt.terrain import splats
 from dav_gswt.terrain.displacement import displace_means
 from dav_gswt.terrain.heights import surface_from_config
 
-SIDE, COUNT, NEAR = 4.0, 3000, 0.05
+SIDE, COUNT, NEAR = 4.0, 1000, 0.05
 DEVIATIONS = np.geomspace(0.005, 0.5, 16)
 SURFACES = {"flat": {"kind": "flat"}, "hills": {"kind": "hills", "height": 1.0, "wavelength": 3.0}}
 LOOK = """async ({ surface, side, near, deviations, centres, sizes, cameras }) => {

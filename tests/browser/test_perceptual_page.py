@@ -11,6 +11,7 @@ from dav_gswt.files import read_json
 from dav_gswt.study.forced_choice import answers, results
 from dav_gswt.study.terrain.browser import served
 
+pytestmark = pytest.mark.slow
 BRIEF = 0.3  # seconds, instead of five
 STORED = "davgswt-2afc-"
 
@@ -19,13 +20,6 @@ STORED = "davgswt-2afc-"
 def kit(tmp_path_factory):
     """A kit of ten pairs: page and key."""
     return answer_files.written(tmp_path_factory.mktemp("kit"), answer_files.drawn(crops=2))
-
-
-@pytest.fixture(scope="module")
-def brief(tmp_path_factory):
-    """The same, with pictures that soon go."""
-    folder = tmp_path_factory.mktemp("brief")
-    return answer_files.written(folder, answer_files.drawn(crops=2), seconds=BRIEF)
 
 
 @pytest.fixture
@@ -69,26 +63,20 @@ def shown(page):
     return [source.split("/")[1].removesuffix(".png") for source in sources]
 
 
-def answer(page, number, choice):
-    """By key, by another key or by touch, in turn."""
-    ways = [
-        lambda: page.keyboard.press({"left": "ArrowLeft", "right": "ArrowRight"}[choice]),
-        lambda: page.keyboard.press({"left": "f", "right": "j"}[choice]),
-        lambda: page.click(f"#{choice}"),
-    ]
-    ways[number % len(ways)]()
-
-
-def answer_all(page, key, listed, first, upto=None):
-    """By a rule, from where the page is. first: of a pair, whether its first crop is chosen."""
+def answer_all(page, key, listed, upto=None):
+    """From where the page is: the first crop of a pair is chosen, but the second where it is the floor."""
     start = int(page.inner_text("#number").split()[0]) - 1
     for number, (name, left, right) in list(enumerate(listed))[start:upto]:
         reached(page, number + 1)
         assert shown(page) == [left, right]
         item = key["items"][name]
-        chosen = item["pictures"][0 if first(item) else 1]
+        chosen = item["pictures"][int(item["b"] == "floor")]
         page.wait_for_timeout(20)  # a picture is on the screen before anybody answers
-        answer(page, number, "left" if chosen == left else "right")
+        side = "left" if chosen == left else "right"
+        if number % 3 < 2:  # by one key, by another or by touch
+            page.keyboard.press({"left": ["ArrowLeft", "f"], "right": ["ArrowRight", "j"]}[side][number % 3])
+        else:
+            page.click(f"#{side}")
 
 
 def saved(page, folder):
@@ -100,16 +88,11 @@ def saved(page, folder):
     return path
 
 
-def semantic_or_floor(item):
-    return item["b"] != "floor"
-
-
-@pytest.mark.parametrize("as_file", [False, True], ids=["served", "as a file"])
-def test_all_trials_answered_are_saved_and_analysed(person, kit, tmp_path, as_file):
+def test_all_trials_answered_are_saved_and_analysed(person, kit, tmp_path):
     key = read_json(kit[1])
-    with person(as_file, "?list=5") as page:
+    with person(as_file=True, query="?list=5") as page:
         begin(page)
-        answer_all(page, key, key["lists"][5], semantic_or_floor)
+        answer_all(page, key, key["lists"][5])
         path = saved(page, tmp_path)
     told = json.loads(path.read_text())
     assert path.name == f"2afc_{told['participant']}.json" and told["list"] == 5
@@ -128,14 +111,14 @@ def test_a_page_that_is_loaded_again_goes_on_and_says_what_was_seen_twice(person
     key = read_json(kit[1])
     with person(query="?list=2") as page:
         begin(page)
-        answer_all(page, key, key["lists"][2], semantic_or_floor, upto=3)
+        answer_all(page, key, key["lists"][2], upto=3)
         reached(page, 4)
         shown(page)
         before = page.evaluate(f"JSON.parse(localStorage.getItem({STORED!r} + STUDY.study))")
         page.reload()
         assert page.inner_text("#done") == "3" and page.locator("#begin").is_hidden()
         page.click("#resume")
-        answer_all(page, key, key["lists"][2], semantic_or_floor)
+        answer_all(page, key, key["lists"][2])
         page.wait_for_selector("#end:not([hidden])")
         page.reload()  # nor are answers lost that were not saved yet
         told = json.loads(saved(page, tmp_path).read_text())
@@ -143,7 +126,8 @@ def test_a_page_that_is_loaded_again_goes_on_and_says_what_was_seen_twice(person
     assert [one["seen"] for one in told["answers"]] == [1, 1, 1, 2] + [1] * (len(told["answers"]) - 4)
 
 
-def test_pictures_go_after_their_time_and_may_be_answered_then(person, brief):
+def test_pictures_go_after_their_time_and_may_be_answered_then(person, tmp_path):
+    brief = answer_files.written(tmp_path, answer_files.drawn(crops=2), seconds=BRIEF)
     with person(kit=brief) as page:
         begin(page)
         Visit(page).until("current && current.gone")
@@ -159,8 +143,7 @@ def test_keys_between_pairs_and_keys_held_down_answer_nothing(person):
         begin(page)
         page.keyboard.press("ArrowLeft")  # nothing is shown yet
         shown(page)
-        page.keyboard.down("ArrowRight")
-        for _ in range(5):
+        for _ in range(6):
             page.keyboard.down("ArrowRight")
         reached(page, 2)
         shown(page)
@@ -168,23 +151,13 @@ def test_keys_between_pairs_and_keys_held_down_answer_nothing(person):
         assert page.evaluate("session.answers.length") == 1
 
 
-def test_who_stops_leaves_nothing_and_the_next_is_another_participant(person):
-    with person() as page:
-        begin(page)
-        shown(page)
-        first = page.evaluate("session.participant")
-        page.click("#stop")
-        assert page.evaluate("localStorage.length") == 0 and page.locator("#begin").is_disabled()
-        begin(page)
-        shown(page)
-        assert page.evaluate("session.participant") != first
-
-
-def test_lists_are_drawn_where_none_is_asked_for_or_the_one_asked_for_is_not_there(person):
-    with person(query="?list=9999") as page:
-        lists = set()
+def test_who_stops_leaves_nothing_and_the_next_is_another_participant_with_a_list_that_is_drawn(person):
+    with person(query="?list=9999") as page:  # there is no such list
+        people, lists = set(), set()
         for _ in range(6):
             begin(page)
+            people.add(page.evaluate("session.participant"))
             lists.add(page.evaluate("session.list"))
             page.click("#stop")
-        assert len(lists) > 1 and lists <= set(range(16))
+            assert page.evaluate("localStorage.length") == 0
+        assert len(people) == 6 and len(lists) > 1 and lists <= set(range(16))

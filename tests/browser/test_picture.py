@@ -1,7 +1,5 @@
 """What the page draws: ground where ground is, sky above it, no holes, and the same picture for everybody."""
 
-import json
-
 import numpy as np
 import pytest
 from fixtures import bundles
@@ -12,33 +10,20 @@ from dav_gswt.terrain.choice import tile_at
 
 SIDE, SALT = Ground().side, Ground().salt
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
-MAGENTA = (255, 0, 255)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def behind_magenta(page_of):
     """A page whose far ground and sky are magenta: it shines through every hole."""
-    folder = page_of(Ground())
-    manifest = json.loads((folder / "davgswt.json").read_text())
-    pink = [v / 255 for v in MAGENTA]
-    manifest |= {"ground_colour": pink, "sky": {"zenith": pink, "horizon": pink}}
-    (folder / "davgswt.json").write_text(json.dumps(manifest))
-    with served(folder) as address:
+    pink = [1, 0, 1]
+    edit = {"ground_colour": pink, "sky": {"zenith": pink, "horizon": pink}}
+    with served(page_of(Ground(), edit=lambda manifest: manifest.update(edit))) as address:
         yield address
 
 
 def through(picture) -> np.ndarray:
     """How much magenta shows, 0 to 1: tiles hold at most 60 of 255 in blue, of which this is the excess."""
     return np.clip((picture[..., 2] - 60) / 195, 0, 1)
-
-
-def test_each_tile_shows_its_colour_where_the_hash_puts_it(still, plain):
-    seen = still(plain)
-    for i, j in [(0, 0), (1, 0), (0, 1), (-1, -1), (-3, 2), (250, -1000)]:
-        picture = seen.at(x=(i + 0.5) * SIDE, y=(j + 0.5) * SIDE, eye=1.0, yaw=90, pitch=-90)
-        # one tile fills the picture (1.15 of 4 units wide). Gaps between its discs let at most 2 of 255 of the far
-        # ground through, blending rounds some 10 times by half a step
-        assert np.abs(picture - colour_of(tile_at(i, j, SALT, 1))).max() <= 6
 
 
 def test_east_is_right_and_north_is_up_when_one_faces_north(still, plain):
@@ -68,7 +53,6 @@ def test_sky_is_above_the_horizon_and_ground_below_it(still, plain):
 @pytest.mark.parametrize(
     "place",
     [
-        pytest.param(dict(x=1.0, y=1.0, eye=0.5, pitch=-40), id="near"),
         pytest.param(OBLIQUE, id="oblique"),
         pytest.param(dict(x=0.0, y=0.0, eye=12.0, pitch=-90), id="from above"),
         pytest.param(dict(x=51234.5, y=-70000.25, eye=2.0, pitch=-30, yaw=200), id="kilometres out"),
@@ -80,7 +64,7 @@ def test_the_ground_has_no_holes(still, behind_magenta, place):
     assert through(picture).max() < 0.03
 
 
-@pytest.mark.parametrize("budget", [2_500, 1_500, 1_000])
+@pytest.mark.parametrize("budget", [2_500, 1_000])
 def test_a_small_budget_draws_coarser_ground_and_no_holes(still, behind_magenta, budget):
     seen = still(behind_magenta)
     seen.page.evaluate("place => davgswt.set(place)", dict(x=2.0, y=2.0, eye=1.0, yaw=60, pitch=-25))
@@ -92,61 +76,22 @@ def test_a_small_budget_draws_coarser_ground_and_no_holes(still, behind_magenta,
     assert state["reach"] > 3 * SIDE
 
 
-def test_the_hole_test_would_see_a_hole(visit, page_of):
-    folder = page_of(Ground())
-    manifest = json.loads((folder / "davgswt.json").read_text())
-    manifest |= {"ground_colour": [1, 0, 1]}
-    for chunk in [c for tile in manifest["tiles"] for c in tile["chunks"]]:
-        path = folder / chunk["file"]
-        data = bytearray(path.read_bytes())
-        data[15 : 16 * chunk["count"] : 16] = bytes(chunk["count"])  # opacity 0
-        path.write_bytes(data)
-        del chunk["sha256"]
-    (folder / "davgswt.json").write_text(json.dumps(manifest))
-    with served(folder) as address:
-        assert through(visit().open(f"{address}?still").at(**OBLIQUE)).min() == 1
-
-
-def test_two_visits_see_the_same_bits(visit, plain):
-    pictures = [visit().open(f"{plain}?still").at(**OBLIQUE) for _ in range(2)]
-    assert (pictures[0] == pictures[1]).all()
-    assert pictures[0].std() > 10
-
-
-def test_a_link_brings_another_person_to_the_same_place(visit, still, plain):
-    first = still(plain)
-    expected = first.at(**OBLIQUE)
+def test_a_link_brings_another_person_to_the_same_place_and_the_same_bits(visit, still, plain):
+    expected = still(plain).at(**OBLIQUE)
     other = visit().open(f"{plain}?still#3,5,2,20,-30")
     assert {k: other.state[k] for k in OBLIQUE} == OBLIQUE
-    assert (other.picture() == expected).all()
+    assert (other.picture() == expected).all() and expected.std() > 10
 
 
-def test_two_to_the_32_cells_out_the_same_tiles_give_the_same_bits(still, plain):
-    # The hash repeats after 2^32 cells, and 2^32 cells of side 4 are a distance that doubles hold exactly.
-    seen = still(plain)
-    near = seen.at(**OBLIQUE)
-    far = seen.at(**OBLIQUE | {"x": OBLIQUE["x"] + 2**32 * SIDE, "y": OBLIQUE["y"] - 2**32 * SIDE})
-    assert (near == far).all()
-
-
-def test_a_step_kilometres_out_moves_the_picture_as_much_as_a_step_at_home(visit, page_of):
-    # Were positions single precision, a step of 1 mm would be lost at 2^34 units, where floats are 2048 units apart.
-    with served(page_of(Ground(speckle=30))) as address:
-        seen = visit().open(f"{address}?still")
-        changes = []
-        for x in (3.0, 3.0 + 2**32 * SIDE):
-            before = seen.at(**OBLIQUE | {"x": x})
-            changes.append(seen.at(**OBLIQUE | {"x": x + 2**-6}) - before)
-    assert np.abs(changes[0]).max() > 0
-    assert (changes[0] == changes[1]).all()
-
-
-def test_coarser_levels_are_drawn_farther_away(still, plain):
-    seen = still(plain)
-    seen.at(x=2.0, y=2.0, eye=1.0, yaw=0, pitch=-10)
-    levels = {(cell["i"], cell["j"]): cell["level"] for cell in seen.state["drawn"]}
-    # level 0 is used nearer than 2 sides (8 units): cell (1, 0) begins 2 units away, cell (3, 0) 10
-    assert levels[1, 0] == 0 and levels[3, 0] == 1
+def test_two_to_the_32_cells_out_the_same_tiles_and_steps_give_the_same_bits(still, plain):
+    # The hash repeats after 2^32 cells, and 2^32 cells of side 4 are a distance that doubles hold exactly. Were
+    # positions single precision, the step would be lost there, where floats are 2048 units apart.
+    seen, pictures = still(plain), []
+    for cells in (0, 2**32):
+        place = OBLIQUE | {"x": OBLIQUE["x"] + cells * SIDE, "y": OBLIQUE["y"] - cells * SIDE}
+        pictures.append([seen.at(**place), seen.at(**place | {"x": place["x"] + 2**-4})])
+    assert (np.array(pictures[0]) == pictures[1]).all()
+    assert (pictures[0][0] != pictures[0][1]).any()
 
 
 def test_each_tile_keeps_the_order_of_its_own_direction(still, plain):

@@ -35,11 +35,9 @@ def seen_as(lonely_folder):
 @pytest.fixture(scope="module")
 def lonely_folder(page_of):
     """A page with one turned, drawn-out Gaussian a tile of 40 units before one plain colour."""
-    folder = page_of(bundles.Ground(side=40.0, levels=1, eye_floor=0.5), one)
-    manifest = json.loads((folder / "davgswt.json").read_text())
     plain = {"ground_colour": BACK.tolist(), "sky": {"zenith": BACK.tolist(), "horizon": BACK.tolist()}}
-    (folder / "davgswt.json").write_text(json.dumps(manifest | plain))
-    return folder
+    ground = bundles.Ground(side=40.0, levels=1, eye_floor=0.5)
+    return page_of(ground, one, edit=lambda manifest: manifest.update(plain))
 
 
 @pytest.fixture(scope="module")

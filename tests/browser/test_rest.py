@@ -69,41 +69,25 @@ def test_slices_follow_each_other_and_are_short(modules, cost):
     assert len(slices) <= 252
 
 
-def test_a_picture_at_rest_is_the_one_that_is_drawn_at_once(visit, plain):
-    seen = visit(320, 200).open(plain)
-    seen.page.evaluate("place => davgswt.set(place)", OBLIQUE)
-    seen.until("davgswt.state.whole")
-    grabbed = seen.page.evaluate("davgswt.grab()")
-    assert (seen.decode(*grabbed) == seen.at(**OBLIQUE)).all()
-
-
-def test_who_walks_on_gets_pictures_at_once_and_the_finest_again_at_rest(visit, plain):
-    seen = visit(320, 200).open(plain)
-    seen.until("davgswt.state.whole")
-    seen.page.keyboard.down("w")
-    seen.until("davgswt.state.x > 2.3 && !davgswt.state.whole")
-    seen.page.keyboard.up("w")
-    seen.until("davgswt.state.whole")
-
-
-def test_progress_is_shown_while_a_picture_takes_long(visit, page_of):
-    with served(page_of(Ground(discs=48))) as address:
-        seen = visit(640, 400)
-        # a device on which every slice takes long: fences pass late
-        seen.page.add_init_script(
-            """const ask = WebGL2RenderingContext.prototype.getSyncParameter, born = new WeakMap();
-            WebGL2RenderingContext.prototype.getSyncParameter = function (sync, name) {
-              if (!born.has(sync)) born.set(sync, performance.now());
-              return performance.now() - born.get(sync) < 60 ? this.UNSIGNALED : ask.call(this, sync, name);
-            };"""
-        )
+@pytest.mark.slow
+def test_a_picture_at_rest_is_the_one_that_is_drawn_at_once_after_progress_and_a_walk(visit, page_of, slow_device):
+    with served(page_of(Ground(discs=24))) as address:
+        seen = visit(320, 200)
+        seen.page.add_init_script(slow_device.replace("150", "60"))
         seen.open(address)
         seen.until("!refining.hidden && refining.value > 0")
         assert not seen.state["whole"]
         seen.until("davgswt.state.whole", seconds=90)
         assert not seen.page.locator("#refining").is_visible()
+        seen.page.keyboard.down("w")
+        seen.until("davgswt.state.x > 2.3 && !davgswt.state.whole")
+        seen.page.keyboard.up("w")
+        seen.page.evaluate("place => davgswt.set(place)", OBLIQUE)
+        grabbed = seen.page.evaluate("davgswt.grab()")
+        assert (seen.decode(*grabbed) == seen.at(**OBLIQUE)).all()
 
 
+@pytest.mark.slow
 def test_another_overlay_is_refined_however_late_the_worker_answers(visit, page_of):
     """The frame at hand, drawn in full before, is not the picture that is due: a coarser one comes first."""
     with served(page_of(Ground(discs=16))) as address:

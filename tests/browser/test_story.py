@@ -1,11 +1,10 @@
 """The panel that says how a terrain was made."""
 
-import json
-
 import numpy as np
 import pytest
 from fixtures import bundles
 from fixtures.page_visit import VIEWER
+from playwright.sync_api import Error
 
 from dav_gswt.images.jpeg import encode_jpeg
 from dav_gswt.study.terrain.browser import served
@@ -15,30 +14,17 @@ from dav_gswt.terrain.page_story import Story
 
 PHOTOS = [{"round": int(k > 2), "at": [k - 2.0, 1.0, 3.0], "look": [0.5, -0.5], "picture": k} for k in range(5)]
 ROUNDS = [{"photos": 3, "psnr": 27.1, "preset": "draft"}, {"photos": 2, "psnr": None}]
-VALUE = {
-    "unit": "metre",
-    "half": 2.0,
-    "photos": PHOTOS,
-    "rounds": ROUNDS,
-    "thumb": 120,
-    "columns": 8,
-    "pictures": 5,
-}
+VALUE = dict(unit="metre", half=2.0, photos=PHOTOS, rounds=ROUNDS, thumb=120, columns=8, pictures=5)
 
 
-@pytest.fixture
-def folder(tmp_path):
+@pytest.mark.slow
+def test_the_panel_shows_places_rounds_and_photos(visit, plain, tmp_path):
     bundles.write_bundle(tmp_path / "bundle", bundles.Ground())
     picture = encode_jpeg(np.full((120, 960, 3), 0.5), 60)
     front = Front("Meadow", "From 5 photos", picture, Story(VALUE, picture))
     write_page(tmp_path / "bundle", VIEWER, tmp_path / "page", front=front)
-    return tmp_path / "page"
-
-
-@pytest.mark.parametrize("width, height", [(360, 640), (844, 390), (1280, 720)])
-def test_the_panel_shows_places_rounds_and_photos(visit, folder, width, height):
-    with served(folder) as address:
-        seen = visit(width, height).open(f"{address}?still")
+    with served(tmp_path / "page") as address:
+        seen = visit(360, 640).open(f"{address}?still")
         seen.page.locator("#menuButton").click()
         seen.page.locator("#storyButton").click()
         panel = seen.page.locator("#story")
@@ -51,31 +37,38 @@ def test_the_panel_shows_places_rounds_and_photos(visit, folder, width, height):
         assert panel.evaluate("panel => panel.scrollWidth <= panel.clientWidth")
         seen.page.keyboard.press("Escape")
         assert not panel.is_visible() and not seen.page.locator("#menu").is_visible()
-
-
-def test_a_page_without_a_story_offers_none(visit, plain):
-    seen = visit(480, 300).open(f"{plain}?still")
-    seen.page.locator("#menuButton").click()
-    assert not seen.page.locator("#storyButton").is_visible()
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"photos": 3},
-        {"thumb": 0},
-        {"rounds": [{"photos": -1, "psnr": 1}]},
-        {"rounds": [{"photos": 1, "psnr": 1, "preset": 3}]},
-        {"photos": [{"round": 0, "at": ["1", 2, 3], "look": [0, 0]}]},
-        {"photos": [PHOTOS[0] | {"picture": 7}]},
-    ],
-)
-def test_a_story_that_is_none_is_told(visit, folder, change):
-    (folder / "story.json").write_text(json.dumps(VALUE | change))
-    with served(folder) as address:
-        seen = visit(480, 300).open(f"{address}?still")
+        (tmp_path / "page/story.json").write_text("{}")
+        seen.open(f"{address}?still")
         seen.page.locator("#menuButton").click()
         seen.page.locator("#storyButton").click()
         alert = seen.page.get_by_role("alert")
         alert.wait_for(state="visible")
         assert "story.json is not as the workflow writes it" in alert.inner_text()
+        seen.open(f"{plain}?still")
+        seen.page.locator("#menuButton").click()
+        assert not seen.page.locator("#storyButton").is_visible(), "this page has none"
+
+
+@pytest.mark.parametrize(
+    "change, sound",
+    [
+        ({"more": 1}, True),
+        ({"unit": 3}, False),
+        ({"half": 0}, False),
+        ({"thumb": 0}, False),
+        ({"columns": 65}, False),
+        ({"photos": 3}, False),
+        ({"photos": [{"round": 0, "at": ["1", 2, 3], "look": [0, 0]}]}, False),
+        ({"photos": [{"round": 0, "at": [1, 2, 3], "look": [0]}]}, False),
+        ({"photos": [PHOTOS[0] | {"picture": 5}]}, False),
+        ({"rounds": [{"photos": -1, "psnr": 1}]}, False),
+        ({"rounds": [{"photos": 1, "psnr": "1"}]}, False),
+        ({"rounds": [{"photos": 1, "psnr": 1, "preset": 3}]}, False),
+    ],
+)
+def test_a_story_is_read_or_refused(call, change, sound):
+    if sound:
+        assert call("data/story.js", "readStory", VALUE | change) == VALUE
+    else:
+        with pytest.raises(Error, match="story.json is not as the workflow writes it"):
+            call("data/story.js", "readStory", VALUE | change)

@@ -63,6 +63,7 @@ def save(seen) -> bytes:
     return download.value.path().read_bytes()
 
 
+@pytest.mark.slow
 def test_a_video_shows_each_moment_of_the_path(flying, modules):
     seen = flying(width=320, height=201)
     expected = [seen.at(**{k: PATH["path"][n][k] for k in ("x", "y", "eye", "yaw", "pitch")}) for n in (0, 3)]
@@ -78,6 +79,7 @@ def test_a_video_shows_each_moment_of_the_path(flying, modules):
     assert seen.state["error"] is None
 
 
+@pytest.mark.slow
 def test_without_an_encoder_the_canvas_is_recorded_while_the_path_plays(flying, modules):
     seen = flying(NO_ENCODER, width=320, height=400)
     assert "records videos while the path plays" in seen.page.locator("#videoNote").inner_text()
@@ -88,27 +90,19 @@ def test_without_an_encoder_the_canvas_is_recorded_while_the_path_plays(flying, 
     assert seen.state["x"] == 10, "it was played"
 
 
-def test_a_browser_that_makes_no_videos_says_so(flying):
-    seen = flying(f"{NO_ENCODER} delete globalThis.MediaRecorder;", width=480, height=600)
-    assert "This browser makes no videos." in seen.page.locator("#videoNote").inner_text()
-    seen.page.wait_for_timeout(400)
-    assert seen.page.locator("#video").is_disabled()
-
-
-def test_a_video_is_given_up_when_asked(flying):
-    seen = flying(width=320, height=400, path=PATH | {"path": [PATH["path"][0], PATH["path"][0] | {"seconds": 500}]})
+@pytest.mark.slow
+def test_a_video_is_given_up_when_asked_and_refused_when_it_is_too_long(flying):
+    path = [PATH["path"][0], PATH["path"][0] | {"seconds": 500}]
+    seen = flying(width=320, height=400, path=PATH | {"path": path})
     seen.until("!video.disabled")
     seen.page.locator("#video").click()
     seen.until("!job.hidden && /Making the video: \\d+ %/.test(jobText.textContent)")
     seen.page.keyboard.press("Escape")
     seen.until("job.hidden && toast.textContent.includes('given up')")
     assert seen.state["error"] is None
-
-
-def test_a_path_that_is_too_long_is_refused(flying):
-    seen = flying(width=320, height=400, path=PATH | {"path": [PATH["path"][0], PATH["path"][0] | {"seconds": 1e9}]})
-    seen.until("!video.disabled")
-    seen.page.locator("#video").click()
+    path[1]["seconds"] = 1e9
+    seen.page.evaluate("path => davgswt.flyPath.load(path)", PATH | {"path": path})
+    seen.page.evaluate("document.getElementById('video').click()")
     seen.until("toast.textContent.includes('ten minutes')")
 
 
@@ -116,14 +110,8 @@ def test_a_path_that_is_too_long_is_refused(flying):
     "size, expected",
     [([1280, 720], [1280, 720]), ([2560, 1440], [1920, 1080]), ([361, 641], [362, 642]), ([1, 1], [2, 2])],
 )
-def test_videos_have_even_sizes(modules, size, expected):
-    found = modules.evaluate(
-        """async ([width, height]) => {
-          const { videoSize } = await import("./ui/video.js");
-          return videoSize({ width, height });
-        }""",
-        size,
-    )
+def test_videos_have_even_sizes(call, size, expected):
+    found = call("ui/video.js", "videoSize", dict(zip(("width", "height"), size, strict=True)))
     assert [found["width"], found["height"]] == expected
 
 

@@ -14,17 +14,16 @@ def moving(chromium, plain):
         yield Visit(context.new_page()).open(plain)
 
 
-def test_a_walk_changes_the_place_and_coming_back_shows_the_same_picture(visit, plain):
-    seen = visit().open(plain)
-    before = seen.at(**OBLIQUE)
-    seen.page.keyboard.down("w")
-    seen.until("davgswt.state.x > 3.2")
-    seen.page.keyboard.up("w")
-    away = seen.state
+def test_a_walk_changes_the_place_and_coming_back_shows_the_same_picture(moving):
+    before = moving.at(**OBLIQUE)
+    moving.page.keyboard.down("w")
+    moving.until("davgswt.state.x > 3.2")
+    moving.page.keyboard.up("w")
+    away = moving.state
     # yaw 20 degrees: the walk goes east by cos 20 and north by sin 20 of it
     assert (away["y"] - 5) / (away["x"] - 3) == pytest.approx(0.36397, abs=1e-4)
-    assert (seen.picture() != before).any()
-    assert (seen.at(**OBLIQUE) == before).all()
+    assert (moving.picture() != before).any()
+    assert (moving.at(**OBLIQUE) == before).all()
 
 
 @pytest.mark.parametrize(
@@ -41,28 +40,91 @@ def test_a_walk_changes_the_place_and_coming_back_shows_the_same_picture(visit, 
     ],
 )
 def test_each_key_does_what_the_help_says(moving, key, condition):
-    moving.at(**OBLIQUE)
+    moving.page.evaluate("place => davgswt.set(place)", OBLIQUE)
     moving.page.keyboard.down(key)
     moving.until(f"(s => {condition})(davgswt.state)")
     moving.page.keyboard.up(key)
 
 
-def test_the_eye_stays_above_its_floor(visit, plain):
-    seen = visit(160, 100).open(f"{plain}?still#2,2,0.001,0,-20")
-    assert seen.state["eye"] == Ground().eye_floor
-    seen.at(eye=-5)
-    assert seen.state["eye"] == Ground().eye_floor
+STEP = """async ([place, mode, held, wish]) => {
+  const { createWalker, moveBy, stepWalker } = await import("./ui/walker.js");
+  const walker = createWalker({ tile_side: 4, eye_floor: 0.5 }, place);
+  walker.mode = mode;
+  for (const action of held) walker.held.add(action);
+  const still = { forward: 0, right: 0, turn: 0, tilt: 0, rise: 0, run: 0 };
+  const moved = wish ? moveBy(walker, { ...still, ...wish }, 0.5) : stepWalker(walker, 0.5);
+  return [moved, walker.x, walker.y, walker.eye, walker.yaw, walker.pitch];
+}"""
+AHEAD = dict(x=3.0, y=5.0, eye=2.0, yaw=90.0, pitch=-30.0)
+
+
+@pytest.mark.parametrize(
+    "mode, held, wish, expected",
+    [
+        # half a second at 1.2 eye heights of 2 a second
+        ("walk", ["forward"], None, [True, 3, 6.2, 2, 90, -30]),
+        ("walk", ["back", "run"], None, [True, 3, 0.2, 2, 90, -30]),
+        ("walk", ["right"], None, [True, 4.2, 5, 2, 90, -30]),
+        ("walk", ["left", "forward"], None, [True, 3 - 1.2 / 2**0.5, 5 + 1.2 / 2**0.5, 2, 90, -30]),
+        ("walk", ["forward", "back"], None, [False, 3, 5, 2, 90, -30]),
+        ("walk", ["turnLeft"], None, [True, 3, 5, 2, 125, -30]),
+        ("walk", ["turnRight", "higher"], None, [True, 3, 5, 2 * 2.718281828**0.6, 55, -30]),
+        ("walk", [], {"tilt": -1, "turn": -3}, [True, 3, 5, 2, 345, -65]),
+        ("walk", [], {"tilt": 4}, [True, 3, 5, 2, 90, 90]),
+        ("walk", [], {"rise": -9}, [True, 3, 5, 0.5, 90, -30]),
+        ("walk", [], {"rise": 9}, [True, 3, 5, 64, 90, -30]),
+        ("fly", ["forward"], None, [True, 3, 5 + 1.2 * 0.75**0.5, 1.4, 90, -30]),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_a_step_goes_where_one_looks_within_bounds(modules, mode, held, wish, expected):
+    assert modules.evaluate(STEP, [AHEAD, mode, held, wish]) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "address, place, overlay, paint",
+    [
+        ("#3,5,2,20,-30&show=level&paint=AbC", dict(x=3, y=5, eye=2, yaw=20, pitch=-30), 2, "AbC"),
+        ("#3,5&paint=AbC&show=tile", dict(x=3, y=5), 1, "AbC"),
+        ("#one,,NaN,Infinity&show=nothing", {}, 0, ""),
+        ("#%2c,%2c&show=%", {}, 0, ""),
+        ("#%", {}, 0, ""),
+        ("", {}, 0, ""),
+    ],
+)
+def test_an_address_is_a_place_an_overlay_and_paint(call, address, place, overlay, paint):
+    found = [call("ui/address.js", f"parse{what}", address) for what in ("Place", "Overlay", "Paint")]
+    assert found == [place, overlay, paint]
+
+
+def test_an_address_tells_a_place_to_a_thousandth(call):
+    place = dict(x=3.00012, y=-5, eye=2, yaw=20, pitch=-30.5, floor=0.5, radius=0)
+    assert call("ui/address.js", "formatAddress", place, 0, "") == "#3.0001,-5.0000,2.0000,20.000,-30.500"
+    coarse = call("ui/address.js", "formatAddress", place | {"floor": 50}, 2, "AbC")
+    assert coarse == "#3.00,-5.00,2.00,20.000,-30.500&show=level&paint=AbC"
+
+
+def test_a_place_that_is_beyond_all_bounds_is_passed_over(still, plain):
+    seen = still(plain)
+    seen.page.evaluate("place => davgswt.set(place)", OBLIQUE)
+    seen.page.evaluate("davgswt.set({ x: 1e300, y: -1e300, eye: NaN, yaw: Infinity })")
+    assert {key: seen.state[key] for key in OBLIQUE} == OBLIQUE
+
+
+def test_the_eye_stays_above_its_floor_and_the_wheel_moves_it(still, plain):
+    seen, floor = still(plain), Ground().eye_floor
+    seen.page.evaluate("davgswt.set({ x: 2, y: 2, eye: -5, yaw: 0, pitch: -20 })")
+    assert seen.state["eye"] == floor
     seen.page.mouse.move(80, 20)  # above the tools
-    for _ in range(3):
-        seen.page.mouse.wheel(0, -200)
-    assert seen.state["eye"] == Ground().eye_floor
+    seen.page.mouse.wheel(0, -200)
+    assert seen.state["eye"] == floor
     seen.page.mouse.wheel(0, 200)
-    seen.until(f"davgswt.state.eye > 1.3 * {Ground().eye_floor}")
+    seen.until(f"davgswt.state.eye > 1.3 * {floor}")
 
 
-def test_dragging_turns_the_view_as_if_the_picture_were_held(visit, plain):
-    seen = visit().open(f"{plain}?still")
-    seen.at(**OBLIQUE)
+def test_dragging_turns_the_view_as_if_the_picture_were_held(still, plain):
+    seen = still(plain)
+    seen.page.evaluate("place => davgswt.set(place)", OBLIQUE)
     seen.page.mouse.move(100, 20)  # above the tools
     seen.page.mouse.down()
     seen.page.mouse.move(140, 40)
@@ -71,6 +133,7 @@ def test_dragging_turns_the_view_as_if_the_picture_were_held(visit, plain):
     assert (seen.state["yaw"], seen.state["pitch"]) == (pytest.approx(27.5), pytest.approx(-26.25))
 
 
+@pytest.mark.slow
 def test_a_phone_has_a_pad_to_walk_with(visit, plain):
     seen = visit(390, 844, has_touch=True, is_mobile=True).open(plain)
     pad = seen.page.get_by_role("button", name="Hold to walk forward")
@@ -81,25 +144,18 @@ def test_a_phone_has_a_pad_to_walk_with(visit, plain):
     assert seen.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-def test_the_address_follows_the_walk_and_a_pasted_one_is_followed(visit, plain):
-    seen = visit(160, 100).open(plain)
-    seen.at(**OBLIQUE)
-    seen.until("location.hash.startsWith('#3.0000,5.0000,2.0000,20.000,-30.000')")
-    seen.page.evaluate("location.hash = '#-7,1.5,1,90,-10'")
-    seen.until("davgswt.state.x === -7 && davgswt.state.yaw === 90")
+def test_the_address_follows_the_walk_and_a_pasted_one_is_followed(moving):
+    moving.page.evaluate("place => davgswt.set(place)", OBLIQUE)
+    moving.until("location.hash.startsWith('#3.0000,5.0000,2.0000,20.000,-30.000')")
+    moving.page.keyboard.press("o")
+    moving.until("location.hash.endsWith('&show=tile')")
+    moving.page.evaluate("location.hash = '#-7,1.5,1,90,-10&show=level&paint='")
+    moving.until("davgswt.state.x === -7 && davgswt.state.yaw === 90 && davgswt.state.overlay === 'level'")
+    moving.page.evaluate("location.hash = '#3,5,2,20,-30'")
+    moving.until("davgswt.state.x === 3 && davgswt.state.overlay === 'picture'")
 
 
-def test_the_address_names_the_overlay_and_a_pasted_one_shows_it(visit, plain):
-    seen = visit(160, 100).open(f"{plain}#3,5,2,20,-30&show=level")
-    assert seen.state["overlay"] == "level"
-    seen.page.keyboard.press("o")
-    seen.until("location.hash.endsWith('&show=order')")
-    seen.page.evaluate("location.hash = '#-7,1.5,1,90,-10&show=tile&paint='")
-    seen.until("davgswt.state.x === -7 && davgswt.state.overlay === 'tile'")
-    seen.page.evaluate("location.hash = '#3,5,2,20,-30'")
-    seen.until("davgswt.state.x === 3 && davgswt.state.overlay === 'picture'")
-
-
+@pytest.mark.slow
 def test_an_address_that_is_entered_as_the_page_writes_its_own_is_followed(visit, plain):
     seen = visit(160, 100)
     seen.page.add_init_script("""window.ticks = [];
@@ -114,31 +170,16 @@ def test_an_address_that_is_entered_as_the_page_writes_its_own_is_followed(visit
     seen.until("davgswt.state.x === -7", 5.0)
 
 
-@pytest.mark.parametrize("name", ["picture", "nothing", "%", ""])
-def test_an_address_of_no_overlay_shows_the_terrain(visit, plain, name):
-    assert visit(160, 100).open(f"{plain}?still#3,5,2,20,-30&show={name}").state["overlay"] == "picture"
-
-
-def test_a_link_with_nonsense_starts_at_the_usual_place(visit, plain):
-    usual = visit(160, 100).open(f"{plain}?still").state
-    state = visit(160, 100).open(f"{plain}?still#one,,NaN,Infinity").state
-    assert state == usual
-
-
-def test_a_resized_window_is_filled(visit, plain):
-    seen = visit().open(f"{plain}?still")
-    seen.page.set_viewport_size({"width": 200, "height": 300})
-    seen.until("document.getElementById('picture').height === 300")
-    assert seen.at(**OBLIQUE).shape == (300, 200, 3)
-
-
+@pytest.mark.slow
 def test_a_lost_context_comes_back_with_the_same_picture(visit, plain):
+    """Also where it goes while a picture is under way."""
     seen = visit().open(f"{plain}?still")
     before = seen.at(**OBLIQUE)
     seen.page.evaluate(
         """() => {
           const gl = document.getElementById("picture").getContext("webgl2");
           window.loss = gl.getExtension("WEBGL_lose_context");
+          davgswt.settle();
           loss.loseContext();
         }"""
     )
@@ -146,23 +187,6 @@ def test_a_lost_context_comes_back_with_the_same_picture(visit, plain):
     error.wait_for(state="visible")
     seen.page.evaluate("loss.restoreContext()")
     error.wait_for(state="hidden")
-    assert (seen.picture() == before).all()
-
-
-@pytest.mark.parametrize("overlay", ["picture", "level"])
-def test_a_picture_waits_for_a_context_that_is_lost_meanwhile(visit, plain, overlay):
-    seen = visit(160, 100).open(f"{plain}?still")
-    seen.page.evaluate("name => davgswt.overlay(name)", overlay)
-    before = seen.at(**OBLIQUE)
-    seen.page.evaluate(
-        """() => {
-          const gl = document.getElementById("picture").getContext("webgl2");
-          const loss = gl.getExtension("WEBGL_lose_context");
-          davgswt.settle(); // under way when the context goes
-          loss.loseContext();
-          setTimeout(() => loss.restoreContext(), 200);
-        }"""
-    )
     assert (seen.picture() == before).all()
 
 

@@ -2,7 +2,6 @@
 
 import os
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -55,26 +54,14 @@ class Ended:
         return f"status {self.status}: {lines[-6:]}"
 
 
-@dataclass(frozen=True)
-class Limit:
-    """A limit of a resource (`resource.RLIMIT_...`), in bytes, for a run and all its jobs."""
-
-    kind: int
-    size: int
-
-    def set(self) -> None:
-        resource.setrlimit(self.kind, (self.size, resource.RLIM_INFINITY))
-
-
 class Experiment:
     """A copy of the repository. What a run prints is beside the folder, so that a full disk takes no word of it."""
 
-    def __init__(self, folder: Path, cores: int, mount: Callable[[Path], None] = lambda folder: None):
+    def __init__(self, folder: Path, cores: int):
         self.folder, self.cores = folder, cores
         self.out = folder.with_suffix(".txt")
         self.temporary = folder / "tmp"
         folder.mkdir(parents=True, exist_ok=True)
-        mount(folder)
         self.temporary.mkdir()
         for name in COPIED:
             source = ROOT / name
@@ -84,9 +71,12 @@ class Experiment:
                 shutil.copy(source, folder / name, follow_symlinks=False)
 
     def start(
-        self, limit: Limit | None = None, command: list[str] | None = None, more: dict[str, str] | None = None
+        self, limit: Callable | None = None, command: list[str] | None = None, more: dict[str, str] | None = None
     ) -> subprocess.Popen:
-        """Begin a run in a session of its own. command: other than that of `make run`; more: environment variables."""
+        """Begin a run in a session of its own. limit: sets one of a resource for the run and all its jobs.
+
+        command: other than that of `make run`; more: environment variables.
+        """
         usual = ["dav_gswt.cli.run", "--cores", str(self.cores), "--configfile", TINY]
         with self.out.open("w") as file:
             return subprocess.Popen(
@@ -96,10 +86,10 @@ class Experiment:
                 stderr=file,
                 start_new_session=True,
                 env=os.environ | ONE_THREAD | {"TMPDIR": str(self.temporary)} | (more or {}),
-                preexec_fn=limit.set if limit else None,
+                preexec_fn=limit,
             )
 
-    def run(self, limit: Limit | None = None) -> Ended:
+    def run(self, limit: Callable | None = None) -> Ended:
         return self.wait(self.start(limit))
 
     def run_on_cluster(self, options: list[str], more: dict[str, str], targets: list[str] | None = None) -> Ended:

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from copy import copy
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import psutil
-from faults.experiment import START, Ended, Experiment, Limit, Reference
+from faults.experiment import START, Ended, Experiment, Reference
 
 FULL, KILLED = "free some space", "was killed by SIGKILL: was there too little memory?"
 LATENCY, TOO_LATE = 3, 8  # seconds that Snakemake waits for files; seconds after which they appear
@@ -37,12 +38,14 @@ class Trial:
     rng: random.Random
     cores: int
 
-    def begin(self, **options) -> Experiment:
-        return Experiment(self.folder / "run", self.cores, **options)
+    def begin(self) -> Experiment:
+        return Experiment(self.folder / "run", self.cores)
 
-    def draw_moment(self, stage: str) -> float:
-        """Seconds after the begin of a stage, anywhere in it."""
-        return self.rng.uniform(0, self.wanted.seconds[stage])
+    def wait_within(self, run: Experiment, job: subprocess.Popen, stage: str, part: float = 1.0) -> None:
+        """Wait for a random moment of a stage, in its first part."""
+        run.wait_for_stage(job, self.list_from(stage))
+        with suppress(subprocess.TimeoutExpired):
+            job.wait(part * self.rng.uniform(0, self.wanted.seconds[stage]))
 
     def list_from(self, stage: str) -> set[str]:
         """A stage and all that come after it."""
@@ -71,9 +74,7 @@ def kill_runs(trial: Trial) -> list[Strike]:
     run, strikes = trial.begin(), []
     for stage in trial.wanted.stages:
         job = run.start()
-        run.wait_for_stage(job, trial.list_from(stage))
-        with suppress(subprocess.TimeoutExpired):
-            job.wait(trial.draw_moment(stage))
+        trial.wait_within(run, job, stage)
         if job.poll() is None:  # not over before it could be killed
             strikes.append(Strike(trial.fault, run.kill(job).stage))
     return trial.end(run, strikes)
@@ -84,9 +85,7 @@ def kill_jobs(trial: Trial) -> list[Strike]:
     run, strikes = trial.begin(), []
     for rule in trial.wanted.stages[1:]:
         job = run.start()
-        run.wait_for_stage(job, trial.list_from(rule))
-        with suppress(subprocess.TimeoutExpired):
-            job.wait(trial.draw_moment(rule) / 2)
+        trial.wait_within(run, job, rule, 0.5)
         found = (run.find_script(Ended(0, run.out.read_text()).stage) for _ in run.watch(job))
         with suppress(psutil.Error):
             if process := next(filter(None, found), None):
@@ -102,8 +101,7 @@ def fill_disk(trial: Trial) -> list[Strike]:
     Without root: a limit of the size of files instead.
     """
     if os.geteuid():
-        sizes = [int(30_000 * 1.3**k) for k in range(20)]
-        return starve(trial, [Limit(resource.RLIMIT_FSIZE, size) for size in sizes], FULL)
+        return starve(trial, resource.RLIMIT_FSIZE, [int(30_000 * 1.3**k) for k in range(20)], FULL)
     with mount_memory(trial.folder / "run"):
         run, strikes = trial.begin(), []
         for stage in trial.wanted.stages:
@@ -118,14 +116,14 @@ def fill_disk(trial: Trial) -> list[Strike]:
 
 def limit_memory(trial: Trial) -> list[Strike]:
     """A limit of the address space, a bit larger after every failure."""
-    sizes = [int(1e9 * 1.1**k) for k in range(30)]
-    return starve(trial, [Limit(resource.RLIMIT_AS, size) for size in sizes], "memory")
+    return starve(trial, resource.RLIMIT_AS, [int(1e9 * 1.1**k) for k in range(30)], "memory")
 
 
-def starve(trial: Trial, limits: list[Limit], words: str) -> list[Strike]:
-    """Run under one limit after the other until a run ends well."""
+def starve(trial: Trial, kind: int, sizes: list[int], words: str) -> list[Strike]:
+    """Run under one limit of a resource (`resource.RLIMIT_...`, bytes) after the other until a run ends well."""
     run, strikes = trial.begin(), []
-    for limit in limits:
+    for size in sizes:
+        limit = partial(resource.setrlimit, kind, (size, resource.RLIM_INFINITY))
         if not (ended := run.run(limit)).status:
             break
         strikes.append(trial.judge(ended, run, words))
@@ -138,9 +136,7 @@ def forbid_writing(trial: Trial) -> list[Strike]:
     (run.folder / "results").mkdir()
     for rule in trial.wanted.stages[1:]:
         job = run.start()
-        run.wait_for_stage(job, trial.list_from(rule))
-        with suppress(subprocess.TimeoutExpired):
-            job.wait(trial.draw_moment(rule) / 2)
+        trial.wait_within(run, job, rule, 0.5)
         with mount_read_only(run.folder / "results"):
             ended = run.wait(job)
         if ended.status:

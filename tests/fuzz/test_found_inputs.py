@@ -44,6 +44,8 @@ SHOT |= {"asked_to_got": 0.0, "taken": None}
 LENS = {"model": "PINHOLE", "width": 8, "height": 6, "params": [9, 9, 4, 3], "pinhole": [9, 9, 4, 3, 8, 6]}
 SELECTION = {"policy": "farthest", "k": 1, "poses": [asdict(POSE)]}
 SCORES = f"{','.join(FIELDS)}\na,{{}},1,1,{{}},,,,,,,{{}},1,,,,,,\n"
+PLY = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+PLY += "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n1 2 3 0 999 0\n"
 
 
 def read_found(path: Path):
@@ -76,45 +78,30 @@ def camera(**changes) -> dict:
         ("views.json", '{"start": [], "pool": [NaN], "test": []}', "NaN is no finite number"),
         ("views.json", '{"start": [' + "9" * 4500 + "]}", "not readable as JSON"),
         ("ground.json", json.dumps(FRAME | {"relief": "x"}).replace('"x"', "1e999"), "1e999 is no finite number"),
-        ("ground.json", json.dumps(FRAME | {"relief": "nan"}), "relief: "),
         ("ground.json", json.dumps(FRAME | {"images": True}), "images: "),
         ("ground.json", json.dumps(FRAME | {"points": 10**400}), "too large a number"),
-        ("poses.json", json.dumps(SELECTION | {"k": "1"}), "k: "),
         ("poses.json", json.dumps(SELECTION | {"policy": 3}), "policy: "),
         ("poses.json", json.dumps(SELECTION | {"poses": [asdict(POSE) | {"radius": "far"}]}), "poses.0.radius: "),
-        ("capture.json", "[" + "[" * 100_000, "not readable as JSON"),
         ("capture.json", record(name="../../outside.png"), "is no name of a file"),
         ("capture.json", record(name="a\0b.png"), "is no name of a file"),
-        ("capture.json", record(name="x" * 3000), "is no name of a file"),
         ("capture.json", record(name=None), "is no name of a file"),
         ("capture.json", record(**camera(width=8.5)), "not the record of a capture"),
         ("capture.json", record(**camera(fx=-1.0)), "out of range"),
         ("capture.json", record(**camera(rotation=[[1, 0, 0]] * 3)), "rotation is none"),
-        ("capture.json", record(**camera(translation=[1, 2])), "rotation is none"),
         ("capture.json", record(asked_to_got="far"), "a distance or a time is none"),
         ("capture.json", record(asked=asdict(POSE) | {"elevation": [], "camera": SHOT["got"]}), "elevation: "),
         ("lenses.json", "7", "not as the workflow writes it"),
         ("lenses.json", json.dumps([LENS | {"model": "BANANA"}]), "BANANA is no camera model"),
         ("lenses.json", json.dumps([LENS | {"params": [9]}]), "a lens lacks numbers"),
-        ("lenses.json", json.dumps([LENS | {"width": -8}]), "not as the workflow writes it"),
         ("lenses.json", json.dumps([{"model": "PINHOLE"}]), "not as the workflow writes it"),
         ("scores.json", '{"scales": {"opacity": 1}, "pixels": {"low": 1, "high": 1' + "0" * 400 + "}}", "too large"),
         ("scores.csv", SCORES.format("nan", 1, 1), "a pose is not finite"),
-        ("scores.csv", SCORES.format(1, 1, 10**30), "not a table of scores"),
         ("scores.csv", "pose\udcff", "not a table of scores"),
         ("scores.csv", '"' + "x" * 200_000, "not a table of scores"),
-        (
-            "cloud.ply",
-            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
-            "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n1 2 3 0 999 0\n",
-            "not readable as a PLY",
-        ),
+        ("cloud.ply", PLY, "not readable as a PLY"),
         ("config.yaml", "seeds: 2001-99-99\n", "not YAML"),
         ("config.yaml", "k: 0b_\n", "not YAML"),
-        ("config.yaml", "k: !!bool z\n", "not YAML"),
-        ("config.yaml", "k: !!timestamp x\n", "not YAML"),
         ("config.yaml", "k: " + "[" * 3000 + "\n", "not YAML"),
-        ("config.yaml", "k: " + "9" * 5000 + "\n", "not YAML"),
     ],
     ids=lambda value: str(value)[:50],
 )
@@ -133,14 +120,6 @@ def bundle(tmp_path):
     return folder
 
 
-def nested(manifest: dict, where: tuple, value) -> dict:
-    inner = manifest
-    for key in where[:-1]:
-        inner = inner[key]
-    inner[where[-1]] = value
-    return manifest
-
-
 CHUNK = ("tiles", 0, "chunks", 0)
 
 
@@ -148,21 +127,22 @@ CHUNK = ("tiles", 0, "chunks", 0)
     "where, value, message",
     [
         (("tile_side",), np.nan, "no finite number"),
-        (("eye_floor",), np.inf, "no finite number"),
         (("encoding", "origin"), [0, 0, 1e300], "a length is beyond"),
         (("encoding", "log_scale"), [0, 1e300], "log_scale makes no sense"),
         (("tiles", 3, "z"), [0, 1e20], "a length is beyond"),
         ((*CHUNK, "count"), 16.0, "count"),
-        ((*CHUNK, "bytes"), 544.0, "bytes"),
         ((*CHUNK, "orders"), [{"a": k} for k in range(20_000)], "not of type 'integer'"),
-        (("unit",), ["x" * 100_000], "not of type 'string'"),
         (("provenance",), {"a": 10**400}, "too large a number"),
     ],
     ids=lambda value: str(value)[:40],
 )
 def test_manifests_that_were_found_are_refused_soon(bundle, where, value, message):
     path = bundle / "davgswt.json"
-    path.write_text(json.dumps(nested(json.loads(path.read_text()), where, value)))
+    manifest = inner = json.loads(path.read_text())
+    for key in where[:-1]:
+        inner = inner[key]
+    inner[where[-1]] = value
+    path.write_text(json.dumps(manifest))
     start = time.process_time()
     with pytest.raises(InputError, match=message) as refusal:
         read_bundle(bundle, SCHEMA)
@@ -174,14 +154,6 @@ def test_whole_numbers_stand_for_lengths(bundle):
     path = bundle / "davgswt.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"tile_side": 4}))
     assert read_bundle(bundle, SCHEMA).manifest.tile_side == 4.0
-
-
-def test_no_photo_of_a_round_is_read_from_elsewhere(tmp_path):
-    image_files.write_png(tmp_path / "outside.png", np.zeros((6, 8, 3)))
-    (tmp_path / "capture").mkdir()
-    (tmp_path / "capture/capture.json").write_text(record(name="../outside.png"))
-    with pytest.raises(InputError, match="capture.json: .*no name of a file"):
-        read_captured_views(tmp_path / "capture", 8)
 
 
 def test_a_photo_smaller_than_its_camera_is_refused(tmp_path):

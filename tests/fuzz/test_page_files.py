@@ -15,6 +15,7 @@ from fixtures.fuzzing import FACTOR, FLOOR, SECONDS, fuzz, mutate_bytes, mutate_
 from fixtures.land_covers import write_cover_bundle
 from hypothesis import given
 
+pytestmark = pytest.mark.slow
 SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
 VIEWER = Path(__file__).parents[2] / "workflow/viewer"
 
@@ -71,27 +72,6 @@ def test_the_bundle_itself_is_read(page, files):
     assert found["read"]["count"] > 100
 
 
-@pytest.mark.parametrize(
-    "radius, cells, objects, read",
-    [
-        pytest.param(24.0, 9, [], True, id="a planet"),
-        pytest.param(4e7, 14_472_025, [], True, id="a large one"),
-        pytest.param(24.0, 16_000_000, [], False, id="more cells than fit"),
-        pytest.param(4e-9, 1, [], False, id="a point"),
-        pytest.param(24.0, 9.5, [], False, id="half a cell"),
-        pytest.param(24.0, 9, [1], False, id="objects on it"),
-    ],
-)
-def test_a_planet_is_read_if_its_cells_are_tiles(page, files, radius, cells, objects, read):
-    data, manifest = files
-    manifest = manifest | {"heights": {"kind": "sphere", "radius": radius, "cells": cells}}
-    manifest |= {"objects": objects} if objects else {}
-    named = {name: encode(content) for name, content in data.items()}
-    found = page("page: planets", 20_000, files=named | {"davgswt.json": encode(json.dumps(manifest).encode())})
-    assert ("read" in found) == read
-    assert not read or found["read"]["count"] > 100
-
-
 @fuzz
 @given(random=randoms)
 def test_manifests(page, files, random):
@@ -138,21 +118,14 @@ def test_chunks(page, files, random):
     page("page: chunks", 20_000, files={name: encode(content) for name, content in named.items()})
 
 
+@pytest.mark.parametrize("kind", ["zip of a bundle", "gswt.zip"])
 @fuzz
 @given(random=randoms)
-def test_zips_of_bundles(page, files, random):
+def test_zips(page, files, set_of_tiles, kind, random):
     data, manifest = files
-    zipped = mutate_zip(
-        random, {"a/davgswt.json": json.dumps(manifest).encode()} | {f"a/{n}": c for n, c in data.items()}
-    )
-    page("page: zip of a bundle", len(zipped) + 40_000, zip=encode(zipped))
-
-
-@fuzz
-@given(random=randoms)
-def test_sets_of_the_public_renderer(page, set_of_tiles, random):
-    zipped = mutate_zip(random, set_of_tiles)
-    page("page: gswt.zip", len(zipped) + 40_000, zip=encode(zipped))
+    bundle = {"a/davgswt.json": json.dumps(manifest).encode()} | {f"a/{n}": c for n, c in data.items()}
+    zipped = mutate_zip(random, bundle if kind == "zip of a bundle" else set_of_tiles)
+    page(f"page: {kind}", len(zipped) + 40_000, zip=encode(zipped))
 
 
 @fuzz

@@ -1,23 +1,19 @@
 """The line to a camera rig, with whatever bytes come from it: an answer of the protocol, a refusal, or a restart."""
 
 import numpy as np
+import pytest
 from fixtures.fuzzing import fuzz, mutate_bytes, randoms, read_guarded
 from hypothesis import given
 
 from dav_gswt.capture import serial_protocol
-from dav_gswt.capture.serial_protocol import RigRestarted, SerialLine, frame_line, unframe_line
+from dav_gswt.capture.serial_protocol import RigRestarted, SerialLine, frame_line
 from dav_gswt.errors import InputError
 
-ANSWERS = (
-    "OK 1 -180 180 10 90 1000 8000 0 60 5000",
-    "OK still 0.0 60.000 5000",
-    "OK moving 1 2 3",
-    "OK",
-    "OK lost",
-    "OK stopped",
-)
-ANSWERS += ("ERR RANGE tilt ends at 90", "ERR LOST", "ERR", "OK still nan 1 2", "OK 1 1e5 2 3 4 5 6 7 8 9", "OK 2")
-ANSWERS += ("OK still 9999999.9 -9999999.9 0", "OK still 99999999 0 0", "OK still", "OK 1", "OK  still  1 2 3")
+pytestmark = pytest.mark.slow
+ANSWERS = ("OK 1 -180 180 10 90 1000 8000 0 60 5000", "OK still 0.0 60.000 5000", "OK moving 1 2 3", "OK", "OK lost")
+ANSWERS += ("OK stopped", "ERR RANGE tilt ends at 90", "ERR LOST", "ERR", "OK still nan 1 2", "OK 2", "OK 1")
+ANSWERS += ("OK still 9999999.9 -9999999.9 0", "OK still 99999999 0 0", "OK still", "OK  still  1 2 3")
+ANSWERS += ("OK 1 1e5 2 3 4 5 6 7 8 9",)
 UNSOLICITED = ("! BOOT", "! LIMIT pan", "! STOP", "!", "! LIMIT", "! ?", "")
 
 
@@ -77,14 +73,3 @@ def _call(line: SerialLine, verb: str, arguments: tuple):
         return getattr(line, verb)(*arguments)
     except RigRestarted as error:
         raise RigRestarted("the rig has restarted") from error
-
-
-@fuzz
-@given(random=randoms)
-def test_a_line_that_is_taken_for_whole_is_whole(random):
-    data = mutate_bytes(random, frame_line(f"12345 {random.choice(ANSWERS)}"), 60)
-
-    def check(text):
-        assert text is None or frame_line(text).rstrip(b"\n").upper() == data.rstrip(b"\r\n").upper()
-
-    read_guarded("serial line, framing", lambda: unframe_line(data), check, len(data))

@@ -1,3 +1,4 @@
+import threading
 from pathlib import Path
 
 import pytest
@@ -5,6 +6,8 @@ import pytest
 from dav_gswt import files
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_file, atomic_folder, digest_files
+from dav_gswt.provenance import record_provenance
+from dav_gswt.threads import map_ahead
 
 
 def test_an_output_that_fails_leaves_what_was_there(tmp_path):
@@ -21,12 +24,17 @@ def test_json_has_no_nan(tmp_path):
     with pytest.raises(ValueError, match="not JSON compliant"):
         files.write_json(tmp_path / "a.json", {"x": float("nan")})
     assert not list(tmp_path.iterdir())
+    for text in ("{", "[NaN]", "[1e999]", f"[{'1' * 301}]"):
+        (tmp_path / "a.json").write_text(text)
+        with pytest.raises(InputError, match=r"a\.json: not readable as JSON"):
+            files.read_json(tmp_path / "a.json")
 
 
-def test_broken_json_is_named(tmp_path):
-    (tmp_path / "a.json").write_text("{")
-    with pytest.raises(InputError, match=r"a\.json"):
-        files.read_json(tmp_path / "a.json")
+def test_the_name_of_a_file_is_no_path():
+    assert files.require_file_name("a b.png") == "a b.png"
+    for name in ("", "..", "a/b", "a\\b", "a\n", "x" * 256, None):
+        with pytest.raises(ValueError, match="is no name of a file"):
+            files.require_file_name(name)
 
 
 def test_the_digest_is_that_of_the_bytes(tmp_path):
@@ -82,3 +90,44 @@ def test_a_path_of_the_config_may_lie_below_the_home_or_the_repository(tmp_path,
     for same in ("nowhere", "~no-such-user/x"):
         assert files.locate_path(same) == Path(same)
     assert [files.locate_path(name, tmp_path) for name in ("photos", "config")] == [Path("photos"), Path("config")]
+
+
+@pytest.fixture
+def photos(tmp_path):
+    for name in ("b.png", "a.png", ".hidden"):
+        (tmp_path / name).write_text(name)
+    return tmp_path
+
+
+def test_the_provenance_of_a_folder_is_the_digest_of_its_files_by_name(photos):
+    def told(*given):
+        return record_provenance({"photos": given[0] if len(given) == 1 else list(given)}, {})["inputs"]["photos"]
+
+    before = told(photos)
+    assert before == digest_files(photos / "a.png", photos / "b.png")
+    assert told(photos / "b.png", photos) == digest_files(*(photos / f"{n}.png" for n in "bab"))
+    (photos / "b.png").write_text("another")
+    assert told(photos) != before
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_results_come_in_the_order_of_the_items(threads):
+    assert list(map_ahead(lambda item: item * item, range(7), threads)) == [0, 1, 4, 9, 16, 25, 36]
+
+
+def test_the_next_items_are_worked_on_while_one_is_taken():
+    both = threading.Barrier(2, timeout=10)  # broken unless two threads meet here
+    assert list(map_ahead(lambda item: both.wait() >= 0, range(4), 2)) == [True] * 4
+
+
+def test_no_more_results_wait_than_there_are_threads():
+    begun = []
+    for taken, _ in enumerate(map_ahead(begun.append, range(20), 3), start=1):
+        assert len(begun) <= taken + 3
+
+
+def test_an_error_arises_where_its_result_is_taken():
+    results = map_ahead(lambda item: 1 // item, [1, 0], 1)
+    assert next(results) == 1
+    with pytest.raises(ZeroDivisionError):
+        next(results)

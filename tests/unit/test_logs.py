@@ -8,37 +8,27 @@ import pytest
 from dav_gswt import logs
 from dav_gswt.errors import InputError
 
-
-def test_bad_input_ends_with_its_message_and_no_traceback(tmp_path, capsys):
-    with pytest.raises(SystemExit) as ended, logs.logging_to(tmp_path / "a.log"):
-        raise InputError("photo.jpg: cut short; copy it again")
-    assert ended.value.code == 1
-    assert "photo.jpg: cut short" in capsys.readouterr().err
-    text = (tmp_path / "a.log").read_text()
-    assert "photo.jpg: cut short" in text and "Traceback" not in text
+FULL = OSError(28, "No space left on device", "results/field.ply")
+FREE_SPACE = "results/field.ply: No space left on device; free some space, then run the same again"
 
 
-def test_a_fault_leaves_its_traceback_in_the_log(tmp_path, capsys):
-    with pytest.raises(ZeroDivisionError), logs.logging_to(tmp_path / "a.log"):
-        1 / 0  # noqa: B018
-    assert "ZeroDivisionError" in (tmp_path / "a.log").read_text()
-    assert "Traceback" not in capsys.readouterr().err
-
-
-def test_a_full_disk_names_the_file_and_what_to_do(tmp_path, capsys):
-    with pytest.raises(SystemExit) as ended, logs.logging_to(tmp_path / "a.log"):
-        raise OSError(28, "No space left on device", "results/field.ply")
-    said = "results/field.ply: No space left on device; free some space, then run the same again"
-    assert ended.value.code == 1 and capsys.readouterr().err.strip() == said
-    text = (tmp_path / "a.log").read_text()
-    assert said in text and "Traceback" in text
-
-
-def test_ctrl_c_ends_a_job_without_a_traceback(tmp_path, capsys):
-    with pytest.raises(SystemExit) as ended, logs.logging_to(tmp_path / "a.log"):
-        raise KeyboardInterrupt
-    assert ended.value.code == 130 and "Traceback" not in capsys.readouterr().err
-    assert "Traceback" not in (tmp_path / "a.log").read_text()
+@pytest.mark.parametrize(
+    "error, code, said, traced",
+    [
+        (InputError("photo.jpg: cut short; copy it again"), 1, "photo.jpg: cut short; copy it again", False),
+        (FULL, 1, FREE_SPACE, True),
+        (KeyboardInterrupt(), 130, "stopped on request", False),
+        (MemoryError(), 1, "out of memory", True),
+        (ZeroDivisionError(), None, "failed", True),
+    ],
+)
+def test_a_job_ends_with_a_message_and_only_faults_leave_a_traceback(tmp_path, capsys, error, code, said, traced):
+    with pytest.raises(SystemExit if code else ZeroDivisionError) as ended, logs.logging_to(tmp_path / "a.log"):
+        raise error
+    assert getattr(ended.value, "code", None) == code
+    text, shown = (tmp_path / "a.log").read_text(), capsys.readouterr().err
+    assert said in text and said in shown
+    assert ("Traceback" in text) == traced and "Traceback" not in shown
 
 
 def test_the_last_words_of_a_library_that_aborts_are_in_the_log(tmp_path):
@@ -66,21 +56,15 @@ def test_progress_tells_how_far_and_how_long(tmp_path, caplog):
     caplog.set_level(logging.INFO)
     assert list(logs.progress(range(3), "count", every=0.0)) == [0, 1, 2]
     assert "count: 3/3" in caplog.text and "left" in caplog.text
-
-
-def test_a_loop_that_ends_at_once_says_nothing(caplog):
-    caplog.set_level(logging.INFO)
+    caplog.clear()
     assert list(logs.progress(range(3), "count")) == [0, 1, 2]
-    assert not caplog.text
-
-
-def test_a_log_that_cannot_be_made_is_a_message_without_a_traceback(tmp_path, capsys):
-    with pytest.raises(SystemExit) as ended, logs.logging_to(tmp_path / "none/a.log"):
-        pass
-    assert ended.value.code == 1 and capsys.readouterr().err == f"  {tmp_path}/none/a.log: No such file or directory\n"
+    assert not caplog.text  # a loop that ends at once says nothing
 
 
 def test_a_log_on_a_full_disk_leaves_the_terminal_its_messages(capsys):
     with logs.logging_to("/dev/full"):
         logging.info("a message")
     assert capsys.readouterr().err == "  a message\n"
+    with pytest.raises(SystemExit) as ended, logs.logging_to("/none/a.log"):
+        pass
+    assert ended.value.code == 1 and capsys.readouterr().err == "  /none/a.log: No such file or directory\n"

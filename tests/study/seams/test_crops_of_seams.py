@@ -1,5 +1,3 @@
-"""Crops: drawn as the terrain is, patches that continue across borders, what a broken border does to psnr and jump."""
-
 from dataclasses import replace
 
 import numpy as np
@@ -14,24 +12,16 @@ from dav_gswt.study.seams.spatial_index import MAX_SLOPE, Footprint, SpatialInde
 from dav_gswt.terrain import heights, stills
 
 HILLS = {"kind": "hills", "height": 1.0, "wavelength": 8.0}
+_, WALKER, TOP = crops.VIEWS
 
 
-def first_of(placed, terrain, view, kind, rng, border=False):
-    for place in kind(placed, rng):
-        crop = crops.make_crop(placed, terrain, view, place.at)
-        if crop and (met := crops.find_patches(placed, crop)) and (border or len(met) > 1):
-            return crops.render_patches(placed, terrain, crop, met, border)
-    raise AssertionError("no crop")
-
-
-@pytest.mark.parametrize("view", crops.VIEWS, ids=lambda view: view.name)
-@pytest.mark.parametrize("surface", [{"kind": "flat"}, HILLS], ids=lambda entry: entry["kind"])
+@pytest.mark.parametrize("view, surface", [(WALKER, HILLS), (TOP, {"kind": "flat"})])
 def test_a_crop_is_the_terrain_s_own_picture(placed, view, surface, rng):
     terrain = replace(placed.terrain, heights=heights.surface_from_config(surface, placed.terrain.side))
-    shown = first_of(placed, terrain, view, places.sample_cuts, rng)
-    np.testing.assert_array_equal(
-        shown.picture, stills.render_view(terrain, shown.crop.camera, rendering.SKY, placed.colour)
-    )
+    some = (crops.find_cut(placed, terrain, view, place.at) for place in places.sample_cuts(placed, rng))
+    crop, met = next(filter(None, some))
+    expected = stills.render_view(terrain, crop.camera, rendering.SKY, placed.colour)
+    np.testing.assert_array_equal(crops.render_patches(placed, terrain, crop, met).picture, expected)
 
 
 def test_across_every_border_the_patch_is_the_same(placed):
@@ -43,22 +33,6 @@ def test_across_every_border_the_patch_is_the_same(placed):
         before, after = patch[edges - 1], patch[edges]
         np.testing.assert_array_equal(before[:, strip], after[:, strip])
         assert (before == after)[:, ~strip].mean() > 0.9
-
-
-def test_the_exemplar_placed_whole_shows_what_a_tile_of_one_patch_shows(placed, rng):
-    """A crop on a border far from any cut: tiles and exemplar hold the same Gaussians, but for the corrections."""
-    shown = first_of(placed, placed.terrain, crops.VIEWS[2], places.sample_borders, rng, border=True)
-    assert len(shown.patches) == 1 and set(np.unique(shown.tile)) > {int(shown.tile[0, 0])}
-    weight = np.ones(shown.picture.shape[:2])
-    assert metrics.psnr(shown.picture, shown.own[0], weight) > 33  # what of a correction varies within the crop
-
-
-def broken(placed, change):
-    """The same with every tile changed in the cells within 3 cells of its western border."""
-    out = {}
-    for key, field in placed.terrain.tiles.items():
-        out[key] = change(field, field.means[:, 0] < 3 * placed.spacing)
-    return replace(placed, tiles={key: SpatialIndex.from_field(field) for key, field in out.items()})
 
 
 def brighter(field, which):
@@ -75,73 +49,42 @@ def moved(field, which):
 
 @pytest.mark.parametrize("change", [brighter, moved, lambda field, which: field[~which]], ids=["step", "shift", "gap"])
 def test_a_border_broken_on_purpose_is_found(placed, change, rng):
-    view = crops.VIEWS[2]
+    """Every tile is changed in the cells within 3 cells of its western border."""
+    tiles = {
+        key: SpatialIndex.from_field(change(field, field.means[:, 0] < 3 * placed.spacing))
+        for key, field in placed.terrain.tiles.items()
+    }
     upright = [p for p in places.sample_borders(placed, rng) if p.cluster.startswith("v")][:6]
-    for place in upright:
-        crop = crops.make_crop(placed, placed.terrain, view, place.at)
-        met = crops.find_patches(placed, crop)
-        if not met:
-            continue
-        whole, bad = (
-            crops.render_patches(each, each.terrain, crop, met, border=True)
-            for each in (placed, broken(placed, change))
-        )
-        weight = np.ones(whole.picture.shape[:2])
-        psnr = [metrics.psnr(each.picture, whole.own[0], weight) for each in (whole, bad)]
-        assert psnr[1] < psnr[0] - 2
-        jumps = [measure.measure_jump(each.picture, each.tile, each.patch >= 0) for each in (whole, bad)]
-        assert change is not brighter or jumps[1] > 1.1 * jumps[0]  # a texture has jumps of its own
-        return
-    raise AssertionError("no border could be looked at")
-
-
-def raised(placed, height):
-    """The same with all ground and what stands on it higher."""
-    out = {}
-    for key, field in placed.terrain.tiles.items():
-        out[key] = SpatialIndex.from_field(replace(field, means=field.means + np.float32([0, 0, height])))
-    ground = placed.source.ground + [0, 0, 0, height]
-    return replace(placed, tiles=out, source=replace(placed.source, ground=ground))
-
-
-@pytest.mark.parametrize("view", crops.VIEWS, ids=lambda view: view.name)
-def test_a_crop_shows_what_it_is_of_however_high_the_ground_lies(placed, view, rng):
-    """Aimed at a plane below it, a walker's crop would show ground 2.7 times that height before the place."""
-    place = next(
-        p
-        for p in places.sample_borders(placed, rng)
-        if crops.find_patches(placed, crops.make_crop(placed, placed.terrain, view, p.at))
+    seen = [crops.make_crop(placed, placed.terrain, TOP, place.at) for place in upright]
+    crop, met = next((crop, met) for crop in seen if (met := crops.find_patches(placed, crop)))
+    whole, bad = (
+        crops.render_patches(each, each.terrain, crop, met, border=True)
+        for each in (placed, replace(placed, tiles=tiles))
     )
-    tiles = []
-    for each in (placed, raised(placed, 12 * placed.spacing)):
-        crop = crops.make_crop(each, each.terrain, view, place.at)
-        tiles.append(crops.render_patches(each, each.terrain, crop, crops.find_patches(each, crop), border=True).tile)
-    assert len(np.unique(tiles[0])) > 1
-    assert (tiles[0] == tiles[1]).mean() > 0.95
+    weight = np.ones(whole.picture.shape[:2])
+    psnr = [metrics.psnr(each.picture, whole.own[0], weight) for each in (whole, bad)]
+    assert psnr[0] > 33 and psnr[1] < psnr[0] - 2  # tiles and exemplar hold the same Gaussians, but for corrections
+    jumps = [measure.measure_jump(each.picture, each.tile, each.patch >= 0) for each in (whole, bad)]
+    assert change is not brighter or jumps[1] > 1.1 * jumps[0]  # a texture has jumps of its own
 
 
-def test_the_ground_s_height_is_that_of_the_tile_s_own_cells(placed):
-    assert raised(placed, 2.0).mean_height((3, 5)) == pytest.approx(2.0 + placed.mean_height((3, 5)))
-    n, height = placed.plan.side, placed.source.ground[..., 3]
-    x, y = 3 - placed.first, 5 - placed.first
+def test_the_middle_of_a_crop_is_its_place_on_the_ground(placed, rng):
+    terrain = replace(placed.terrain, heights=heights.surface_from_config(HILLS, placed.terrain.side))
+    some = places.sample_borders(placed, rng)
+    for view in crops.VIEWS:
+        crop = next(filter(None, (crops.make_crop(placed, terrain, view, place.at) for place in some)))
+        spot = np.array(crop.at) * placed.spacing
+        (height,), _ = terrain.heights.at(spot[:1], spot[1:])
+        pixel, _ = crop.camera.project(np.array([[*spot, height + placed.mean_height(crop.at)]]))
+        np.testing.assert_allclose(pixel, crops.SIDE / 2, atol=1e-6)
+        assert np.abs(crop.cells[crops.SIDE // 2, crops.SIDE // 2] - crop.at).max() <= 3
+    # the ground's height is that of the tile's own cells
+    n, x, y = placed.plan.side, 3 - placed.first, 5 - placed.first
     column, row = [3, 5] - placed.origins[placed.patch[y, x]]
-    expected = height[row, column] + placed.correction[placed.tile[y, x], y % n, x % n, 3]
+    expected = placed.source.ground[row, column, 3] + placed.correction[placed.tile[y, x], y % n, x % n, 3]
     assert placed.relief[y, x] == pytest.approx(expected, nan_ok=True)
     bare = replace(placed, source=replace(placed.source, ground=np.full_like(placed.source.ground, np.nan)))
     assert bare.mean_height((3, 5)) == 0
-
-
-def test_borders_are_shown_without_cuts_where_that_is_possible(placed, rng):
-    places_looked_at = places.sample_borders(placed, np.random.default_rng(2))[: measure.MAX_BORDER_PLACES]
-    view = crops.VIEWS[2]
-    met = [
-        crops.find_patches(placed, crops.make_crop(placed, placed.terrain, view, place.at))
-        for place in places_looked_at
-    ]
-    alone = sum(bool(each) and len(each) == 1 for each in met)
-    taken = measure._sample_borders(placed, placed.terrain, view, np.random.default_rng(2))
-    shown = [len(each.shown.patches) for each in taken]
-    assert 0 < shown.count(1) == min(alone, measure.BORDERS) and shown == sorted(shown, key=lambda n: n > 1)
 
 
 def test_a_jump_is_1_without_a_seam_and_as_high_as_the_step_makes_it():
@@ -153,21 +96,8 @@ def test_a_jump_is_1_without_a_seam_and_as_high_as_the_step_makes_it():
         expected = np.sqrt((6 * 0.1**2 + 3 * step**2) / (6 * 0.1**2))
         assert found == pytest.approx(expected, rel=0.15)  # 48 pairs across: their variance has 10 %, and values clip
         assert found == measure.measure_jump(picture[:, ::-1], patch[:, ::-1], known)
-
-
-def test_a_jump_needs_two_sides():
-    texture, picture, patch = seams.halves()
-    assert measure.measure_jump(picture, np.zeros_like(patch), np.ones(patch.shape, bool)) is None
-    assert measure.measure_jump(np.zeros_like(picture), patch, np.ones(patch.shape, bool)) is None
-
-
-def test_a_hill_before_a_point_hides_it(placed):
-    steep = replace(placed.terrain, heights=heights.Hills(40 * placed.terrain.side, 8 * placed.terrain.side, 1, 0))
-    found = [
-        crops.make_crop(placed, steep, crops.VIEWS[1], place.at)
-        for place in places.sample_borders(placed, np.random.default_rng(1))[:40]
-    ]
-    assert None in found
+    assert measure.measure_jump(picture, np.zeros_like(patch), known) is None
+    assert measure.measure_jump(np.zeros_like(picture), patch, known) is None
 
 
 def test_ceilings_lie_in_the_tile_of_their_cuts(placed, straight, rng):
@@ -175,58 +105,39 @@ def test_ceilings_lie_in_the_tile_of_their_cuts(placed, straight, rng):
     for place in places.sample_cuts(placed, rng)[:20]:
         twin = places.find_nearest_cut(straight, place)
         assert [v // n for v in twin.at] == [v // n for v in place.at] and twin.cluster == place.cluster
-
-
-def test_tiles_without_cuts_are_named(placed, straight, rng):
     bare = replace(placed, patch=np.zeros_like(placed.patch), origins=placed.origins[:1])
     with pytest.raises(InputError, match="only 0 of .* cuts could be rendered"):
-        measure._sample_cuts(bare, placed.terrain, (straight, straight.terrain), crops.VIEWS[2], rng)
+        measure._sample_cuts(bare, placed.terrain, (straight, straight.terrain), TOP, rng)
 
 
 def test_the_same_crops_are_drawn_by_any_number_of_threads(placed, straight, monkeypatch):
     monkeypatch.setattr(measure, "BORDERS", 2)
     monkeypatch.setattr(measure, "CUTS", 2)
-    monkeypatch.setattr(crops, "VIEWS", crops.VIEWS[2:])
+    monkeypatch.setattr(crops, "VIEWS", [TOP])
     found = []
     for threads in ("1", "2"):
         monkeypatch.setenv("DAV_GSWT_THREADS", threads)
         found.append(measure.measure_crops(placed, straight, None, 0))
     assert found[0] == found[1]
     assert [row["seam_lpips"] for row in found[0]] == [None] * len(found[0])  # no weights: absent, never made up
-    assert {row["place"] for row in found[0]} == {"border", "cut", "floor", "ceiling"}
-
-
-def test_crops_that_are_hidden_altogether_are_passed_over(placed, straight, monkeypatch, rng):
-    shown, seen = crops.render_patches, []
-
-    def every_other(*args, **kwargs):
-        found = shown(*args, **kwargs)
-        seen.append(found)
-        return replace(found, patch=np.full_like(found.patch, -1)) if len(seen) % 3 == 0 else found
-
-    monkeypatch.setattr(crops, "render_patches", every_other)
-    monkeypatch.setattr(measure, "BORDERS", 4)
-    monkeypatch.setattr(measure, "CUTS", 4)
-    view = crops.VIEWS[2]
-    borders = measure._sample_borders(placed, placed.terrain, view, rng)
-    cuts = measure._sample_cuts(placed, placed.terrain, (straight, straight.terrain), view, rng)
-    assert len(seen) > 12 and all(each.shown.shows_patch for each in (*borders, *cuts))
-    assert [each.number for each in borders] == [0, 1, 2, 3]
-    assert [each.number for each in cuts] == [4, 8, 5, 9, 6, 10, 7, 11]
+    numbers = {name: {r["crop"] for r in found[0] if r["place"] == name} for name in ("border", "cut", "ceiling")}
+    assert numbers == {"border": {0, 1}, "cut": {2, 3}, "ceiling": {4, 5}}
+    assert {row["crop"] for row in found[0] if row["place"] == "floor"} == set(range(6))
 
 
 def test_the_few_gaussians_of_the_exemplar_that_may_show_are_found_among_all(source, rng):
-    for index in source.levels:
-        size = np.ptp(index.field.means[:, :2], axis=0).min()
-        for _ in range(20):
-            west, south = rng.uniform(-0.2, 1.0, 2) * size
-            box = np.array([[west, south], [west + 0.2 * size, south + 0.1 * size]])
-            seen = Footprint(box, rng.normal(0, 2, 2))
-            corner = np.array([*rng.uniform(-size, size, 2) * 0.1, 0.0])
-            found, wanted = index.query(seen, corner), index.field[_shows(seen, index.field, corner)]
-            np.testing.assert_array_equal(found.means, wanted.means)
-            np.testing.assert_array_equal(found.sh, wanted.sh)
+    index = source.levels[0]
+    size = np.ptp(index.field.means[:, :2], axis=0).min()
+    for _ in range(4):
+        west, south = rng.uniform(-0.2, 1.0, 2) * size
+        box = np.array([[west, south], [west + 0.2 * size, south + 0.1 * size]])
+        seen = Footprint(box, rng.normal(0, 2, 2))
+        corner = np.array([*rng.uniform(-size, size, 2) * 0.1, 0.0])
+        found, wanted = index.query(seen, corner), index.field[_shows(seen, index.field, corner)]
+        np.testing.assert_array_equal(found.means, wanted.means)
+        np.testing.assert_array_equal(found.sh, wanted.sh)
     assert len(wanted) < len(index.field)
+    assert len(SpatialIndex.from_field(index.field[:0]).query(seen, corner)) == 0
 
 
 def _shows(seen, field, corner):
@@ -239,8 +150,3 @@ def _shows(seen, field, corner):
         high = place[:2] + corner[:2] + reach + np.max(behind, 0)
         shown.append(bool((high > seen.box[0]).all() and (low < seen.box[1]).all()))
     return np.array(shown)
-
-
-def test_an_empty_shelf_shows_nothing(source):
-    empty = SpatialIndex.from_field(source.levels[0].field[:0])
-    assert len(empty.query(Footprint(np.array([[0.0, 0], [1, 1]]), np.ones(2)), np.zeros(3))) == 0

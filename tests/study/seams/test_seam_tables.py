@@ -1,57 +1,38 @@
-"""Summaries: hand-worked means, intervals that know clusters, shares that are unknown, rows that add up; repeats."""
-
 import numpy as np
 import pytest
 
-from dav_gswt.study.seams import repetition, summary
+from dav_gswt.errors import InputError
+from dav_gswt.study.seams import repetition, replicates, summary
 
-ABOUT = {
-    "scene": "desert",
-    "seed": 0,
-    "preset": "draft",
-    "variant": "colour",
-    "version": "1",
-    "weights": "",
-    "tiles": "",
-}
-
-
-def crop(place, number, cluster, value, floor, **more):
-    about = {"view": "top", "ground": "flat", "crop": number, "cluster": cluster, "psnr": 30.0, "jump": 1.5}
-    own = ABOUT | {"place": place} | about | {"seam_lpips": value} | more
-    return [own, ABOUT | {"place": "floor"} | about | {"seam_lpips": floor, "psnr": None, "jump": 1.0} | more]
+ABOUT = {"scene": "desert", "seed": 0, "preset": "draft", "version": "1", "weights": "", "tiles": ""}
+ABOUT |= {"view": "top", "ground": "flat"}
 
 
 def table(cut=0.01, ceiling=0.05, noise=0.001, variant="colour"):
+    """40 crops of each place, two of each cluster, all with the same floor."""
     rng, rows = np.random.default_rng(0), []
     for k in range(40):
-        for place, more in (("border", 0.0), ("cut", cut), ("ceiling", ceiling)):
-            number = k + {"border": 0, "cut": 40, "ceiling": 80}[place]
-            rows += crop(place, number, f"{k // 2}", 0.1 + more + noise * rng.normal(), 0.1, variant=variant)
+        for number, (place, more) in enumerate((("border", 0.0), ("cut", cut), ("ceiling", ceiling))):
+            about = ABOUT | {"variant": variant, "crop": k + 40 * number, "cluster": f"{k // 2}"}
+            value = 0.1 + more + noise * rng.normal()
+            rows.append(about | {"place": place, "seam_lpips": value, "psnr": 30.0, "jump": 1.5})
+            rows.append(about | {"place": "floor", "seam_lpips": 0.1, "psnr": None, "jump": 1.0})
     return rows
 
 
-def test_differences_and_shares_are_those_put_in():
+def test_shares_are_those_put_in_and_none_where_the_ceiling_is_not_told_from_the_floor_or_without_lpips():
     every = next(row for row in summary.summarise_crops(table()) if row["view"] == summary.EVERY)
     assert every["border"] == pytest.approx(0, abs=5e-4) and every["border_low"] < 0 < every["border_high"]
     assert every["share"] == pytest.approx(0.2, abs=0.02) and every["share_low"] < 0.2 < every["share_high"]
     assert (every["borders"], every["border_clusters"]) == (40, 20)
-
-
-def test_where_the_ceiling_is_not_told_from_the_floor_there_is_no_share():
     every = summary.summarise_crops(table(ceiling=-0.01, noise=0.02))[0]
     assert every["ceiling_low"] < 0 and every["share"] is None
-
-
-def test_without_lpips_there_is_none_in_the_summary():
-    rows = [row | {"seam_lpips": None} for row in table()]
-    every = summary.summarise_crops(rows)[0]
+    every = summary.summarise_crops([row | {"seam_lpips": None} for row in table()])[0]
     assert every["border"] is None and every["share"] is None and every["cut_psnr"] == pytest.approx(30)
 
 
 def test_a_variant_is_compared_with_the_baseline_in_the_same_clusters():
-    rows = table() + table(cut=0.03, variant="none")
-    found = summary.compare_variants(rows, "colour")
+    found = summary.compare_variants(table() + table(cut=0.03, variant="none"), "colour")
     row = next(r for r in found if r["measure"] == "seam_lpips")
     assert row["variant"] == "none" and row["difference"] == pytest.approx(0.02, abs=1e-3)
     assert row["difference_low"] > 0.018
@@ -75,3 +56,34 @@ def test_a_picture_that_repeats_stands_out_at_its_period_and_noise_does_not():
         found = repetition.tabulate_repetition(repetition.Autocorrelations(r, r, 32))
         assert all((row["terrain"] > 2 * row["around"]) == repeats for row in found)
         assert found[0]["terrain"] == pytest.approx(1 if repeats else 0, abs=0.05)
+
+
+TILINGS = {"semantic": {"tile": 0.5, "strip": 0.06, "candidates": 9, "variants": 1}, "small": {"tile": 0.3}}
+SCENES = {"desert": {"tiling": "semantic-refined"}, "beach": {"tiling": "small"}, "moon": {"tiling": "semantic"}}
+ONCE = {"tilings": [], "replicates": 1, "compared_replicates": 1}
+
+
+def config(**study):
+    return {"scenes": SCENES, "tilings": dict(TILINGS), "seams": {"scenes": ["desert", "beach"]} | ONCE | study}
+
+
+def test_the_own_tiling_of_every_scene_has_an_entry_for_each_replicate():
+    entries = replicates.add_replicates(config(replicates=3))["tilings"]
+    assert list(entries) == [*TILINGS, *(f"{name}-replicate-{k}" for name in ("semantic", "small") for k in (1, 2))]
+    assert entries["semantic-replicate-2"] == TILINGS["semantic"] | {"replicate": 2}
+    assert replicates.add_replicates(config())["tilings"] == TILINGS
+    taken = config(replicates=2)
+    taken["tilings"]["small-replicate-1"] = {"tile": 0.4}
+    with pytest.raises(InputError, match="tilings.small-replicate-1"):
+        replicates.add_replicates(taken)
+
+
+def test_compared_tilings_have_as_many_replicates_as_the_study_says():
+    for own, counts in ((1, [2, 2]), (3, [3, 2])):
+        study = {"tilings": ["semantic", "small"], "compared_replicates": 2, "replicates": own}
+        assert [len(replicates.list_replicates(name, "semantic", study)) for name in study["tilings"]] == counts
+    assert replicates.list_replicates("other", "semantic", study) == []
+    names = replicates.list_replicates("semantic-refined", "semantic-refined", ONCE | {"replicates": 2})
+    assert names == ["semantic-refined", "semantic-replicate-1-refined"]
+    entries = replicates.add_replicates(config(tilings=["small"], compared_replicates=2))["tilings"]
+    assert list(entries) == [*TILINGS, "small-replicate-1"]

@@ -1,8 +1,3 @@
-"""How long frames take: columns, means, and what the study's tables join. No time is asserted but that there is one."""
-
-import csv
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -31,18 +26,11 @@ def test_a_row_holds_means_deviations_and_shares_worked_by_hand():
     assert never["sort_ms"] is never["sort_ms_sd"] is None
 
 
-def test_the_pages_first_budget_is_what_the_studys_tables_join(tmp_path: Path):
-    for renderer in (frames.LIBRARY, frames.PAGE):
-        csv_tables.write_table(tmp_path / f"{renderer}.csv", [row_of(renderer, budget) for budget in ASKED.budgets])
-    paths = [[str(tmp_path / f"{renderer}.csv")] for renderer in (frames.LIBRARY, frames.PAGE)]
-    rows = frames.gather_frames([CELL], *paths)
-    assert [(row["renderer"], row["budget"]) for row in rows] == [
-        (name, str(budget)) for name in (frames.LIBRARY, frames.PAGE) for budget in ASKED.budgets
-    ]
+def test_the_pages_first_budget_is_what_the_studys_tables_join(tmp_path):
+    for name in (frames.LIBRARY, frames.PAGE):
+        csv_tables.write_table(tmp_path / f"{name}.csv", [row_of(name, budget) for budget in ASKED.budgets])
+    rows = frames.gather_frames([CELL], *([str(tmp_path / f"{name}.csv")] for name in (frames.LIBRARY, frames.PAGE)))
+    assert len(rows) == 4
     csv_tables.write_table(tmp_path / "viewer.csv", frames.select_viewer_rows(rows))
     (joined,) = spread.join_viewer([CELL], spread.read_viewer(tmp_path / "viewer.csv"))
     assert (joined["render_ms"], joined["sort_ms"]) == (4, 1.5) and joined["update_share"] == 0.66667  # five digits
-    with (tmp_path / "viewer.csv").open(newline="") as file:
-        assert next(csv.reader(file)) == [*spread.CELL, *spread.VIEWER]
-    frames.write_frame_plot(tmp_path / "plot.png", rows)
-    assert (tmp_path / "plot.png").stat().st_size > 5000

@@ -26,20 +26,10 @@ def added(content, baked, tile, level=0):
     return baked[level][tile][len(content.tiles[1].fields[level][tile]) :]
 
 
-def test_a_material_without_objects_keeps_its_tiles(content):
-    assert baking.bake_objects(content, 0, 7) is content.tiles[0].fields
-
-
 def test_tiles_have_as_many_objects_as_the_density_says(content, baked):
     count = sum(len(added(content, baked, tile)) for tile in range(TILES)) / len(content.objects[0].fields[0])
     mean = 0.2 * SIDE**2 * TILES
     assert abs(count - mean) < 3 * mean**0.5 and count == int(count)
-
-
-def test_objects_stay_inside_of_their_tiles(content, baked):
-    for tile in range(TILES):
-        means = added(content, baked, tile).means
-        assert len(means) == 0 or (means[:, :2].min() >= 0 and means[:, :2].max() <= SIDE)
 
 
 def test_tiles_keep_the_same_mean_height_and_their_borders(content, baked):
@@ -61,19 +51,16 @@ def test_the_public_renderers_checker_finds_no_fault_with_objects(content, gswt_
     assert done.returncode == 0 and " 0 faults" in done.stdout, done.stdout + done.stderr
 
 
-def test_every_level_has_the_same_objects(content, baked):
+def test_every_level_has_the_same_objects_and_every_tile_others(content, baked):
     fine, coarse = ([len(added(content, baked, tile, level)) for tile in range(TILES)] for level in (0, 1))
     sizes = [len(field) for field in content.objects[0].fields]
     np.testing.assert_array_equal(np.array(fine) / sizes[0], np.array(coarse) / sizes[1])
-
-
-def test_tiles_have_other_draws(content, baked):
-    first = [added(content, baked, tile).means[:1].tolist() for tile in range(TILES)]
-    drawn = [str(each) for each in first if each]
+    drawn = [str(added(content, baked, tile).means[:1].tolist()) for tile in range(TILES) if fine[tile]]
     assert len(set(drawn)) == len(drawn) > 4
 
 
 def test_an_object_wider_than_a_tile_is_left_out(content):
+    assert baking.bake_objects(content, 0, 7) is content.tiles[0].fields  # this material has none at all
     wide = replace(content, objects=[shrub(2.5, 0.2)])
     fields = baking.bake_objects(wide, 1, 7)
     assert [len(f) for f in fields[0]] == [len(f) for f in content.tiles[1].fields[0]]

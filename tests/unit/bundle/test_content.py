@@ -6,14 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fixtures.land_covers import TILES, cover_content
-from fixtures.tile_sets import report_of
 
 from dav_gswt.bundle import build, manifest, store
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.terrain import endless, page, stills
-from dav_gswt.tiles.build import TileSet
 
 SCHEMA = Path(__file__).parents[3] / "workflow/schemas/davgswt.schema.json"
 
@@ -36,9 +34,6 @@ def test_tiles_of_a_material_follow_those_of_the_one_before(bundle, content):
     for number in (3, TILES + 3):
         source = content.tiles[number // TILES].fields[1][3]
         assert bundle.chunk(number, 1)[0].means == pytest.approx(source.means, abs=1e-3)
-
-
-def test_materials_keep_their_names_shares_and_colours(bundle, content):
     assert [(each.name, each.share) for each in bundle.manifest.materials] == [("sand", 0.6), ("grass", 0.4)]
     green = bundle.manifest.materials[1].ground_colour
     assert green == pytest.approx(content.materials[1].colour, abs=0.02)
@@ -82,13 +77,10 @@ def test_a_page_of_several_materials_has_the_rule_of_the_config(bundle, tmp_path
     assert made.object_chunk(0, 0)[0].means.shape == bundle.object_chunk(0, 0)[0].means.shape
 
 
-def test_materials_with_tiles_of_other_sizes_are_refused(content):
+def test_tiles_of_other_sizes_and_objects_with_fewer_levels_are_refused(content):
     other = replace(content.tiles[1], side=2 * content.side)
     with pytest.raises(InputError, match="the same tile side"):
         BundleContent([content.tiles[0], other], content.materials)
-
-
-def test_an_object_with_fewer_levels_than_the_tiles_is_refused(content):
     flat = replace(content.objects[0], fields=content.objects[0].fields[:1])
     with pytest.raises(InputError, match="2 levels"):
         replace(content, objects=[flat])
@@ -101,11 +93,9 @@ def test_an_object_with_fewer_levels_than_the_tiles_is_refused(content):
         ("16 C", lambda m: m["materials"].append(m["materials"][0])),
         ("classes", lambda m: m.pop("classes")),
         ("one value for each", lambda m: m["classes"]["rise"].update(ground=[0.0])),
-        ("wavelengths", lambda m: m["classes"]["rule"][0].update(wavelengths=[1.0, -1.0])),
         ("scatter", lambda m: m.pop("scatter")),
         ("objects", lambda m: m.update(objects=[])),
         ("material", lambda m: m["objects"][0].update(material=2)),
-        ("probability", lambda m: m["objects"][0].update(probability=1.5)),
         ("object 0", lambda m: m["objects"][0]["chunks"].pop()),
     ],
 )
@@ -114,16 +104,3 @@ def test_a_manifest_whose_cover_contradicts_itself_is_refused(bundle, key, chang
     change(value)
     with pytest.raises(InputError, match=f"(?i){key}"):
         manifest.check_manifest(value, SCHEMA)
-
-
-def test_one_material_is_named_ground(content):
-    one = BundleContent.of_one_material(content.tiles[0])
-    assert [(each.name, each.share) for each in one.materials] == [("ground", 1.0)]
-
-
-def test_a_set_of_one_material_has_no_classes(content):
-    tiles = TileSet(
-        content.side, 0.1, content.tiles[0].fields, np.zeros((16, 20, 20), np.uint8), np.zeros((16, 9, 2), int),
-        np.zeros(16), report_of(),
-    )  # fmt: skip
-    assert BundleContent.of_one_material(tiles).classes is None

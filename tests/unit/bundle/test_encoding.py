@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.bundle.encoding import MAX_COMPONENT, SCALE_STEPS, Encoding, EncodingErrors, find_smallest_rotations
+from dav_gswt.bundle.encoding import MAX_COMPONENT, Encoding, EncodingErrors, find_smallest_rotations
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
 
@@ -121,10 +121,12 @@ def test_gaussians_that_meet_across_a_border_are_moved_alike():
     assert (moved < 1e-6).mean() > 0.98 and moved.max() <= coding.step[0] + 1e-6
 
 
-def test_a_side_s_both_ends_are_places_of_the_grid():
+def test_a_side_s_both_ends_are_places_of_the_grid_and_a_splat_miles_from_its_tile_is_refused():
     field = field_of([[0, 0, 0], [SIDE, SIDE, 0], [-0.3, 1, 0]], np.full((3, 3), 0.1))
     coding = Encoding.fit([field], SIDE, PIXEL)
     np.testing.assert_allclose(coding.decode(coding.encode(field)).means[:2], field.means[:2], atol=1e-7)
+    with pytest.raises(InputError, match="5000 tile sides"):
+        Encoding.fit([field_of([[1, 1, 0], [1e4, 1, 0]], np.full((2, 3), 0.1))], SIDE, PIXEL)
 
 
 def test_a_ladder_of_one_size_has_one_rung():
@@ -133,10 +135,3 @@ def test_a_ladder_of_one_size_has_one_rung():
     assert coding.log_scale[1] == 0 and coding.step[2] == 0
     back = coding.decode(coding.encode(field))
     np.testing.assert_allclose(back.log_scales, field.log_scales, atol=1e-6)
-    assert SCALE_STEPS == 255
-
-
-def test_a_splat_miles_from_its_tile_is_refused():
-    field = field_of([[1, 1, 0], [1e4, 1, 0]], np.full((2, 3), 0.1))
-    with pytest.raises(InputError, match="5000 tile sides"):
-        Encoding.fit([field], SIDE, PIXEL)

@@ -56,7 +56,7 @@ def capture(site, agent, poses, pool=(), **scene):
 
 
 def photo_pool(site):
-    (site.photos / "images").mkdir()
+    (site.photos / "images").mkdir(exist_ok=True)
     pool = [(Pose(f"{x}.png", 90.0, 0.0, 5.0), at(x)) for x in (0, 1, 2)]
     for pose, _ in pool:
         (site.photos / "images" / pose.name).write_text(pose.name)
@@ -67,30 +67,19 @@ def test_replay_takes_the_nearest_unused_photo_once_and_records_the_distance(sit
     photos = capture(site, "replay", requested(0.9, 0.9, 0.9, 0.9), photo_pool(site))
     assert [photo.name for photo in photos] == ["1.png", "0.png", "2.png"]
     np.testing.assert_allclose([photo.distance for photo in photos], [0.1 / 5, 0.9 / 5, 1.1 / 5], atol=1e-6)
-    write_capture_record(tmp_path / "capture", "replay", photos)
-    record = json.loads((tmp_path / "capture" / "capture.json").read_text())
-    assert [s["name"] for s in record["shots"]] == ["1.png", "0.png", "2.png"] and record["agent"] == "replay"
     assert (tmp_path / "capture" / "1.png").read_text() == "1.png"
-
-
-def test_the_record_of_a_capture_comes_back(site, tmp_path):
-    photos = capture(site, "replay", requested(0.9), photo_pool(site))
     write_capture_record(tmp_path, "replay", photos)
-    (back,) = read_capture_record(tmp_path)
+    back = read_capture_record(tmp_path)[0]
     assert (back.name, back.pose, back.distance, back.taken) == ("1.png", photos[0].pose, photos[0].distance, None)
     np.testing.assert_array_equal(back.camera.centre, photos[0].camera.centre)
-
-
-@pytest.mark.parametrize("content", ["[]", "{}", '{"shots": [{"name": "a"}]}'])
-def test_something_else_is_not_the_record_of_a_capture(tmp_path, content):
-    (tmp_path / "capture.json").write_text(content)
-    with pytest.raises(InputError, match=r"capture\.json: not the record"):
-        read_capture_record(tmp_path)
-
-
-def test_a_burst_of_a_replayed_scene_takes_several_photos_of_a_pose(site):
     photos = capture(site, "replay", requested(0.9, 0.9), photo_pool(site), burst=2)
     assert [(photo.name, photo.pose.name) for photo in photos] == [("1.png", "a0"), ("0.png", "a0"), ("2.png", "a1")]
+
+
+def test_something_else_is_not_the_record_of_a_capture(tmp_path):
+    (tmp_path / "capture.json").write_text('{"shots": [{"name": "a"}]}')
+    with pytest.raises(InputError, match=r"capture\.json: not the record"):
+        read_capture_record(tmp_path)
 
 
 def test_a_burst_of_a_rendered_scene_repeats_the_photo_with_other_noise(site, tmp_path, monkeypatch):
@@ -119,12 +108,15 @@ def test_a_photo_that_cannot_be_kept_whole_is_not_kept(tmp_path):
     assert store.photos_of(one[1]) == [] and not list((tmp_path / "captures").glob(".part-*"))
 
 
-def test_a_stored_photo_that_was_changed_is_refused_by_name(tmp_path):
+def test_a_stored_photo_or_record_that_was_changed_is_refused_by_name(tmp_path):
     store, (one,) = PhotoStore(tmp_path / "captures"), requested(0.0)
     kept = store.add(picture(tmp_path / "in.png"), "serial", one, one[1], WHEN)
     picture(kept.photo, 0.9)
     with pytest.raises(InputError, match=r"photo\.png.*put it back"):
         store.photos_of(one[1])
+    kept.photo.with_name("shot.json").write_text('{"photo": "photo.png"}')
+    with pytest.raises(InputError, match=r"shot\.json: not the record of a photo"):
+        store.list_digests([one[1]])
 
 
 def test_a_photo_that_was_removed_is_taken_again_beside_later_ones(tmp_path):
@@ -135,20 +127,8 @@ def test_a_photo_that_was_removed_is_taken_again_beside_later_ones(tmp_path):
     assert [stored.photo for stored in store.photos_of(one[1])] == [second.photo, again.photo]
 
 
-def test_a_damaged_record_is_named_whoever_reads_it(tmp_path):
-    store, (one,) = PhotoStore(tmp_path / "captures"), requested(0.0)
-    record = store.add(picture(tmp_path / "in.png"), "serial", one, one[1], WHEN).photo.with_name("shot.json")
-    record.write_text('{"photo": "photo.png"}')
-    with pytest.raises(InputError, match=r"shot\.json: not the record of a photo"):
-        store.list_digests([one[1]])
-
-
 def test_poses_differ_but_not_by_rounding():
-    assert (
-        pose_key(at(0.0)) == pose_key(at(1e-9))
-        and pose_key(at(0.0)) != pose_key(at(1e-3))
-        and len(pose_key(at(0.0))) == 24
-    )
+    assert pose_key(at(0.0)) == pose_key(at(1e-9)) != pose_key(at(1e-3))
 
 
 def test_one_run_at_a_time_holds_the_device(tmp_path):
@@ -177,30 +157,14 @@ def test_what_the_store_holds_is_not_taken_again(site, tmp_path, monkeypatch):
     assert image_files.read_size(tmp_path / "capture/a1.png") == (8, 8)
 
 
-@pytest.mark.parametrize("agent", ["render", "replay", "serial", "plan", "handheld"])
-def test_where_no_pose_was_chosen_no_agent_is_called(agent, tmp_path, monkeypatch):
-    def no_one(*_):
-        raise AssertionError("somebody was asked for photos")
-
-    monkeypatch.setitem(AGENTS, agent, no_one)
+def test_where_no_pose_was_chosen_no_agent_is_called(tmp_path, monkeypatch):
+    monkeypatch.setitem(AGENTS, "plan", lambda *_: pytest.fail("somebody was asked for photos"))
     monkeypatch.setattr(agents.candidates, "list_remaining", lambda *_: requested(0.0))
-    scene = {"agent": agent, "kind": "photos"}
+    scene = {"agent": "plan", "kind": "photos"}
     site = Site("dune", scene, scene_frame(flying_height=5.0), tmp_path / "photos", PhotoStore(tmp_path / "captures"))
     agents.capture_views(site, ViewSplit((), (), ()), [], [], tmp_path / "capture")
-    assert [path.name for path in (tmp_path / "capture").iterdir()] == ["capture.json"]
-    assert json.loads((tmp_path / "capture/capture.json").read_text()) == {"agent": agent, "shots": []}
+    assert json.loads((tmp_path / "capture/capture.json").read_text()) == {"agent": "plan", "shots": []}
     assert read_captured_views(tmp_path / "capture", 8) == [] and not (tmp_path / "captures").exists()
-
-
-def test_what_was_taken_before_a_failure_stays(site, tmp_path, monkeypatch):
-    def take(site, missing):
-        site.store.add(picture(tmp_path / "in.png"), "handheld", missing[0], missing[0][1], WHEN)
-        raise InputError("the battery is empty")
-
-    monkeypatch.setitem(AGENTS, "handheld", StoreAgent(take))
-    with pytest.raises(InputError, match="battery"):
-        capture(site, "handheld", requested(0.0, 1.0))
-    assert len(site.store.photos_of(at(0.0))) == 1 and not site.store.photos_of(at(1.0))
 
 
 def drop(site, places, monkeypatch):
@@ -218,26 +182,18 @@ def test_dropped_photos_go_to_the_poses_that_they_were_taken_for(site, monkeypat
     missing = drop_folder.import_dropped_photos(site, both, "handheld")
     assert [pose.name for pose, _ in missing] == ["a2"]
     assert site.store.photos_of(at(0.0))[0].camera.centre[0] == pytest.approx(0.05)
-    assert [r["source"] for r in read_records(site.store)] and site.store.photos_of(at(1.0))[0].taken.startswith(
-        "1970-01-01"
-    )
+    assert site.store.photos_of(at(1.0))[0].taken.startswith("1970-01-01")
     assert "lost.png: it could not be localised" in caplog.text
     assert "far.png: it is near no requested pose" in caplog.text
     assert (drop_folder.make_drop_folder(site) / "x.png").exists()  # people's own files stay
 
 
-def test_a_photo_is_taken_over_once(site, monkeypatch):
-    drop(site, {"x.png": 0.1, "y.png": 0.2}, monkeypatch)
-    for _ in range(2):
-        assert drop_folder.import_dropped_photos(site, requested(0.0), "handheld") == []
-    assert len(read_records(site.store)) == 1
-
-
-def test_the_same_file_dropped_twice_is_one_photo(site, monkeypatch, caplog):
+def test_a_photo_is_taken_over_once_also_where_it_was_dropped_twice(site, monkeypatch, caplog):
     drop(site, {"x.png": 0.1, "y.png": 0.1}, monkeypatch)
     folder = drop_folder.make_drop_folder(site)
     shutil.copyfile(folder / "x.png", folder / "y.png")
-    assert len(drop_folder.import_dropped_photos(site, requested(0.0, 0.2), "plan")) == 1
+    for _ in range(2):
+        assert len(drop_folder.import_dropped_photos(site, requested(0.0, 0.2), "plan")) == 1
     assert [record["source"] for record in read_records(site.store)] == ["x.png"]
     assert "y.png: the same photo as x.png" in caplog.text
 
@@ -262,7 +218,3 @@ def test_an_agent_knows_the_poses_of_this_round_and_the_earlier_ones(site, tmp_p
     chosen = [pose for pose, _ in now]
     agents.capture_views(site, ViewSplit((), (), ()), [tmp_path / "before"], chosen, tmp_path / "capture")
     assert [pose_key(camera) for camera in seen] == [pose_key(at(x)) for x in (3.0, 0.0, 1.0)]
-
-
-def test_an_empty_drop_folder_leaves_all_poses_missing(site):
-    assert len(drop_folder.import_dropped_photos(site, requested(0.0, 1.0), "plan")) == 2

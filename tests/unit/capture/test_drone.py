@@ -1,11 +1,12 @@
 import json
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 from fixtures.frames import scene_frame
 
-from dav_gswt.capture import drone, drop_folder, qgc_plan
+from dav_gswt.capture import drone, drop_folder, qgc_plan, route
 from dav_gswt.capture.site import Site
 from dav_gswt.capture.store import PhotoStore
 from dav_gswt.errors import InputError
@@ -29,6 +30,10 @@ def requested():
     return [(pose_of_camera(f"pose_{i}", camera, FRAME), camera) for i, camera in enumerate(found)]
 
 
+def requested_views(requested):
+    return [(pose.name, camera) for pose, camera in requested]
+
+
 @pytest.fixture
 def site(tmp_path, monkeypatch):
     monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, requested, agent: requested)
@@ -50,35 +55,14 @@ def places(items):
     return PLACE.to_world(np.array([home, *earth])), found
 
 
-def test_the_file_has_what_qgroundcontrol_reads(site, requested):
-    with pytest.raises(InputError):
-        drone.take_photos(site, requested)
-    content = json.loads((site.store.folder / "mission.plan").read_text())
-    flown = content["mission"]
-    items = flown.pop("items")
-    assert content.pop("mission") is flown
-    assert content == {
-        "fileType": "Plan",
-        "geoFence": {"circles": [], "polygons": [], "version": 2},
-        "groundStation": "QGroundControl",
-        "rallyPoints": {"points": [], "version": 2},
-        "version": 1,
-    }
-    assert flown.pop("plannedHomePosition") == [*items[0]["params"][4:6], 430.0]
-    assert flown == {
-        "cruiseSpeed": 3,
-        "firmwareType": 12,
-        "globalPlanAltitudeMode": 1,
-        "hoverSpeed": 3,
-        "vehicleType": 2,
-        "version": 2,
-    }
+def test_the_items_are_numbered_and_their_altitudes_are_above_home(site, items):
+    plan = json.loads((site.store.folder / "mission.plan").read_text())
+    mission = plan["mission"]
+    assert (plan["fileType"], plan["version"], mission["version"], mission["cruiseSpeed"]) == ("Plan", 1, 2, 3)
+    assert mission["plannedHomePosition"] == [*items[0]["params"][4:6], 430.0]
     assert [item["doJumpId"] for item in items] == list(range(1, len(items) + 1))
     assert all(len(item["params"]) == 7 and item["type"] == "SimpleItem" and item["autoContinue"] for item in items)
-    for item in items:
-        if item["frame"] == 3:
-            assert (item["Altitude"], item["AltitudeMode"]) == (item["params"][6], 1)
-            assert item["AMSLAltAboveTerrain"] is None
+    assert all(item["Altitude"] == item["params"][6] for item in items if item["frame"] == 3)
     assert [items[0]["command"], items[1]["command"], items[-1]["command"]] == [22, 178, 20]
 
 
@@ -127,73 +111,84 @@ def test_detours_are_only_made_where_they_are_needed():
     np.testing.assert_array_equal(qgc_plan.plan_detour(low, low + [1, 0, 0], 5.0), [[4, 0, 5], [5, 0, 5]])
 
 
-def test_the_message_says_what_to_fly_what_is_missing_and_where_to_put_it(site, requested):
+def test_the_message_says_what_to_fly_what_is_missing_and_where_to_put_it(site, requested, monkeypatch):
     with pytest.raises(InputError) as said:
         drone.take_photos(site, requested[:2])
     for part in ("mission.plan", "4 photos are missing, of 2 poses (pose_0, pose_1)", "drop", "same command again"):
         assert part in str(said.value)
-
-
-def test_nothing_is_written_when_nothing_is_missing(site, requested, monkeypatch):
+    # (0, -10, 5), (0, 0, 20), (9.85, 1.74, 17.32) and back: 18.03 + 10.35 + 19.66 m; at each stop 4 s and 2 photos
+    assert "48 m, about 1 min, up to 20 m above the ground" in str(said.value)
+    flown = qgc_plan.plan_flight(requested_views(requested[:2]), PLACE, np.array([0, -0.5]), qgc_plan.FlightRules(), 2)
+    assert flown.duration == pytest.approx(48.04 / 3 + 2 * (4 + 2), abs=0.01)
+    (site.store.folder / "mission.plan").unlink()
     monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, requested, agent: [])
     assert drone.take_photos(site, requested) is None
     assert not (site.store.folder / "mission.plan").exists()
 
 
-def test_a_scene_without_gps_is_refused(site, requested):
+def test_a_scene_without_gps_and_poses_that_are_too_low_are_refused(site, requested):
     bare = Site("moor", site.scene, replace(FRAME, georeference=None), site.photos, site.store)
     with pytest.raises(InputError, match="GPS positions in their EXIF"):
         drone.take_photos(bare, requested)
-
-
-def test_poses_that_are_too_low_are_refused_by_name(site, requested):
     low = Site("moor", {"drone": {"min_altitude": 3.6}}, FRAME, site.photos, site.store)
     with pytest.raises(InputError, match=r"pose_4, pose_5: lower than 3.6 m"):
         drone.take_photos(low, requested)
 
 
-def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, requested):
-    def on(slope, **flight):
-        frame = replace(FRAME, georeference=replace(FRAME.georeference, slope=slope))
-        return Site("moor", {"drone": flight}, frame, site.photos, site.store)
+def said_on_a_slope(site, requested, slope, **flight):
+    frame = replace(FRAME, georeference=replace(FRAME.georeference, slope=slope))
+    with pytest.raises(InputError) as raised:
+        drone.take_photos(Site("moor", {"drone": flight}, frame, site.photos, site.store), requested)
+    return str(raised.value)
 
+
+def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, requested):
     # the farthest of the high poses is 0.8 x 20 m from where the drone takes off: 10 degrees are 2.9 m
     high = requested[:3]
-    with pytest.raises(InputError, match=r"slopes by 10.0 degrees, .* up to 2\.9 m; set scenes.moor.drone.clearance"):
-        drone.take_photos(on(10.0), high)
-    with pytest.raises(InputError, match="fly this mission"):
-        drone.take_photos(on(10.0, clearance=12), high)
-    with pytest.raises(InputError, match="fly this mission"):
-        drone.take_photos(on(2.0), requested)
+    message = said_on_a_slope(site, high, 10.0)
+    assert "slopes by 10.0 degrees" in message and "up to 2.9 m; set scenes.moor.drone.clearance" in message
+    assert "fly this mission" in said_on_a_slope(site, high, 10.0, clearance=12)
+    assert "fly this mission" in said_on_a_slope(site, requested, 2.0)
 
 
 def test_a_pose_that_could_be_in_the_slope_is_refused_by_name_however_high_the_clearance(site, requested):
-    frame = replace(FRAME, georeference=replace(FRAME.georeference, slope=10.0))
-
-    def said(**flight):
-        with pytest.raises(InputError) as raised:
-            drone.take_photos(Site("moor", {"drone": flight}, frame, site.photos, site.store), requested)
-        return str(raised.value)
-
     # pose_4 and pose_5 are planned at 3.5 and 3.1 m, 27 m from where the drone takes off: 4.8 m off
-    message = said(clearance=12)
+    message = said_on_a_slope(site, requested, 10.0, clearance=12)
     assert "pose_4, pose_5 by more than half" in message and "drone.min_altitude to 10 or more" in message
     assert "drone.clearance" not in message and not (site.store.folder / "mission.plan").exists()
-    assert "drone.clearance to 10 or more and scenes.moor.drone.min_altitude to 10 or more" in said()
+    both = "drone.clearance to 10 or more and scenes.moor.drone.min_altitude to 10 or more"
+    assert both in said_on_a_slope(site, requested, 10.0)
 
 
-def test_the_same_poses_give_the_same_file(site, requested):
-    written = []
-    for _ in range(2):
-        with pytest.raises(InputError):
-            drone.take_photos(site, requested)
-        written.append((site.store.folder / "mission.plan").read_bytes())
-    assert written[0] == written[1]
+def way(places, ordered, start=None, end=None):
+    stops = [p for p in (start, *places[list(ordered)], end) if p is not None]
+    return route.path_length(np.array(stops))
 
 
-def test_a_pose_is_flown_whatever_its_place_in_the_list(requested):
-    views = [(pose.name, camera) for pose, camera in requested]
-    flown = qgc_plan.plan_flight(views, PLACE, np.array([0.0, -0.5]), qgc_plan.FlightRules())
-    assert sorted(flown.names) == sorted(pose.name for pose, _ in requested)
-    assert flown.highest == pytest.approx(20.0)
-    assert flown.duration > flown.length / 3
+def test_places_on_a_line_are_visited_along_it():
+    places = np.array([[3.0, 0], [1, 0], [4, 0], [2, 0]])
+    assert route.order_stops(places, np.zeros(2)) == (1, 3, 0, 2)
+
+
+def test_two_opt_mends_what_the_nearest_neighbour_leaves():
+    # from 0 the nearest is 1, then -1.1, then 4: 1 + 2.1 + 5.1 = 8.2; with the first two turned round 1.1 + 2.1 + 3
+    places = np.array([[1.0], [-1.1], [4.0]])
+    assert route.order_stops(places, np.zeros(1)) == (1, 0, 2)
+
+
+@pytest.mark.parametrize("start, end", [(None, None), (0.0, None), (0.0, 0.0), (0.0, 1.0)])
+def test_every_place_is_visited_once_and_no_stretch_can_be_turned_round_to_shorten_the_way(start, end):
+    for seed in range(20):
+        places = np.random.default_rng(seed).random((9, 2))
+        first, last = (None if at is None else np.full(2, at) for at in (start, end))
+        ordered = route.order_stops(places, first, last)
+        assert sorted(ordered) == list(range(9))
+        long = way(places, ordered, first, last)
+        for i, j in combinations(range(10), 2):
+            turned = [*ordered[:i], *ordered[i:j][::-1], *ordered[j:]]
+            assert way(places, turned, first, last) >= long - 1e-9
+
+
+def test_one_place_and_places_in_one_spot_have_an_order():
+    assert route.order_stops(np.zeros((1, 2)), np.ones(2), np.ones(2)) == (0,)
+    assert sorted(route.order_stops(np.zeros((3, 2)))) == [0, 1, 2]

@@ -2,11 +2,9 @@
 
 import pickle
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 import pytest
-from fixtures.configs import ROOT
 
 from dav_gswt.capture import serial_rig
 from dav_gswt.config import rule_keys
@@ -16,7 +14,6 @@ from dav_gswt.config.scenes import PhotoScene, SyntheticScene
 from dav_gswt.config.settings import Preset
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.photos.sfm.registration import choose_sfm_options
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings, select_settings
 from dav_gswt.views import candidates
@@ -56,11 +53,6 @@ def test_jobs_receive_keys_with_their_guard():
         sent["rig"].get("port")
 
 
-def test_an_agent_that_a_rule_does_not_serve_is_named():
-    with pytest.raises(InputError, match="render_candidates serves no scene with agent replay"):
-        select_scene_keys("render_candidates", {"agent": "replay"})
-
-
 @pytest.mark.parametrize("rule, settings", [("fit_coarse", CoarseSettings), ("update_field", UpdateSettings)])
 def test_a_fit_is_given_all_keys_of_its_settings(rule, settings):
     read = {field.name for field in fields(settings) if field.metadata.get("of_preset", True)}
@@ -82,28 +74,11 @@ def test_what_renders_photos_reads_only_its_keys(synthetic_scene):
     assert synthetic.test_groups(given) == synthetic.test_groups(synthetic_scene)
 
 
-@pytest.mark.parametrize("rule", ["score_coarse", "select_poses", "capture_views", "render_candidates"])
-def test_what_lists_rendered_candidates_reads_only_its_keys(synthetic_scene, rule):
+def test_what_lists_candidates_reads_only_its_keys(synthetic_scene):
     frame = synthetic.make_scene("desert", 0).frame
-    assert len(candidates.list_rendered(select_scene_keys(rule, synthetic_scene), frame)) == 250
-
-
-@pytest.mark.parametrize("agent", ["serial", "plan", "handheld"])
-@pytest.mark.parametrize("rule", ["score_round", "select_poses", "request_views", "calibrate_round"])
-def test_what_lists_candidates_for_devices_reads_only_its_keys(agent, rule):
-    frame = synthetic.make_scene("desert", 0).frame
+    assert len(candidates.list_rendered(select_scene_keys("select_poses", synthetic_scene), frame)) == 250
     camera = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, 64.0, 64.0, 128, 128)
-    given = select_scene_keys(rule, photo_scene(agent))
-    assert given["agent"] == agent and len(candidates.list_poses(given, frame, camera)) == 250
-
-
-def test_structure_from_motion_reads_only_its_keys():
-    entry = photo_scene("replay") | {"focal": 28.0, "mapper": "global", "sfm": "careful"}
-    given = select_scene_keys("register_photos", entry)
-    assert choose_sfm_options(given, 1) == choose_sfm_options(entry, 1)
-
-
-def test_every_rule_with_keys_is_a_rule_of_the_workflow():
-    text = "".join(path.read_text() for path in Path(ROOT, "rules").rglob("*.smk"))
-    for rule in (*rule_keys.SCENE_KEYS, *rule_keys.PRESET_KEYS, *rule_keys.PRIOR_KEYS):
-        assert f"rule {rule}:" in text or f" as {rule} with:" in text, rule
+    given = select_scene_keys("score_round", photo_scene("plan"))
+    assert given["agent"] == "plan" and len(candidates.list_poses(given, frame, camera)) == 250
+    with pytest.raises(InputError, match="render_candidates serves no scene with agent replay"):
+        select_scene_keys("render_candidates", {"agent": "replay"})

@@ -1,5 +1,6 @@
 """A bundle of two materials with objects, on hills, and the programs of others that npm brings."""
 
+import json
 import shutil
 import subprocess
 
@@ -8,25 +9,13 @@ from fixtures.land_covers import write_cover_bundle
 from fixtures.random_field import random_field
 
 from dav_gswt.bundle import store
-from dav_gswt.export import spool
+from dav_gswt.config.exports import Export
+from dav_gswt.export import spool, terrain_files
 from dav_gswt.export.spool import Spool
 from dav_gswt.terrain import endless
 
 HILLS = {"kind": "hills", "height": 0.4, "wavelength": 4}
 NPM = ["gltf-validator@2.0.0-dev.3.10", "three@0.187.0", "@playcanvas/splat-transform@2.7.1"]
-SETTINGS = {
-    "columns": 3,
-    "rows": 2,
-    "centre": [0.0, 0.0],
-    "level": 0,
-    "formats": ["glb"],
-    "axes": "own",
-    "spz_version": 3,
-    "tile_compression": "spz",
-    "max_gb": 1.0,
-    "surface": "ground",
-    "mesh_error": 0.25,
-}
 
 
 @pytest.fixture
@@ -50,19 +39,27 @@ def cover_bundle(tmp_path_factory, root):
 
 
 @pytest.fixture(scope="session")
-def hills():
-    return HILLS
+def export_settings():
+    """The config's `export`, all keys."""
+    settings = Export(columns=3, rows=2, centre=[0.0, 0.0], max_gb=1)
+    return settings.model_dump(mode="json", exclude_none=True)
 
 
 @pytest.fixture(scope="session")
-def export_settings():
-    """The config's `export`, all keys."""
-    return SETTINGS
+def cover_terrain(cover_bundle):
+    return endless.terrain_from_bundle(cover_bundle, HILLS)
 
 
 @pytest.fixture
-def cover_terrain(cover_bundle):
-    return endless.terrain_from_bundle(cover_bundle, HILLS)
+def export(cover_bundle, cover_terrain, export_settings, tmp_path):
+    """A function that exports the terrain to tmp_path / name; what terrain.json says."""
+
+    def export(name="out", threads=1, reference=None, **changes):
+        settings, out = export_settings | changes, tmp_path / name
+        terrain_files.export_terrain(cover_terrain, cover_bundle.manifest, settings, out, threads, reference)
+        return json.loads((out / "terrain.json").read_text())
+
+    return export
 
 
 @pytest.fixture(scope="session")

@@ -32,24 +32,34 @@ def known():
     return replace(found, colours=np.full(found.points.shape, 0.5, np.float32))
 
 
-@pytest.fixture
-def taken(known, tmp_path):
-    """Three start views, a replayed photo of the pool, and one that a device took under a name that is there."""
-    ground = synth.texture(np.random.default_rng(4), 300)
-    synth.shoot(tmp_path / "images", known.cameras, ground, HALF)
+@pytest.fixture(scope="module")
+def folder(known, tmp_path_factory):
+    """images/, a replayed photo of the pool, and one that a device took under a name that is there."""
+    folder, ground = tmp_path_factory.mktemp("photos"), synth.texture(np.random.default_rng(4), 300)
+    synth.shoot(folder / "images", known.cameras, ground, HALF)
     other = replace(synth.camera((0.1, 0.2, 1.1), (0, 0, 0)), fx=250.0, cy=100.0)
     for number, (name, camera) in enumerate([("002.png", known.camera("002.png")), ("001.png", other)], 1):
-        folder = tmp_path / f"capture{number}"
-        folder.mkdir()
-        image_files.write_png(folder / name, synth.photograph(camera, ground, HALF))
-        write_capture_record(folder, "replay", [CapturedPhoto(name, POSE, camera, camera, 0.0)])
-    return list_taken_photos(tmp_path / "images", known, SPLIT.start, [tmp_path / "capture1", tmp_path / "capture2"])
+        capture = folder / f"capture{number}"
+        capture.mkdir()
+        image_files.write_png(capture / name, synth.photograph(camera, ground, HALF))
+        write_capture_record(capture, "replay", [CapturedPhoto(name, POSE, camera, camera, 0.0)])
+    return folder
 
 
-@pytest.fixture
-def written(taken, known, tmp_path):
-    photo_model.write_photo_models(tmp_path / "model", tmp_path / "images", known, SPLIT, taken)
-    return tmp_path / "model"
+def list_photos(folder, known, left_out=()):
+    captures = [folder / "capture1", folder / "capture2"]
+    return list_taken_photos(folder / "images", known, SPLIT.start, captures, set(left_out))
+
+
+@pytest.fixture(scope="module")
+def taken(folder, known):
+    return list_photos(folder, known)
+
+
+@pytest.fixture(scope="module")
+def written(taken, folder, known):
+    photo_model.write_photo_models(folder / "model", folder / "images", known, SPLIT, taken)
+    return folder / "model"
 
 
 NAMES = ("000.png", "001.png", "004.png", "002.png", "iter2_001.png")
@@ -97,13 +107,6 @@ def test_the_importer_reads_the_poses_of_transforms_json_back(written, taken):
     assert read.colours == pytest.approx(stored.colours, abs=1e-6)
 
 
-def test_a_camera_of_transforms_json_looks_along_its_own_minus_z_with_y_up(known):
-    one = replace(known, names=("a.png",), cameras=(synth.camera((0, -1, 1), (0, 0, 1)),))
-    pose = np.array(photo_model.describe_transforms(one)["frames"][0]["transform_matrix"])
-    assert pose[:3, 2] == pytest.approx([0, -1, 0]) and pose[:3, 1] == pytest.approx([0, 0, 1])  # it looks north
-    assert pose[:3, 3] == pytest.approx([0, -1, 1])
-
-
 def test_photos_that_test_have_a_folder_of_their_own(written, known):
     tests = read_colmap_model(written / "test/sparse/0")
     assert tests.names == SPLIT.test and len(tests.point_of) == 0
@@ -113,23 +116,25 @@ def test_photos_that_test_have_a_folder_of_their_own(written, known):
     assert [frame["file_path"] for frame in frames] == ["images/006.png"]
 
 
-def test_what_the_test_photos_see_leaves_no_trace(written, taken, known, tmp_path):
+def test_what_the_test_photos_see_leaves_no_trace(written, taken, folder, known, tmp_path):
     unseen = known.image_of == known.names.index("006.png")
     pixels = known.pixels + unseen[:, None] * 30.0
     moved = replace(known, pixels=pixels, points=known.points + unseen.sum(), colours=1 - known.colours)
-    photo_model.write_photo_models(tmp_path / "other", tmp_path / "images", moved, SPLIT, taken)
+    photo_model.write_photo_models(tmp_path / "other", folder / "images", moved, SPLIT, taken)
     for name in ("sparse/0/points3D.bin", "sparse/0/images.bin", "sparse_pc.ply", "transforms.json"):
         assert digest_files(written / name) == digest_files(tmp_path / "other" / name), name
 
 
-def test_a_photo_that_the_fit_left_out_is_left_out(known, tmp_path, taken):
-    captures = [tmp_path / "capture1", tmp_path / "capture2"]
-    kept = list_taken_photos(tmp_path / "images", known, SPLIT.start, captures, {"002.png"})
-    assert [photo.name for photo in kept] == [*SPLIT.start, "iter2_001.png"]
+def test_a_photo_that_the_fit_left_out_is_left_out(folder, known):
+    assert [photo.name for photo in list_photos(folder, known, {"002.png"})] == [*SPLIT.start, "iter2_001.png"]
 
 
-def test_a_picture_of_another_size_is_named_and_nothing_is_left(known, taken, tmp_path):
-    image_files.write_png(taken[1].source, np.zeros((8, 9, 3), np.float32))
-    with pytest.raises(InputError, match=r"001\.png: 9 x 8 pixels, its camera takes 320 x 240; make the photos again"):
-        photo_model.write_photo_models(tmp_path / "model", tmp_path / "images", known, SPLIT, taken)
-    assert not list(tmp_path.glob("*model*"))
+def test_a_picture_of_another_size_or_a_name_that_leads_elsewhere_is_named_and_nothing_is_left(
+    folder, known, taken, tmp_path
+):
+    image_files.write_png(tmp_path / "small.png", np.zeros((8, 9, 3), np.float32))
+    small, elsewhere = replace(taken[4], source=tmp_path / "small.png"), replace(taken[4], name="../001.png")
+    for wrong, why in ((small, "small.png: 9 x 8 pixels, its camera takes 320 x 240"), (elsewhere, "001.png")):
+        with pytest.raises(InputError, match=f"{why}.*; make the photos again"):
+            photo_model.write_photo_models(tmp_path / "model", folder / "images", known, SPLIT, [*taken[:4], wrong])
+        assert not list(tmp_path.glob("*model*"))

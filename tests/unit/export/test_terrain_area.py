@@ -1,6 +1,7 @@
 """The cells of a finite terrain, and what is said before work starts."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,18 +17,12 @@ from dav_gswt.terrain.finite import Area, Disc
     [
         ({}, (Area(-1, -1, 3, 2), (0.0, 0.0))),
         ({"centre": [10.5, -4.0]}, (Area(9, -5, 3, 2), (10.5, -4.0))),
+        ({"centre": [3.9, -0.5], "columns": 5}, (Area(1, -1, 5, 2), (3.9, -0.5))),
         ({"corner": [7, -3]}, (Area(7, -3, 3, 2), (8.5, -2.0))),
     ],
 )
 def test_cells_lie_about_the_centre_or_from_the_corner(place, expected):
     assert terrain_area.choose_area({"columns": 3, "rows": 2} | place) == expected
-
-
-@pytest.mark.parametrize("centre", [-0.5, 0.0, 0.3, 0.5, 3.9])
-@pytest.mark.parametrize("columns", [1, 2, 5])
-def test_the_centre_is_in_the_middle_of_the_area_to_half_a_cell(centre, columns):
-    area, _ = terrain_area.choose_area({"columns": columns, "rows": 1, "centre": [centre, 0.0]})
-    assert abs(area.west + columns / 2 - centre) <= 0.5
 
 
 def limits(name):
@@ -46,60 +41,45 @@ def test_the_eye_stands_on_the_surface_and_the_origin_is_the_middle(cover_terrai
     np.testing.assert_allclose(wanted.origin, [4.5 * side, 3 * side, 0])
 
 
-def test_a_level_that_is_not_there_is_named(cover_terrain, export_settings):
-    with pytest.raises(InputError, match=r"export\.level: there is no level 2; the last one is 1"):
-        plan(cover_terrain, export_settings, level=2)
-
-
-@pytest.mark.parametrize("level", [0, 1, "by_distance"])
-@pytest.mark.parametrize("name, limit", [("ply", None), ("glb", None), ("usd", None), ("spz", 20_000)])
+@pytest.mark.parametrize("level, name, limit", [(0, "spz", 20_000), (1, "glb", None), ("by_distance", "usd", None)])
 def test_too_much_is_refused_with_the_area_that_fits(cover_terrain, export_settings, monkeypatch, level, name, limit):
-    given = export_settings | {"columns": 40, "rows": 20, "level": level}
     if limit:
         monkeypatch.setitem(terrain_area.LIMITS, name, terrain_area.FileLimit(1, limit))
     max_gb = 1.0 if limit else 1e-9 * 20_000 * terrain_area.LIMITS[name].bytes
+
+    def check(columns, rows):
+        wanted = plan(cover_terrain, export_settings, columns=columns, rows=rows, level=level)
+        return terrain_area.check_size(cover_terrain, wanted, limits(name), max_gb)[name]
+
     with pytest.raises(
         InputError, match=rf"export: {name}: 40 x 20 cells have up to \d+ Gaussians, .* 20000; "
     ) as told:
-        terrain_area.check_size(cover_terrain, plan(cover_terrain, given), limits(name), max_gb)
+        check(40, 20)
     columns, rows = map(int, re.search(r"; (\d+) x (\d+) fit", str(told.value)).groups())
-    fits = plan(cover_terrain, given, columns=columns, rows=rows)
-    assert 0 < terrain_area.check_size(cover_terrain, fits, limits(name), max_gb)[name] <= 20_000
-    wider = plan(cover_terrain, given, columns=columns + 4, rows=rows + 4)
+    assert 0 < check(columns, rows) <= 20_000
     with pytest.raises(InputError):
-        terrain_area.check_size(cover_terrain, wider, limits(name), max_gb)
+        check(columns + 4, rows + 4)
 
 
-def test_where_not_one_cell_fits_the_message_says_so(cover_terrain, export_settings):
+def test_a_level_that_is_not_there_and_a_limit_below_one_cell_are_named(cover_terrain, export_settings):
+    with pytest.raises(InputError, match=r"export\.level: there is no level 2; the last one is 1"):
+        plan(cover_terrain, export_settings, level=2)
     with pytest.raises(InputError, match="not one cell fits: set export.level to a coarser one, or raise"):
         terrain_area.check_size(cover_terrain, plan(cover_terrain, export_settings), limits("ply"), 1e-6)
 
 
 @pytest.mark.parametrize("name", sorted(terrain_area.ALL_LEVELS))
 def test_a_set_of_all_levels_is_counted_by_the_finest(cover_terrain, export_settings, name):
-    fine, coarse = (plan(cover_terrain, export_settings, level=level) for level in (0, 1))
-    most = terrain_area.check_size(cover_terrain, fine, limits(name), 1.0)[name]
-    bound = 1e-9 * (most - 1) * terrain_area.LIMITS[name].bytes
-    assert terrain_area.check_size(cover_terrain, coarse, limits("ply"), bound)["ply"] < most
-    with pytest.raises(InputError, match=rf"export: {name}: 3 x 2 cells have up to {most} Gaussians"):
-        terrain_area.check_size(cover_terrain, coarse, limits(name), bound)
-
-
-@pytest.mark.parametrize("name", sorted(terrain_area.ALL_LEVELS))
-def test_the_log_counts_each_format_by_the_levels_that_it_holds(cover_terrain, export_settings, name):
     coarse, both = plan(cover_terrain, export_settings, level=1), limits("ply") | limits(name)
     counts = terrain_area.check_size(cover_terrain, coarse, both, 1.0)
     assert counts["ply"] < counts[name]
+    assert counts[name] == terrain_area.check_size(cover_terrain, replace(coarse, level=0), limits("ply"), 1.0)["ply"]
     said = terrain_area.describe_size(counts, both)
     assert f"ply {counts['ply']} Gaussians" in said and f"{name} (finest level) {counts[name]} Gaussians" in said
-
-
-def test_tiles_without_compression_are_larger(export_settings):
-    plain, packed = (
-        terrain_area.choose_limits(export_settings | {"formats": ["3dtiles", "ply"], "tile_compression": how})
-        for how in ("none", "spz")
-    )
-    assert plain["3dtiles"].bytes > packed["3dtiles"].bytes and plain["ply"] == packed["ply"]
+    bound = 1e-9 * (counts[name] - 1) * terrain_area.LIMITS[name].bytes
+    with pytest.raises(InputError, match=rf"export: {name}: 3 x 2 cells have up to {counts[name]} Gaussians"):
+        terrain_area.check_size(cover_terrain, coarse, limits(name), bound)
+    assert said.endswith(f"{counts[name] * 56 / 1e6:.0f} MB of disk on the way")
 
 
 def test_a_radius_takes_all_cells_that_it_touches(cover_terrain, export_settings):
@@ -115,23 +95,16 @@ def test_a_radius_takes_all_cells_that_it_touches(cover_terrain, export_settings
 
 
 def test_a_radius_that_is_too_large_is_refused_with_the_one_that_fits(cover_terrain, export_settings):
-    given = export_settings | {"radius": 12.0}
-    max_gb = 1e-9 * 20_000 * terrain_area.LIMITS["ply"].bytes
+    def check(radius):
+        wanted = plan(cover_terrain, export_settings, radius=radius)
+        return terrain_area.check_size(cover_terrain, wanted, limits("ply"), 20_000e-9 * 68)["ply"]
+
     with pytest.raises(InputError, match=r"ply: a radius of 12 tiles has up to \d+ Gaussians") as told:
-        terrain_area.check_size(cover_terrain, plan(cover_terrain, given), limits("ply"), max_gb)
+        check(12.0)
     fits = float(re.search(r"; ([\d.]+) tiles fit: set export\.radius", str(told.value))[1])
-    assert (
-        terrain_area.check_size(cover_terrain, plan(cover_terrain, given, radius=fits), limits("ply"), max_gb)["ply"]
-        <= 20_000
-    )
+    assert check(fits) <= 20_000
     with pytest.raises(InputError):
-        terrain_area.check_size(cover_terrain, plan(cover_terrain, given, radius=fits + 1), limits("ply"), max_gb)
-
-
-def test_metres_become_tile_sides():
-    given = {"centre": ["-3m", 2.0], "radius": "6 m", "level": 0}
-    found = terrain_area.resolve_lengths(given, side=4.0, metres=0.5)
-    assert found == {"centre": [-1.5, 2.0], "radius": 3.0, "level": 0}
+        check(fits + 1)
 
 
 @pytest.mark.parametrize(
@@ -141,14 +114,13 @@ def test_metres_become_tile_sides():
         ({"centre": [0.0, "1m"]}, None, r"export\.centre: 1m: the scale of this terrain is not known"),
         ({"radius": "6000m"}, 1.0, r"export\.radius: 1500 tile sides; more than 0 and at most 500"),
         ({"radius": "0m"}, 1.0, r"export\.radius: 0 tile sides"),
-        (
-            {"radius": 1e-17, "centre": [3.0, 3.0]},
-            None,
-            r"export\.radius: 1e-17 tile sides touch no cell; make it larger",
-        ),
+        ({"radius": 1e-17, "centre": [3.0, 3.0]}, None, r"export\.radius: 1e-17 tile sides touch no cell"),
         ({"centre": ["99999999999m", 0.0]}, 1.0, r"export\.centre lies beyond"),
     ],
 )
-def test_lengths_that_make_no_sense_are_refused(given, metres, said):
+def test_metres_become_tile_sides_and_lengths_that_make_no_sense_are_refused(given, metres, said):
+    sound = {"centre": ["-3m", 2.0], "radius": "6 m", "level": 0}
+    found = terrain_area.resolve_lengths(sound, side=4.0, metres=0.5)
+    assert found == {"centre": [-1.5, 2.0], "radius": 3.0, "level": 0}
     with pytest.raises(InputError, match=said):
         terrain_area.resolve_lengths(given, 4.0, metres)

@@ -10,9 +10,10 @@ from fixtures.random_field import random_field
 from fixtures.splat_files import read_glb_splats, read_glb_spz
 from pyproj import Transformer
 
-from dav_gswt.export import terrain_files, tiles_3d
+from dav_gswt.export import tiles_3d
 from dav_gswt.export.axes import Y_UP, turn_field
 from dav_gswt.export.spool import Spool
+from dav_gswt.export.terrain_area import choose_limits
 from dav_gswt.field import concatenate_fields
 from dav_gswt.files import digest_files
 from dav_gswt.geometry.georeference import Georeference
@@ -20,6 +21,7 @@ from dav_gswt.terrain import finite
 from dav_gswt.terrain.finite import Area
 
 PLACE = Georeference(47.1, 11.3, 600.0, 20.0, metres_per_unit=1.5)
+FEW = {"columns": 2, "rows": 1}
 
 
 def list_tiles(tile, parent=None):
@@ -40,15 +42,13 @@ def assert_inside(inner, outer):
 
 
 @pytest.fixture
-def write(cover_bundle, cover_terrain, export_settings, tmp_path):
+def write(export, tmp_path):
     """A function that exports 5 x 3 cells; the folder of tileset.json and what is in it."""
 
-    def write(name="out", reference=None, threads=1, **changes):
-        settings = export_settings | {"columns": 5, "rows": 3, "formats": ["3dtiles"], "tile_compression": "none"}
-        settings |= changes
-        out = tmp_path / name
-        terrain_files.export_terrain(cover_terrain, cover_bundle.manifest, settings, out, threads, reference)
-        return out / "terrain_3dtiles", json.loads((out / "terrain_3dtiles/tileset.json").read_text())
+    def write(name="out", **changes):
+        export(name, **({"columns": 5, "rows": 3, "formats": ["3dtiles"], "tile_compression": "none"} | changes))
+        folder = tmp_path / name / "terrain_3dtiles"
+        return folder, json.loads((folder / "tileset.json").read_text())
 
     return write
 
@@ -67,46 +67,40 @@ def test_the_tree_keeps_the_rules_of_the_specification(write):
     uris = [tile["content"]["uri"] for tile, _ in tiles[1:]]
     there = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.glb"))
     assert sorted(uris) == there and len(there) == 15 + 3 * 2
-
-
-def test_contents_lie_in_their_volumes_with_y_up(write):
-    folder, tileset = write()
-    for tile, _ in list_tiles(tileset["root"])[1:]:
-        points = read_glb_splats(folder / tile["content"]["uri"]).means @ np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    for tile, _ in tiles[1:]:
+        points = turn_field(read_glb_splats(folder / tile["content"]["uri"]), Y_UP.T).means
         low, high = find_ends(tile["content"]["boundingVolume"])
         assert (points > low).all() and (points < high).all()
 
 
-@pytest.mark.parametrize("level", [0, 1])
-def test_a_level_has_the_gaussians_of_the_terrain(write, cover_terrain, level):
+def test_every_level_has_the_gaussians_of_the_terrain(write, cover_terrain):
     folder, tileset = write(level=1)  # which the set does not heed
-    parts = [read_glb_splats(path) for path in sorted(folder.glob(f"{level}/*.glb"))]
-    found = turn_field(concatenate_fields(parts), Y_UP.T)
     west, south = tileset["extras"]["cells"]["west"], tileset["extras"]["cells"]["south"]
-    wanted = finite.collect_cells(cover_terrain, west, south, 5, 3, level)
-    side = cover_terrain.side
-    means = wanted.means + np.float32(np.array([west * side, south * side, 0]) - tileset["extras"]["origin"])
-    assert len(found) == len(wanted)
-    assert np.sort(found.sh.ravel()).tolist() == np.sort(wanted.sh.ravel()).tolist()
-    np.testing.assert_allclose(np.sort(found.means, 0), np.sort(means, 0), atol=2e-5)
+    corner = np.array([west, south, 0]) * cover_terrain.side - tileset["extras"]["origin"]
+    for level in (0, 1):
+        parts = [read_glb_splats(path) for path in sorted(folder.glob(f"{level}/*.glb"))]
+        found = turn_field(concatenate_fields(parts), Y_UP.T)
+        wanted = finite.collect_cells(cover_terrain, west, south, 5, 3, level)
+        assert np.sort(found.sh.ravel()).tolist() == np.sort(wanted.sh.ravel()).tolist()
+        np.testing.assert_allclose(np.sort(found.means, 0), np.sort(wanted.means + corner, 0), atol=2e-5)
 
 
 def test_compressed_contents_are_those_without_to_the_steps_of_spz(write):
-    (plain, _), (packed, tileset) = write("plain"), write("packed", tile_compression="spz")
+    (plain, _), (packed, tileset) = write("plain", **FEW), write("packed", tile_compression="spz", **FEW)
     names = sorted(path.relative_to(plain) for path in plain.rglob("*.glb"))
     assert names == sorted(path.relative_to(packed) for path in packed.rglob("*.glb"))
     for name in names:
         wanted, read = read_glb_splats(plain / name), read_glb_spz(packed / name)
         np.testing.assert_allclose(read.means, wanted.means, atol=1e-3)
         np.testing.assert_allclose(read.log_scales, wanted.log_scales, atol=1 / 32 + 1e-4)
-        seen, same = (1 / (1 + np.exp(-f.opacity_logits.astype(float))) for f in (read, wanted))
-        np.testing.assert_allclose(seen, same, atol=0.5 / 255 + 1e-6)
     extension = tileset["extensions"]["3DTILES_content_gltf"]
     assert extension["extensionsRequired"] == ["KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"]
+    limits = [choose_limits({"formats": ["3dtiles"], "tile_compression": how})["3dtiles"] for how in ("none", "spz")]
+    assert limits[0].bytes > 2 * limits[1].bytes
 
 
 def test_a_georeferenced_tileset_stands_where_pyproj_puts_it(write):
-    _, tileset = write(reference=PLACE, centre=[7.0, -3.0])
+    _, tileset = write(reference=PLACE, centre=[7.0, -3.0], **FEW)
     matrix = np.array(tileset["root"]["transform"]).reshape(4, 4).T
     origin = np.array(tileset["extras"]["origin"])
     assert np.abs(origin[:2]).max() > 5
@@ -116,38 +110,21 @@ def test_a_georeferenced_tileset_stands_where_pyproj_puts_it(write):
         np.testing.assert_allclose(matrix @ [*local, 1.0], [*wanted, 1.0], atol=1e-6)
 
 
-def test_threads_change_no_byte(write):
-    folders = [write(str(threads), threads=threads)[0] for threads in (1, 3)]
-    names = [sorted(path.relative_to(folder) for path in folder.rglob("*.*")) for folder in folders]
+def test_threads_and_axes_of_other_formats_change_no_byte(write):
+    (first, _), (second, _) = write("a"), write("b", threads=3, axes="y-down", formats=["ply", "3dtiles"])
+    names = [sorted(path.relative_to(folder) for path in folder.rglob("*.*")) for folder in (first, second)]
     assert names[0] == names[1]
     for name in names[0]:
-        assert digest_files(folders[0] / name) == digest_files(folders[1] / name)
-
-
-def test_axes_of_other_formats_leave_the_tileset_alone(write):
-    (first, _), (second, _) = write("a"), write("b", axes="y-down", formats=["ply", "3dtiles"])
-    assert digest_files(first / "tileset.json") == digest_files(second / "tileset.json")
+        assert digest_files(first / name) == digest_files(second / name)
     assert json.loads((second.parent / "terrain.json").read_text())["files"] == {"ply": "y-down", "3dtiles": "z-up"}
 
 
-def test_a_level_is_refined_where_its_gaussians_lie_more_than_a_pixel_apart(cover_terrain):
-    errors = tiles_3d.measure_errors(cover_terrain)
+def test_a_level_is_refined_where_its_gaussians_lie_more_than_a_pixel_apart_and_no_error_falls(cover_terrain):
     counts = [len(tile) for (level, _), tile in cover_terrain.tiles.items() if level == 1]
-    assert errors == [0.0, pytest.approx(16 * cover_terrain.side / np.sqrt(np.mean(counts)))]
-
-
-def test_errors_do_not_fall_where_a_coarser_level_has_more_gaussians(cover_terrain):
-    tiles = cover_terrain.tiles | {(2, 0): cover_terrain.tiles[0, 0]}
+    expected = pytest.approx(16 * cover_terrain.side / np.sqrt(np.mean(counts)))
+    tiles = cover_terrain.tiles | {(2, 0): cover_terrain.tiles[0, 0]}  # with more Gaussians than the finer one
     errors = tiles_3d.measure_errors(replace(cover_terrain, tiles=tiles, switches=[1.0, 2.0, np.inf]))
-    assert errors[2] == errors[1] > 0
-
-
-@pytest.mark.parametrize("columns, rows, edge", [(1, 1, 1), (5, 3, 2), (4, 4, 4), (3, 7, 8)])
-def test_blocks_hold_every_cell_once(columns, rows, edge):
-    blocks = tiles_3d.split_area(Area(-2, 5, columns, rows), edge)
-    cells = [(b.west + i, b.south + j) for b in blocks for i in range(b.columns) for j in range(b.rows)]
-    assert sorted(cells) == sorted((i, j) for i in range(-2, columns - 2) for j in range(5, rows + 5))
-    assert max(max(b.columns, b.rows) for b in blocks) <= edge
+    assert errors == [0.0, expected, expected]
 
 
 @pytest.mark.parametrize("spz", [False, True])

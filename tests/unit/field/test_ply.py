@@ -8,7 +8,7 @@ from fixtures.random_field import random_field
 from plyfile import PlyData, PlyElement
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import HEADER_BYTES, GaussianField, concatenate_fields, read_field, write_field
+from dav_gswt.field import HEADER_BYTES, GaussianField, concatenate_fields, read_field, rgb_to_sh, write_field
 
 NAMES = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", *(f"scale_{i}" for i in range(3))]
 NAMES += [f"rot_{i}" for i in range(4)]
@@ -26,25 +26,29 @@ def foreign(path, rows=3, drop=(), change=None, extra=(), text=False):
     return path
 
 
-@pytest.mark.parametrize("degree", [0, 1, 2, 3])
-def test_a_field_comes_back_to_the_bit(tmp_path, degree):
-    field = random_field(7, degree)
-    write_field(field, tmp_path / "a.ply")
+def test_concatenating_and_indexing_keep_the_order():
+    one, two = random_field(3, seed=1), random_field(2, seed=2)
+    both = concatenate_fields([one, two])
+    assert np.array_equal(both[3:].means, two.means) and np.array_equal(both[np.array([0, 4])].sh[1], two.sh[1])
+
+
+def test_a_colour_of_half_has_no_coefficients_and_base_colours_invert_them():
+    colours = np.float32([[0, 0.5, 1]])
+    assert rgb_to_sh(colours)[0, 0] == pytest.approx([-1.7724539, 0, 1.7724539])  # sqrt(pi)
+    assert replace(random_field(1), sh=rgb_to_sh(colours)).base_colours == pytest.approx(colours, abs=1e-6)
+
+
+@pytest.mark.parametrize("count, degree", [(7, 0), (7, 1), (7, 3), (0, 0)])
+def test_a_field_comes_back_to_the_bit(tmp_path, count, degree):
+    field = random_field(count, degree)
+    for name in ("a.ply", "b.ply"):
+        write_field(field, tmp_path / name)
+    assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
     back = read_field(tmp_path / "a.ply")
+    assert back.sh_degree == degree
     for name in GaussianField.__dataclass_fields__:
         one, two = getattr(field, name), getattr(back, name)
         assert one.dtype == two.dtype and np.array_equal(one, two), name
-
-
-def test_the_same_field_gives_the_same_bytes(tmp_path):
-    for name in ("a.ply", "b.ply"):
-        write_field(random_field(), tmp_path / name)
-    assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
-
-
-def test_a_field_without_gaussians_comes_back(tmp_path):
-    write_field(random_field(0), tmp_path / "a.ply")
-    assert len(read_field(tmp_path / "a.ply")) == 0
 
 
 def test_harmonics_are_stored_channel_by_channel(tmp_path):
@@ -63,23 +67,35 @@ def test_a_foreign_field_is_read_and_nothing_in_it_is_uncertain(tmp_path, text):
     assert not field.uncertainty.any() and not field.ground.any()
 
 
-@pytest.mark.parametrize("missing", ["x", "f_dc_1", "opacity", "scale_2", "rot_3"])
-def test_a_missing_property_is_named(tmp_path, missing):
-    with pytest.raises(InputError, match=rf"a.ply.*{missing}"):
-        read_field(foreign(tmp_path / "a.ply", drop=[missing]))
+ZERO = {(2, f"rot_{i}"): 0.0 for i in range(4)}
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("name", ["x", "f_dc_2", "opacity", "scale_0", "rot_1"])
-def test_a_value_that_is_not_finite_is_refused_with_its_index(tmp_path, name, value):
-    with pytest.raises(InputError, match=rf"a.ply.*{name} of Gaussian 2 "):
-        read_field(foreign(tmp_path / "a.ply", change={(2, name): value}))
+@pytest.mark.parametrize(
+    "extra, change, said",
+    [
+        pytest.param([], {(2, "x"): np.nan}, "x of Gaussian 2 is not finite", id="a place"),
+        pytest.param([], {(2, "f_dc_2"): -np.inf}, "f_dc_2 of Gaussian 2 is not finite", id="a colour"),
+        pytest.param([], {(2, "rot_1"): np.inf}, "rot_1 of Gaussian 2 is not finite", id="a rotation"),
+        pytest.param([], ZERO, "Gaussian 2 has a zero quaternion", id="no rotation"),
+        pytest.param(["uncertainty"], {(2, "uncertainty"): -0.1}, "uncertainty of Gaussian 2 is -0.1", id="below 0"),
+        pytest.param(["uncertainty"], {(2, "uncertainty"): 1.1}, "uncertainty of Gaussian 2 is 1.1", id="above 1"),
+        pytest.param(["uncertainty"], {(2, "uncertainty"): np.nan}, "uncertainty of Gaussian 2 is not", id="neither"),
+        pytest.param(["imagined"], {(2, "imagined"): 2}, "imagined of Gaussian 2 is neither", id="no flag"),
+        pytest.param(["imagined"], {(2, "imagined"): np.nan}, "imagined of Gaussian 2 is neither", id="no number"),
+    ],
+)
+def test_a_value_that_makes_no_sense_is_refused_with_its_index(tmp_path, extra, change, said):
+    whole = {(row, name): 1.0 for row in range(2) for name in extra}
+    with pytest.raises(InputError, match=f"a.ply: {said}"):
+        read_field(foreign(tmp_path / "a.ply", extra=extra, change=whole | change))
 
 
-def test_a_zero_quaternion_is_refused_with_its_index(tmp_path):
-    zero = {(1, f"rot_{i}"): 0.0 for i in range(4)}
-    with pytest.raises(InputError, match="a.ply.*Gaussian 1 "):
-        read_field(foreign(tmp_path / "a.ply", change=zero))
+def test_a_missing_file_or_property_is_named(tmp_path):
+    with pytest.raises(InputError, match="a.ply: there is no such file"):
+        read_field(tmp_path / "a.ply")
+    for missing in ("x", "f_dc_1", "opacity", "scale_2", "rot_3"):
+        with pytest.raises(InputError, match=rf"a.ply: property {missing} is missing"):
+            read_field(foreign(tmp_path / "a.ply", drop=[missing]))
 
 
 @pytest.mark.parametrize("count", [3, 8, 10, 12])
@@ -88,13 +104,15 @@ def test_harmonics_that_are_not_whole_are_refused(tmp_path, count):
         read_field(foreign(tmp_path / "a.ply", extra=[f"f_rest_{i}" for i in range(count)]))
 
 
-@pytest.mark.parametrize("share", [0.0, 0.05, 0.5, 0.99])
 @pytest.mark.parametrize("text", [False, True], ids=["binary", "ascii"])
-def test_a_file_cut_short_is_refused_by_name(tmp_path, share, text):
+def test_a_file_cut_short_and_what_is_no_field_are_refused_by_name(tmp_path, text):
     path = foreign(tmp_path / "a.ply", rows=200, text=text)
-    path.write_bytes(path.read_bytes()[: int(path.stat().st_size * share)])
-    with pytest.raises(InputError, match="a.ply"):
-        read_field(path)
+    whole = path.read_bytes()
+    no_field = (b"no ply at all", b"ply\n", b"ply\nformat ascii 1.0\nend_header\n")
+    for content in (whole[: int(0.99 * len(whole))], whole[: int(0.02 * len(whole))], b"", *no_field):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match="a.ply"):
+            read_field(path)
 
 
 @pytest.mark.parametrize("count", [b"99999999999999", b"-1"])
@@ -115,16 +133,12 @@ def with_comment(path, line):
 def test_a_comment_does_not_hide_a_false_count(tmp_path, line, monkeypatch):
     path = foreign(tmp_path / "a.ply")
     with_comment(path, line)
+    if len(line) < HEADER_BYTES:
+        assert len(read_field(path)) == 3  # a comment that names the end of the header is read over
     path.write_bytes(path.read_bytes().replace(b"element vertex 3", b"element vertex 9999999999"))
     monkeypatch.setattr(PlyData, "read", lambda *_: pytest.fail("the vertices are allocated"))
     with pytest.raises(InputError, match="a.ply"):
         read_field(path)
-
-
-def test_a_comment_that_names_the_end_of_the_header_is_read_over(tmp_path):
-    path = foreign(tmp_path / "a.ply")
-    with_comment(path, b"comment end_header")
-    assert len(read_field(path)) == 3
 
 
 def with_list(path, name):
@@ -137,17 +151,10 @@ def with_list(path, name):
     return path
 
 
-@pytest.mark.parametrize("name", ["x", "f_dc_1", "rot_3", "uncertainty", "ground", "imagined"])
+@pytest.mark.parametrize("name", ["x", "rot_3", "uncertainty", "ground", "imagined"])
 def test_a_property_that_is_a_list_is_refused_by_name(tmp_path, name):
     with pytest.raises(InputError, match=rf"a.ply: property {name} is a list; export it again"):
         read_field(with_list(tmp_path / "a.ply", name))
-
-
-@pytest.mark.parametrize("value", [-0.1, 1.1, 1e30, np.nan, np.inf])
-def test_an_uncertainty_outside_0_to_1_is_refused_with_its_index(tmp_path, value):
-    path = foreign(tmp_path / "a.ply", extra=["uncertainty"], change={(0, "uncertainty"): 1, (2, "uncertainty"): value})
-    with pytest.raises(InputError, match="a.ply.*uncertainty of Gaussian 2 "):
-        read_field(path)
 
 
 def test_an_uncertainty_that_rounding_puts_beyond_1_is_clipped(tmp_path):
@@ -156,27 +163,6 @@ def test_an_uncertainty_that_rounding_puts_beyond_1_is_clipped(tmp_path):
         tmp_path / "a.ply", extra=["uncertainty"], change={(i, "uncertainty"): v for i, v in enumerate(values)}
     )
     assert read_field(path).uncertainty.tolist() == [1, 1, 0]
-
-
-@pytest.mark.parametrize(
-    "content", [b"no ply at all", b"ply\n", b"\x00\xff" * 50, b"ply\nformat ascii 1.0\nend_header\n"]
-)
-def test_what_is_no_field_is_refused_by_name(tmp_path, content):
-    (tmp_path / "a.ply").write_bytes(content)
-    with pytest.raises(InputError, match="a.ply"):
-        read_field(tmp_path / "a.ply")
-
-
-def test_a_mesh_is_refused_by_the_property_that_it_lacks(tmp_path):
-    table = np.zeros(4, [(name, "<f4") for name in "xyz"])
-    PlyData([PlyElement.describe(table, "vertex")]).write(str(tmp_path / "mesh.ply"))
-    with pytest.raises(InputError, match="mesh.ply.*f_dc_0"):
-        read_field(tmp_path / "mesh.ply")
-
-
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(InputError, match="nowhere.ply"):
-        read_field(tmp_path / "nowhere.ply")
 
 
 def test_what_was_imagined_comes_back_and_costs_a_field_without_it_no_byte(tmp_path):
@@ -199,10 +185,3 @@ def test_a_plain_file_has_floats_alone_and_the_same_gaussians(tmp_path):
     back = read_field(tmp_path / "a.ply")
     assert np.array_equal(back.means, field.means) and np.array_equal(back.sh, field.sh)
     assert not back.imagined.any() and not back.ground.any()
-
-
-@pytest.mark.parametrize("value", [2, -1, 0.5, np.nan, np.inf])
-def test_a_flag_that_is_none_is_refused_with_its_index(tmp_path, value):
-    path = foreign(tmp_path / "a.ply", extra=["imagined"], change={(0, "imagined"): 0, (2, "imagined"): value})
-    with pytest.raises(InputError, match=r"a.ply.*imagined of Gaussian 2 "):
-        read_field(path)

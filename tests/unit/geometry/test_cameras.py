@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.geometry import cameras
+from dav_gswt.geometry import camera_layouts, cameras
 from dav_gswt.geometry.cameras import camera_from_json, camera_to_json
 
 
@@ -39,12 +39,6 @@ def test_a_resized_camera_sees_the_same_directions():
     np.testing.assert_allclose(half.project(point)[0] * 2, camera.project(point)[0])
 
 
-def test_looking_straight_down_has_north_on_top():
-    camera = cameras.pinhole([0, 0, 5.0], [0, 0, 0], 10, 10, 90.0)
-    pixels, _ = camera.project(np.array([[0.0, 1, 0], [1, 0, 0]]))
-    assert pixels[0, 1] < 5 < pixels[1, 0]
-
-
 def test_an_eye_at_its_target_is_refused():
     with pytest.raises(ValueError, match="coincide"):
         cameras.look_at([1, 2, 3], [1, 2, 3])
@@ -56,3 +50,85 @@ def test_a_camera_comes_back_from_json_as_it_was():
     np.testing.assert_array_equal(back.rotation, camera.rotation)
     np.testing.assert_array_equal(back.translation, camera.translation)
     assert (back.fx, back.width, back.orthographic) == (camera.fx, 64, False)
+
+
+def camera(elevation, azimuth, radius=7.0, target=(1.0, 2.0, 0.5)):
+    return camera_layouts.orbit(elevation, azimuth, radius, target, 60, 40, 90.0)
+
+
+@pytest.mark.parametrize(
+    "elevation, azimuth, centre",
+    [
+        pytest.param(90, 0, (1, 2, 7.5), id="above"),
+        pytest.param(0, 0, (8, 2, 0.5), id="east"),
+        pytest.param(0, 90, (1, 9, 0.5), id="north"),
+        pytest.param(30, 180, (1 - 7 * 3**0.5 / 2, 2, 4), id="west, half way up"),
+    ],
+)
+def test_a_place_is_where_its_angles_say(elevation, azimuth, centre):
+    assert camera(elevation, azimuth).centre == pytest.approx(np.array(centre, float), abs=1e-12)
+
+
+def test_the_target_is_in_the_middle_of_the_picture_at_the_radius():
+    for elevation in (-90, -20, 33, 90):
+        pixels, depth = camera(elevation, 77.0).project(np.array([[1.0, 2.0, 0.5], [1.0, 2.0, 1.5]]))
+        assert pixels[0] == pytest.approx([30, 20], abs=1e-9)
+        assert depth[0] == pytest.approx(7.0)
+        assert abs(elevation) == 90 or pixels[1, 1] < 20  # up is up
+    assert camera(40, 0).fx == pytest.approx(30.0)  # 90 degrees: half the width over tan 45
+    near, at = camera(90 - 1e-7, 120), camera(90, 120)
+    assert at.rotation == pytest.approx(near.rotation, abs=1e-8)  # 1e-7 degrees are 2e-9 radians
+
+
+@pytest.mark.parametrize("elevation, radius", [(40, 0), (90.5, 7), (-90.5, 7), (float("nan"), 7)])
+def test_a_place_that_is_none_is_refused(elevation, radius):
+    with pytest.raises(ValueError, match="no camera stands"):
+        camera(elevation, 0, radius)
+
+
+def test_the_start_ring_has_one_view_from_above_and_the_others_evenly_around():
+    assert camera_layouts.start_ring(4, 65.0, 7.0) == [(90, 0, 7), (65, 0, 7), (65, 120, 7), (65, 240, 7)]
+    assert camera_layouts.ring(2, 45.0, 7.0, turn=20.0) == [(45, 20, 7), (45, 200, 7)]
+    with pytest.raises(ValueError):
+        camera_layouts.start_ring(0, 65.0, 7.0)
+
+
+def test_a_hemisphere_is_uniform_by_area():
+    height = np.sin(np.radians([e for e, _, _ in camera_layouts.hemisphere(1000, 30.0, 7.0)]))
+    # heights of points uniform on a sphere are uniform: here every tenth of [0.5, 1] has a tenth of the points
+    assert (np.histogram(height, bins=10, range=(0.5, 1.0))[0] == 100).all()
+    azimuth = np.array([a for _, a, _ in camera_layouts.hemisphere(1000, 30.0, 7.0)])
+    # a golden-angle sequence fills arcs with a discrepancy of a few points
+    assert np.abs(np.histogram(azimuth, bins=10, range=(0, 360))[0] - 100).max() <= 5
+
+
+def test_test_views_are_distinct_from_each_other_and_from_every_other_view():
+    def centres(places):
+        return np.array([camera(*place).centre for place in places])
+
+    tests = centres(camera_layouts.held_out(6, 30.0, 7.0))
+    others = centres(camera_layouts.start_ring(8, 65.0, 7.0) + camera_layouts.hemisphere(250, 30.0, 7.0))
+    assert np.linalg.norm(tests[:, None] - others, axis=-1).min() >= 0.7 - 1e-9  # a tenth of the radius
+    assert np.linalg.norm(tests[:, None] - tests, axis=-1)[~np.eye(6, dtype=bool)].min() > 1.0
+
+
+@pytest.mark.parametrize("n, circle", [(100, 36), (72, 36), (71, 26), (50, 18), (3, 1)])
+def test_a_paper_rig_has_36_in_100_views_on_a_circle_and_the_others_uniform_above_the_lowest(n, circle):
+    places = camera_layouts.paper(n, 45.0, 30.0, 7.0)
+    assert len(places) == n
+    assert [e for e, _, _ in places[:circle]] == circle * [45.0]
+    assert np.diff([a for _, a, _ in places[:circle]]) == pytest.approx((circle - 1) * [360 / circle])
+    height = np.sin(np.radians([e for e, _, _ in places[circle:]]))
+    # equal steps of height are equal areas of the sphere
+    assert height == pytest.approx(1 - (np.arange(n - circle) + 0.5) / (n - circle) * 0.5)
+
+
+def test_a_walker_stands_away_from_the_target_and_looks_past_it_to_the_horizon():
+    camera = camera_layouts.eye_level_camera(1.6, 90.0, 4.0, (1.0, 2.0, 0.5), 160, 90, 60.0)
+    assert camera.centre == pytest.approx(np.array([1.0, 6.0, 2.1]))
+    horizon = camera.centre + np.array([[0.0, -1.0, 0.0]])
+    [pixel], _ = camera.project(horizon)
+    # 12 degrees above the middle: a focal length of 80 / tan 30 pixels times tan 12
+    assert pixel == pytest.approx([80, 45 - 80 * 3**0.5 * np.tan(np.radians(12))])
+    with pytest.raises(ValueError, match="above the ground"):
+        camera_layouts.eye_level_camera(0.0, 0.0, 4.0, (0.0, 0.0, 0.0), 160, 90, 60.0)

@@ -57,22 +57,7 @@ def test_a_square_by_hand():
 def test_what_is_written_is_read_back(path, frame):
     write_scene_frame(path, frame)
     assert read_scene_frame(path) == frame
-
-
-def test_keys_are_written_in_the_order_of_the_format(path):
-    write_scene_frame(path, FRAME)
-    values = json.loads(path.read_text())
-    assert list(values) == [
-        *("kind", "unit", "flying_height", "exemplar", "extent", "photos_per_cell", "relief", "georeference", "test"),
-        *("images", "registered", "left_out", "focal_ratio", "focal", "reprojection_error", "points", "verdict"),
-    ]
-    assert list(values["georeference"]) == ["latitude", "longitude", "altitude", "north", "slope", "metres_per_unit"]
-    assert values["left_out"] == [{"name": "a.jpg", "reason": "too dark"}] and values["test"] is None
-
-
-def test_a_frame_without_a_place_on_earth_has_no_georeference(path):
-    write_scene_frame(path, replace(FRAME, georeference=None))
-    assert "georeference" not in json.loads(path.read_text())
+    assert ("georeference" in path.read_text()) == (frame.georeference is not None)
 
 
 def written_with(path, **values):
@@ -83,25 +68,19 @@ def written_with(path, **values):
     return path
 
 
-def test_whole_numbers_are_read_as_lengths(path):
-    assert read_scene_frame(written_with(path, flying_height=2)).flying_height == 2.0
-
-
-def test_a_slope_that_is_not_stored_is_0(path):
+def test_a_slope_that_is_not_stored_is_0_and_no_place_on_earth_is_refused(path):
     place = {"latitude": 47.1, "longitude": 8, "altitude": 430, "north": 12, "metres_per_unit": 2.5}
     assert read_scene_frame(written_with(path, georeference=place)).georeference == replace(PLACE, slope=0.0)
+    for wrong in ({"metres_per_unit": 0}, {"latitude": 90}):
+        with pytest.raises(InputError, match="no place on earth"):
+            read_scene_frame(written_with(path, georeference=place | wrong))
 
 
 @pytest.mark.parametrize(
     "values, said",
     [
-        ({"exemplar": None}, "exemplar"),
-        ({"exemplar": 3}, "exemplar"),
-        ({"exemplar": {"west": 0, "south": 0}}, "exemplar.side"),
         ({"exemplar": {"west": 0, "south": 0, "side": -1}}, "no square"),
         ({"exemplar": {"west": 0, "south": 0, "side": "nan"}}, "exemplar.side"),
-        ({"registered": 1.5}, "registered"),
-        ({"flying_height": "high"}, "flying_height"),
         ({"kind": "film"}, "kind"),
         ({"georeference": {"latitude": 47.1, "longitude": 8, "altitude": 430, "metres_per_unit": 2.5}}, "north"),
     ],
@@ -109,22 +88,3 @@ def test_a_slope_that_is_not_stored_is_0(path):
 def test_a_wrong_value_is_named(path, values, said):
     with pytest.raises(InputError, match=f"ground.json: not as the workflow writes it.*{said}.*photos stage again"):
         read_scene_frame(written_with(path, **values))
-
-
-@pytest.mark.parametrize("wrong", [{"metres_per_unit": 0}, {"latitude": 90}, {"metres_per_unit": -1}])
-def test_no_place_on_earth_is_refused(path, wrong):
-    place = {"latitude": 47.1, "longitude": 8, "altitude": 430, "north": 12, "metres_per_unit": 2.5}
-    with pytest.raises(InputError, match="no place on earth"):
-        read_scene_frame(written_with(path, georeference=place | wrong))
-
-
-@pytest.mark.parametrize("values", [{"relief": float("nan")}, {"flying_height": float("inf")}])
-def test_a_number_that_is_not_finite_is_refused(path, values):
-    with pytest.raises(InputError, match="ground.json: not readable as JSON .*no finite number"):
-        read_scene_frame(written_with(path, **values))
-
-
-def test_what_is_no_object_is_refused(path):
-    path.write_text("[]")
-    with pytest.raises(InputError, match="not as the workflow writes it"):
-        read_scene_frame(path)

@@ -1,9 +1,9 @@
-"""Arithmetic on images of few channels: the same bits as NumPy's broadcasting."""
+"""Arithmetic on images of few channels: the same bits as NumPy's broadcasting; PSNR and SSIM."""
 
 import numpy as np
 import pytest
 
-from dav_gswt.images import channels
+from dav_gswt.images import channels, metrics
 
 
 @pytest.fixture
@@ -17,50 +17,53 @@ def alpha():
 
 
 @pytest.mark.parametrize("shape", [(3,), (5, 7, 3)])
-def test_composite(image, alpha, shape):
-    behind = np.random.default_rng(2).uniform(size=shape).astype(np.float32)
-    expected = image + (1 - alpha)[..., None] * behind
-    found = channels.composite(image, alpha, behind)
-    assert found.dtype == np.float32 and np.array_equal(found, expected)
+def test_sums_with_a_colour_or_another_image_are_those_of_broadcasting(image, alpha, shape):
+    other = np.random.default_rng(2).uniform(size=shape).astype(np.float32)
+    before, found = image.copy(), channels.composite(image, alpha, other)
+    assert found.dtype == np.float32 and np.array_equal(found, before + (1 - alpha)[..., None] * other)
+    assert channels.sum_products(image, other) == pytest.approx((before.astype(float) * other).sum(-1), abs=1e-6)
 
 
-def test_composite_leaves_its_inputs(image, alpha):
-    before = image.copy(), alpha.copy()
-    channels.composite(image, alpha, np.zeros(3, np.float32))
-    assert np.array_equal(image, before[0]) and np.array_equal(alpha, before[1])
-
-
-def test_scale_channels(image):
+def test_channels_are_scaled_and_filled_each_by_its_own_value(image):
     gain, offset = np.float32([0.5, 1.5, 2.5]), np.float32([0.1, -0.2, 0.3])
-    assert np.array_equal(channels.scale_channels(image, gain), image * gain)
+    assert np.array_equal(channels.scale_channels(image[::2, ::3], gain), image[::2, ::3] * gain)
     assert np.array_equal(channels.scale_channels(image, gain, offset), image * gain + offset)
-
-
-def test_scale_channels_of_part_of_an_image(image):
-    part, gain = image[::2, ::3], np.float32([0.5, 1.5, 2.5])
-    assert np.array_equal(channels.scale_channels(part, gain), part * gain)
-
-
-@pytest.mark.parametrize("shape", [(3,), (5, 7, 3)])
-def test_sum_products(image, shape):
-    other = np.random.default_rng(3).normal(size=shape).astype(np.float32)
-    expected = (image.astype(float) * other).sum(-1)
-    assert channels.sum_products(image, other) == pytest.approx(expected, abs=1e-6)
-
-
-def test_fill_unknown(image):
-    image[1, 2] = np.nan
-    image[3, 4, 1] = np.nan
-    colour = np.float32([0.25, 0.5, 0.75])
-    assert np.array_equal(channels.fill_unknown(image, colour), np.where(np.isnan(image), colour, image))
+    image[1, 2], image[3, 4, 1] = np.nan, np.nan
+    assert np.array_equal(channels.fill_unknown(image, gain), np.where(np.isnan(image), gain, image))
     assert np.isnan(image[1, 2]).all()
 
 
-def test_mean_squares(image):
+def test_mean_squares_and_largest_differences_are_over_the_channels(image):
     found = channels.mean_squares(image)
     assert found.dtype == np.float32 and found == pytest.approx((image.astype(float) ** 2).mean(-1), rel=1e-6)
+    assert np.array_equal(channels.largest_difference(image, image[::-1]), np.abs(image - image[::-1]).max(-1))
 
 
-def test_largest_difference(image):
-    other = image[::-1]
-    assert np.array_equal(channels.largest_difference(image, other), np.abs(image - other).max(-1))
+ONE = np.ones((16, 16), np.float32)
+
+
+def test_pixels_of_weight_0_do_not_count():
+    a = np.full((16, 16, 3), 0.5, np.float32)
+    b = a + np.float32(0.1)
+    b[:8] = 1
+    weight = ONE.copy()
+    weight[:8] = 0
+    assert metrics.psnr(a, b, weight) == pytest.approx(20, abs=1e-4)  # a uniform error of a tenth; float32's 0.1
+    assert metrics.psnr(a, a, ONE) is None
+    with pytest.raises(ValueError, match="weight is 0"):
+        metrics.psnr(a, b, 0 * ONE)
+
+
+def test_colour_correction_undoes_a_change_of_exposure():
+    rng = np.random.default_rng(0)
+    picture = rng.uniform(0.2, 0.6, (16, 16, 3)).astype(np.float32)
+    photo = picture * [1.2, 1.0, 0.8] + [0.05, 0, -0.02]
+    np.testing.assert_allclose(metrics.correct_colours(picture, photo, ONE), photo, atol=1e-6)
+
+
+def test_ssim_is_1_for_equal_pictures_and_falls_with_noise():
+    rng = np.random.default_rng(0)
+    a = rng.uniform(0, 1, (32, 32, 3)).astype(np.float32)
+    weight = np.ones((32, 32), np.float32)
+    assert metrics.ssim(a, a, weight) == pytest.approx(1, abs=1e-5)
+    assert metrics.ssim(a, rng.uniform(0, 1, a.shape).astype(np.float32), weight) < 0.3

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.images import figures, image_files
+from dav_gswt.images.jpeg import encode_jpeg
 
 
 @pytest.mark.parametrize("ending", [".png", ".jpg"])
@@ -25,3 +26,10 @@ def test_a_sheet_shows_every_picture_in_its_row(tmp_path):
     found = [shown[y * high, x * wide] for y in (1, 3) for x in (1, 3)]
     np.testing.assert_allclose(found, colours, atol=0.02)
     assert shown.shape[1] > 1.8 * shown.shape[0]
+
+
+def test_colours_of_a_jpeg_stay_and_values_beyond_are_clipped(tmp_path):
+    image = np.full((16, 24, 3), [1.5, 0.5, -1.0])
+    (tmp_path / "a.jpg").write_bytes(encode_jpeg(image, 90))
+    assert abs(image_files.read_photo(tmp_path / "a.jpg") - [1, 0.5, 0]).max() < 0.02
+    assert encode_jpeg(image, 90) == encode_jpeg(image, 90)

@@ -1,8 +1,6 @@
 """Reading, writing and shrinking images, and float maps in EXR."""
 
 import resource
-import struct
-import zlib
 
 import numpy as np
 import OpenImageIO as oiio
@@ -30,33 +28,16 @@ def stored(path, pixels, **attributes):
 
 
 def test_a_png_comes_back_to_the_bit(tmp_path):
-    image_files.write_png(tmp_path / "a.png", PICTURE / 255)
-    assert np.array_equal(np.rint(image_files.read_photo(tmp_path / "a.png") * 255).astype(np.uint8), PICTURE)
-
-
-def test_writing_the_same_image_twice_gives_the_same_bytes(tmp_path):
     for name in ("a.png", "b.png"):
         image_files.write_png(tmp_path / name, PICTURE / 255)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert np.array_equal(np.rint(image_files.read_photo(tmp_path / "a.png") * 255).astype(np.uint8), PICTURE)
 
 
-def test_a_write_that_fails_leaves_nothing_behind(tmp_path):
-    (tmp_path / ".a.png.part.png").symlink_to("/dev/full")
-    with pytest.raises(OSError):
-        image_files.write_png(tmp_path / "a.png", np.tile(PICTURE / 255, (99, 99, 1)))
-    assert not list(tmp_path.iterdir())
-
-
-def test_sixteen_bits_are_read_to_their_full_depth(tmp_path):
-    path = stored(tmp_path / "a.tif", np.full((4, 5, 3), 12345, np.uint16))
-    assert image_files.read_photo(path) == pytest.approx(12345 / 65535, abs=1e-7)
-
-
-def test_grey_becomes_three_equal_channels(tmp_path):
-    path = stored(tmp_path / "a.png", PICTURE[..., :1])
-    assert image_files.read_photo(path) == pytest.approx(
-        np.repeat(PICTURE[..., :1], 3, 2) / 255, abs=1e-7
-    )  # float32's rounding
+def test_sixteen_bits_are_read_to_their_full_depth_and_grey_becomes_three_equal_channels(tmp_path):
+    path = stored(tmp_path / "a.tif", np.arange(20, dtype=np.uint16).reshape(4, 5, 1) * 3000)
+    grey = np.repeat(np.arange(20).reshape(4, 5, 1) * 3000 / 65535, 3, 2)
+    assert image_files.read_photo(path) == pytest.approx(grey, abs=1e-7)  # float32's rounding
 
 
 @pytest.mark.parametrize("channels", [2, 4])
@@ -79,37 +60,24 @@ UPRIGHT = {
 }
 
 
-@pytest.mark.parametrize("orientation", UPRIGHT)
-def test_exif_orientation_is_applied(tmp_path, orientation):
+def test_exif_orientation_is_applied(tmp_path):
     sensor = np.repeat(np.arange(6, dtype=np.uint8).reshape(2, 3, 1), 3, 2)
-    path = stored(tmp_path / "a.tif", sensor, Orientation=orientation)
-    assert (image_files.read_photo(path)[..., 0] * 255).round().tolist() == UPRIGHT[orientation]
-    width, height = image_files.read_size(path)
-    assert (height, width) == np.shape(UPRIGHT[orientation])
+    for orientation, upright in UPRIGHT.items():
+        path = stored(tmp_path / "a.tif", sensor, Orientation=orientation)
+        assert (image_files.read_photo(path)[..., 0] * 255).round().tolist() == upright
+        assert image_files.read_size(path)[::-1] == np.shape(upright)
 
 
-@pytest.mark.parametrize("suffix", ["jpg", "png", "tif", "webp", "bmp"])
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.6, 0.95])
-def test_a_half_written_image_is_refused_by_name(tmp_path, suffix, share):
+@pytest.mark.parametrize("suffix", ["jpg", "png", "tif", "webp"])
+def test_a_half_written_image_is_refused_by_name(tmp_path, suffix):
     path = stored(tmp_path / f"half.{suffix}", GENERATOR.integers(0, 256, (90, 80, 3)).astype(np.uint8))
-    path.write_bytes(path.read_bytes()[: int(path.stat().st_size * share)])
-    with pytest.raises(InputError, match=f"half.{suffix}"):
-        image_files.read_photo(path)
-
-
-def test_what_is_no_image_and_what_is_not_there_is_refused_by_name(tmp_path):
-    (tmp_path / "text.jpg").write_text("no image at all")
-    for name in ("text.jpg", "nothing.jpg"):
-        with pytest.raises(InputError, match=name):
-            image_files.read_photo(tmp_path / name)
-
-
-def test_a_header_that_promises_too_many_pixels_is_refused_before_they_are_allocated(tmp_path):
-    path = tmp_path / "huge.png"
-    chunk = b"IHDR" + struct.pack(">IIBBBBB", 60000, 60000, 8, 2, 0, 0, 0)
-    head = struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + head + struct.pack(">I", 9) + b"IDAT" + bytes(99))
-    with pytest.raises(InputError, match="huge.png"):
+    whole = path.read_bytes()
+    for share in (0.95, 0.1, 0.0):
+        path.write_bytes(whole[: int(len(whole) * share)])
+        with pytest.raises(InputError, match=f"half.{suffix}"):
+            image_files.read_photo(path)
+    path.unlink()
+    with pytest.raises(InputError, match="there is no such file"):
         image_files.read_photo(path)
 
 
@@ -131,12 +99,10 @@ def test_photos_are_listed_by_name_without_hidden_and_other_files(tmp_path):
     for name in ("b.JPG", "a.png", ".c.jpg", "notes.txt", "raw.dng"):
         (tmp_path / name).write_bytes(b"x")
     assert [p.name for p in image_files.list_photos(tmp_path)] == ["a.png", "b.JPG"]
-
-
-def test_a_folder_without_photos_is_refused_and_says_what_to_do(tmp_path):
-    (tmp_path / "raw.heic").write_bytes(b"x")
+    (tmp_path / "raw").mkdir()
+    (tmp_path / "raw/raw.heic").write_bytes(b"x")
     with pytest.raises(InputError, match="no photos.*raw.heic.*JPEG"):
-        image_files.list_photos(tmp_path)
+        image_files.list_photos(tmp_path / "raw")
     with pytest.raises(InputError, match="no such folder"):
         image_files.list_photos(tmp_path / "nowhere")
 
@@ -145,6 +111,8 @@ def test_shrinking_averages_areas_by_hand():
     row = np.array([[0.0, 3.0, 6.0]], np.float32)[..., None]
     # Two pixels of 1.5 old ones each: (0 + 3/2) / 1.5 = 1 and (3/2 + 6) / 1.5 = 5.
     assert image_files.shrink_image(row, 2, 1)[0, :, 0] == pytest.approx([1, 5])
+    with pytest.raises(ValueError, match="does not shrink"):
+        image_files.shrink_image(row, 4, 1)
 
 
 def test_shrinking_equals_blocks_of_the_finest_common_grid():
@@ -152,20 +120,10 @@ def test_shrinking_equals_blocks_of_the_finest_common_grid():
     fine = image.repeat(2, 0).repeat(4 // 2, 1)  # 12 x 20: multiples of 4 x 5
     slow = fine.reshape(4, 3, 5, 4, 3).mean((1, 3))
     assert image_files.shrink_image(image, 5, 4) == pytest.approx(slow, abs=1e-6)  # one rounding to float32
+    assert image_files.shrink_to(image, 5).shape == (3, 5, 3)
 
 
-def test_shrinking_keeps_the_mean_and_a_constant():
-    image = GENERATOR.random((31, 47, 3)).astype(np.float32)
-    assert image_files.shrink_image(image, 13, 7).mean((0, 1)) == pytest.approx(image.mean((0, 1)), abs=1e-6)
-    assert np.array_equal(image_files.shrink_image(image, 47, 31), image)
-
-
-def test_photos_are_never_enlarged():
-    with pytest.raises(ValueError, match="does not shrink"):
-        image_files.shrink_image(np.zeros((4, 4, 3), np.float32), 5, 4)
-
-
-def test_exr_keeps_channels_by_name_and_texts_and_leaves_the_arguments_alone(tmp_path):
+def test_exr_keeps_parts_channels_and_texts_by_name_and_leaves_the_arguments_alone(tmp_path):
     maps = {k: GENERATOR.random((3, 5)).astype(np.float32) for k in ("R", "G", "B", "Z", "uncertainty")}
     channels, header = dict(maps), {"lam": repr(0.1), "pose": "a"}
     image_files.write_exr(tmp_path / "a.exr", channels, header)
@@ -173,19 +131,15 @@ def test_exr_keeps_channels_by_name_and_texts_and_leaves_the_arguments_alone(tmp
     back, texts = image_files.read_exr(tmp_path / "a.exr")
     assert set(back) == set(maps) and all(np.array_equal(back[k], maps[k]) for k in maps)
     assert texts == header
-
-
-def test_exr_parts_keep_their_own_sizes_and_headers(tmp_path):
     parts = {n: ({"u": GENERATOR.random(s).astype(np.float32)}, {"n": n}) for n, s in [("a", (2, 3)), ("b", (4, 1))]}
     image_files.write_exr_parts(tmp_path / "a.exr", parts)
-    back = image_files.read_exr_parts(tmp_path / "a.exr")
-    assert list(back) == ["a", "b"]
-    for name, (channels, header) in back.items():
-        assert np.array_equal(channels["u"], parts[name][0]["u"]) and header == parts[name][1]
+    for name, (channels, header) in image_files.read_exr_parts(tmp_path / "a.exr").items():
+        assert np.array_equal(channels["u"], parts[name][0]["u"]) and header == parts.pop(name)[1]
+    assert not parts
 
 
 def test_a_map_has_colours_for_viewers_that_are_no_channels_of_ours(tmp_path):
-    """Read by OpenImageIO as a picture; the lowest value is dark, the highest bright, no number grey."""
+    """The lowest value is dark, the highest bright, no number grey."""
     values = np.linspace(-3, 7, 60).reshape(6, 10).astype(np.float32)
     values[2, 3] = np.nan
     image_files.write_exr(tmp_path / "a.exr", {"Z": values, "seen": np.ones((6, 10), np.float32)}, {"n": "1"})
@@ -195,26 +149,15 @@ def test_a_map_has_colours_for_viewers_that_are_no_channels_of_ours(tmp_path):
     picture = image_files.read_photo(tmp_path / "a.exr")
     assert picture.shape == (6, 10, 3) and picture[0, 0].sum() < 0.5 < 1 < picture[-1, -1].sum()
     assert len(set(picture[2, 3].tolist())) == 1
+    image_files.write_exr(tmp_path / "a.exr", {"u": np.full((2, 2), np.nan, np.float32)})  # no number at all
+    assert set(image_files.read_exr(tmp_path / "a.exr")[0]) == {"u"}
 
 
-def test_a_map_without_any_number_or_without_range_still_has_a_preview(tmp_path):
-    for value in (np.nan, 4.0):
-        image_files.write_exr(tmp_path / "a.exr", {"u": np.full((2, 2), value, np.float32)})
-        assert set(image_files.read_exr(tmp_path / "a.exr")[0]) == {"u"}
-
-
-def test_opencv_shows_the_preview(tmp_path, monkeypatch):
-    monkeypatch.setenv("OPENCV_IO_ENABLE_OPENEXR", "1")
-    cv2 = pytest.importorskip("cv2", reason="opencv is not installed")
-    image_files.write_exr(tmp_path / "a.exr", {"Z": np.linspace(0, 1, 60).reshape(6, 10).astype(np.float32)})
-    seen = cv2.imread(str(tmp_path / "a.exr"), cv2.IMREAD_UNCHANGED)
-    if seen is None:
-        pytest.skip("this OpenCV reads no EXR")
-    assert seen.shape == (6, 10, 3) and seen[-1, -1].sum() > 1.5 > 0.5 > seen[0, 0].sum() >= 0
-
-
-def test_a_damaged_exr_is_refused_by_name(tmp_path):
+def test_a_damaged_exr_is_refused_by_name(tmp_path, monkeypatch):
     image_files.write_exr(tmp_path / "a.exr", {"u": GENERATOR.random((64, 64))})
+    with monkeypatch.context() as patch, pytest.raises(InputError, match="64 x 64 pixels is more than is read"):
+        patch.setattr(image_files, "MAX_PIXELS", 64 * 64 - 1)
+        image_files.read_exr(tmp_path / "a.exr")
     (tmp_path / "a.exr").write_bytes((tmp_path / "a.exr").read_bytes()[:900])
     with pytest.raises(InputError, match="a.exr"):
         image_files.read_exr(tmp_path / "a.exr")

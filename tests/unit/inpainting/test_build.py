@@ -32,15 +32,15 @@ class BandPrior:
 
     name, size = "bands", 32
 
-    def __init__(self, spoil=None, depth=True):
-        self.spoil, self.depth = spoil, depth
+    def __init__(self, spoil=None, depth=True, light=1.0):
+        self.spoil, self.depth, self.light = spoil, depth, np.float32(light)
 
     def sample(self, condition, m, p_drop, steps, seed, known=None, common=True):
         assert p_drop == 0 and not common
         hidden = np.kron(~known, np.ones((1, view_inpainting.CELL, view_inpainting.CELL), bool))[..., None]
         bands = BANDS[np.arange(self.size) // BAND % 2][None, :, None]
         colour = np.where(hidden, bands, condition.colour)
-        planes = [colour, condition.alpha[..., None], condition.inverse_depth[..., None]]
+        planes = [self.light * colour, condition.alpha[..., None], condition.inverse_depth[..., None]]
         return np.repeat(np.concatenate(planes, -1).transpose(0, 3, 1, 2)[:, None], m, 1).astype(np.float32)
 
     def encode_render(self, condition):
@@ -90,8 +90,7 @@ def test_unseen_ground_takes_the_colour_of_the_prior_and_all_else_keeps_its_byte
     field, grid = half_seen()
     before = field[:], grid.seen.copy()
     made = inpaint(field, grid)
-    n = grid.heights.size
-    marked = made.field.imagined
+    n, marked = grid.heights.size, made.field.imagined
     assert np.array_equal(marked[:n].reshape(grid.shape), ~grid.seen) and np.array_equal(made.inpainted, ~grid.seen)
     assert same(made.field[~marked], field[~marked])
     inner = np.zeros(grid.shape, bool)
@@ -102,44 +101,20 @@ def test_unseen_ground_takes_the_colour_of_the_prior_and_all_else_keeps_its_byte
     assert (made.field.uncertainty[marked] == 1).all() and made.objects == 0
     assert np.array_equal(made.field.means, field.means)  # no height is moved
     assert same(field, before[0]) and np.array_equal(grid.seen, before[1])  # nothing is changed in place
-    assert made.describe(grid) == {
-        "cells": n,
-        "unseen": 32 * 12,
-        "painted": 32 * 12,
-        "things": 0,
-        "exemplar": {"unseen": 32 * 12, "painted": 32 * 12},
-        "changed": True,
-    }
-
-
-def test_the_underlay_takes_the_colour_of_the_discs_above_it():
-    field, grid = half_seen()
-    made = inpaint(field, grid).field
-    rows = underlay.find_rows(made, grid)
-    under = made[rows].base_colours.reshape(16, 16, 3)
+    count = {"unseen": 32 * 12, "painted": 32 * 12}
+    assert made.describe(grid) == {"cells": n, **count, "things": 0, "exemplar": count, "changed": True}
+    rows = underlay.find_rows(made.field, grid)
+    under = made.field[rows].base_colours.reshape(16, 16, 3)  # the colour of the discs above it
     assert np.median(distance_to_bands(under[3:-3, 13:-2])) < 0.1
-    assert np.array_equal(made.imagined[rows].reshape(16, 16), np.tile(np.arange(16) >= FIRST // 2, (16, 1)))
+    assert np.array_equal(marked[rows].reshape(16, 16), np.tile(np.arange(16) >= FIRST // 2, (16, 1)))
 
 
-def test_colours_join_their_surroundings():
-    """A prior that paints all a third too dark, what is known included, leaves no step at the border."""
-
-    class Dark(BandPrior):
-        def sample(self, condition, m, p_drop, steps, seed, known=None, common=True):
-            dark = replace(condition, colour=np.float32(0.66) * true.colour)
-            return super().sample(dark, m, p_drop, steps, seed, np.ones_like(known), common)
-
+def test_a_prior_that_paints_all_too_dark_what_is_known_included_gives_about_the_same_ground():
     field, grid = half_seen()
-    pool = seen_by([1.6, 1.6, 4.0])
-    true, condition = condition_views(patch.field(), pool)[0], condition_views(field, pool)[0]
-    hidden = (
-        unseen.render_share(field, unseen.select_gaussians(field, grid, ~grid.seen), pool[0][1])[None] > unseen.TOUCHED
-    )
-    made = view_inpainting.inpaint_views(config(Dark()), condition, hidden, SEEN.astype(float))
-    sure = ~hidden[0] & (condition.alpha[0] > 0.9)
-    near = hidden[0] & (true.alpha[0] > 0.9) & (np.roll(sure, 2, 1) | np.roll(sure, -2, 1))
-    off, raw = (np.abs(picture - true.colour[0])[near].mean() for picture in (made.colour[0], 0.66 * true.colour[0]))
-    assert near.sum() > 10 and off < 0.25 * raw
+    dark, bright = (inpaint(field, grid, BandPrior(light=light)).field.base_colours for light in (0.66, 1.0))
+    unseen_discs = (~grid.seen).ravel()
+    off = (dark - bright)[: len(unseen_discs)][unseen_discs].mean(0)
+    assert np.abs(off).max() < 0.08  # without a match it is 0.17
 
 
 def test_far_from_known_pixels_a_picture_has_the_mean_colour_of_the_ground():
@@ -155,10 +130,10 @@ def test_far_from_known_pixels_a_picture_has_the_mean_colour_of_the_ground():
 
 
 def test_where_photos_saw_everything_the_field_is_returned():
-    made = inpaint(patch.field(), patch.grid())
-    assert not made.describe(patch.grid())["changed"] and made.inpainted.sum() == made.unseen.sum() == 0
     field = patch.field()
-    assert inpaint(field, patch.grid()).field is field
+    made = inpaint(field, patch.grid())
+    assert made.field is field and made.inpainted.sum() == made.unseen.sum() == 0
+    assert not made.describe(patch.grid())["changed"]
 
 
 def test_a_cell_is_unseen_where_neither_the_grid_nor_the_fit_knows_it():
@@ -176,40 +151,38 @@ def test_ground_under_a_known_object_is_not_inpainted():
     field, grid = half_seen()
     lid = blob([2.7, 0.6, 0.3], [0.35, 0.35, 0.02], [0.1, 0.9, 0.1])
     made = inpaint(concatenate_fields([field, lid]), grid)
-    covered = np.hypot(grid.centres[:, 0] - 2.7, grid.centres[:, 1] - 0.6) < 0.2
-    assert covered.any() and not made.field.imagined[: grid.heights.size][covered].any()
-    assert not made.inpainted.ravel()[covered].any() and made.unseen.ravel()[covered].all()
+    covered = (np.hypot(grid.centres[:, 0] - 2.7, grid.centres[:, 1] - 0.6) < 0.2).reshape(grid.shape)
+    assert covered.any() and not made.inpainted[covered].any() and made.unseen[covered].all()
+    assert np.array_equal(made.field.imagined[: covered.size].reshape(grid.shape), made.inpainted)
     assert same(made.field[len(field) : len(field) + 1], lid)
     roof = concatenate_fields([field, blob([2.6, 1.6, 0.3], [2.0, 3.0, 0.02], [0.1, 0.9, 0.1])])
     hidden = inpaint(roof, grid)
-    assert hidden.field is roof and hidden.unseen.any() and not hidden.describe(grid)["changed"]
+    assert hidden.field is roof and hidden.unseen.any() and not hidden.inpainted.any()
 
 
-@pytest.mark.parametrize("plane", [0, 3, 4], ids=["colour", "opacity", "depth"])
-def test_a_prior_with_samples_that_are_not_finite_is_refused(plane):
-    with pytest.raises(ValueError, match="view 0 is not finite"):
-        inpaint(*half_seen(), BandPrior(spoil=plane))
+@pytest.mark.parametrize(
+    "prior, message",
+    [
+        (BandPrior(spoil=0), "view 0 is not finite"),
+        (BandPrior(spoil=4), "view 0 is not finite"),
+        (BandPrior(depth=False), "bands has no depth"),
+    ],
+)
+def test_a_prior_with_samples_that_are_not_finite_or_without_depth_is_refused(prior, message):
+    with pytest.raises(ValueError, match=message):
+        inpaint(*half_seen(), prior)
 
 
-def test_a_prior_without_depth_is_refused():
-    with pytest.raises(ValueError, match="bands has no depth"):
-        inpaint(*half_seen(), BandPrior(depth=False))
-
-
-@pytest.fixture(scope="module")
-def terrain():
+@pytest.mark.slow
+def test_the_terrain_prior_gives_the_same_bytes_on_any_number_of_threads():
     torch.manual_seed(5)
-    return TerrainPrior(Network())
-
-
-def test_the_terrain_prior_gives_the_same_bytes_on_any_number_of_threads(terrain):
-    assert isinstance(terrain, view_inpainting.Inpainter)
+    terrain = TerrainPrior(Network())
     found, before = [], torch.get_num_threads()
-    for threads in (1, 2, 2):
+    for threads in (1, 2):
         torch.set_num_threads(threads)
         found.append(inpaint(*half_seen(), terrain).field)
     torch.set_num_threads(before)
-    assert found[0].imagined.any() and same(found[0], found[1]) and same(found[1], found[2])
+    assert found[0].imagined.any() and same(found[0], found[1])
 
 
 def blob(place, sizes, colour):
@@ -239,36 +212,27 @@ def condition_views(field, pool):
 EYES = [1.6, 1.0, 4.2], [3.6, 1.6, 3.7], [1.6, 4.0, 3.5]
 
 
-@pytest.mark.parametrize("count, stands", [(1, False), (2, True), (3, True)])
-def test_an_object_is_added_where_two_views_agree(count, stands):
-    bare = patch.field()
-    bare = replace(bare, imagined=bare.ground.copy())
-    there = concatenate_fields([bare, blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])])
+def find_objects(bare, there, count=2, spoil=None):
+    """Objects that a prior shows `there` over a field, from some eyes. spoil: a view that shows none."""
     pool = seen_by(*EYES[:count])
-    (condition, _), (_, made) = condition_views(bare, pool), condition_views(there, pool)
-    new = occluders.find_occluders(bare, patch.grid(), pool, condition, made, patch.FRAME.flying_height)
-    assert bool(len(new)) == stands
-    if stands:
-        assert np.hypot(new.means[:, 0] - 1.7, new.means[:, 1] - 1.5).max() < 0.7
-        assert (
-            new.means[:, 2].min() > occluders.LEAST_HEIGHT * patch.FRAME.flying_height and new.means[:, 2].max() < 1.1
-        )
-        assert new.base_colours.mean(0)[1] > 0.6 and new.imagined.all() and (new.uncertainty == 1).all()
+    (condition, flat), (_, made) = condition_views(bare, pool), condition_views(there, pool)
+    if spoil is not None:
+        made.inverse_depth[spoil] = flat.inverse_depth[spoil]
+    return occluders.find_occluders(bare, patch.grid(), pool, condition, made, patch.FRAME.flying_height)
 
 
-def test_no_object_is_added_where_views_contradict_each_other_or_the_ground_is_known():
+def test_an_object_is_added_on_imagined_ground_where_two_views_agree():
     bare = patch.field()
     marked = replace(bare, imagined=bare.ground.copy())
-    pool = seen_by(*EYES[:2])
-    condition, flat = condition_views(marked, pool)
-    thing = blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])
-    _, made = condition_views(concatenate_fields([marked, thing]), pool)
-    half = made.inverse_depth.copy()
-    half[1] = flat.inverse_depth[1]
-    alone = replace(made, inverse_depth=half)
-    height = patch.FRAME.flying_height
-    assert len(occluders.find_occluders(marked, patch.grid(), pool, condition, alone, height)) == 0
-    assert len(occluders.find_occluders(bare, patch.grid(), pool, condition, made, height)) == 0
+    there = concatenate_fields([marked, blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])])
+    for count in (2, 3):
+        new = find_objects(marked, there, count)
+        assert np.hypot(new.means[:, 0] - 1.7, new.means[:, 1] - 1.5).max() < 0.7
+        assert new.means[:, 2].min() > occluders.LEAST_HEIGHT * patch.FRAME.flying_height
+        assert new.means[:, 2].max() < 1.1
+        assert new.base_colours.mean(0)[1] > 0.6 and new.imagined.all() and (new.uncertainty == 1).all()
+    assert len(find_objects(marked, there, 1)) == len(find_objects(marked, there, spoil=1)) == 0
+    assert len(find_objects(bare, there)) == 0  # the ground is known
 
 
 def test_every_unseen_cell_is_well_inside_the_picture_of_its_block():
@@ -298,7 +262,7 @@ def test_no_camera_is_inside_an_object_or_under_the_ground():
 def test_evaluation_compares_before_and_after_everywhere_and_where_it_was_inpainted():
     field, grid = half_seen()
     east = unseen.select_gaussians(field, grid, ~grid.seen)
-    tests = patch.photos(2)  # of the ground as it is
+    tests = patch.photos(1)  # of the ground as it is
     after = replace(patch.field(), imagined=east)
     after.sh[east] += 0.05
     found = evaluation.evaluate_inpainting(field, after, tests)
@@ -308,12 +272,10 @@ def test_evaluation_compares_before_and_after_everywhere_and_where_it_was_inpain
     assert found["gaussians"] == {"before": len(field), "after": len(after), "imagined": int(after.imagined.sum())}
     same_again = evaluation.evaluate_inpainting(field, field, tests)
     assert same_again["imagined"]["pixels"] == 0 and same_again["imagined"]["before"]["psnr"] is None
-    assert same_again["all"]["before"] == same_again["all"]["after"]
 
 
 def test_the_maps_of_a_prior_leave_inpainted_gaussians_at_uncertainty_1():
-    field = concatenate_fields([patch.field()[:4], blob(MIDDLE, [0.1] * 3, [0.5] * 3)])
-    marked = np.array([False, True, False, False, True])
-    field = replace(field, imagined=marked, uncertainty=np.float32([0.1, 1, 0.1, 0.1, 1]))
+    field = replace(patch.field()[:5], imagined=np.array([False, True, False, False, True]))
+    field = replace(field, uncertainty=np.float32([0.1, 1, 0.1, 0.1, 1]))
     told = pose_maps.apply_uncertainty(field, np.float32([0.3, 0.3, 0.4, 0.5]))
     assert told.uncertainty.tolist() == np.float32([0.3, 1, 0.4, 0.5, 1]).tolist()

@@ -1,20 +1,22 @@
-"""Gaussians as solids: their place, size, direction and colour."""
+"""Gaussians as solids: their place, size, direction and colour; colours that stand for numbers."""
 
 import numpy as np
 import pytest
 from fixtures import tile_sets
+from matplotlib import colormaps
 from scipy.spatial.transform import Rotation
 
 from dav_gswt import field as fields
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.inspect import field_scenes as seen
-from dav_gswt.inspect import scene
+from dav_gswt.inspect import map_scenes, scene
 from dav_gswt.inspect.options import ViewOptions
 
+LEVEL = Rotation.identity()
 
-def one(sigma, ground=False, turn=None, opacity=4.0, uncertainty=0.0):
-    turn = Rotation.identity() if turn is None else turn
+
+def one(sigma=(0.1, 0.1, 0.1), ground=False, turn=LEVEL, opacity=4.0, uncertainty=0.0):
     return GaussianField(
         np.float32([[1.0, 2.0, 3.0]]),
         np.log(np.float32([sigma])),
@@ -52,37 +54,39 @@ def test_a_disc_is_a_hexagon_of_its_ellipses_area_across_its_least_axis():
 
 
 def test_faint_gaussians_are_left_out_and_large_fields_are_thinned_evenly():
-    many = fields.concatenate_fields(
-        [one([0.1] * 3, opacity=-9.0)] + [one([0.1] * 3, uncertainty=i / 100) for i in range(100)]
-    )
+    many = fields.concatenate_fields([one(opacity=-9.0)] + [one(uncertainty=i / 100) for i in range(100)])
     assert len(seen.thin_field(many, 1000)) == 100
     np.testing.assert_allclose(seen.thin_field(many, 4).uncertainty, [0, 0.33, 0.66, 0.99], atol=1e-6)
 
 
-def test_a_field_is_coloured_by_what_is_asked(tmp_path):
+def test_a_field_is_coloured_by_what_is_asked_or_says_why_it_cannot_be(tmp_path):
     path = tmp_path / "level2_of.ply"
-    fields.write_field(one([0.1] * 3, uncertainty=1.0), path)
+    fields.write_field(one(uncertainty=1.0), path)
     shown = {by: seen.build_field(path, ViewOptions(colour=by)).layers[0].colours[0] for by in seen.COLOUR_NAMES}
     np.testing.assert_array_equal(shown["colour"], [51, 102, 153])
     np.testing.assert_array_equal(shown["uncertainty"], scene.map_colours(np.ones(1), scene.ColourBar("", 0.0, 1.0))[0])
     np.testing.assert_array_equal(shown["level"], seen.level_colour(2))
-    with pytest.raises(InputError, match="--colour hue: .* has colour, uncertainty, level"):
-        seen.build_field(path, ViewOptions(colour="hue"))
+    for colour, opacity, said in (
+        ("hue", 4.0, "--colour hue: .* has colour, uncertainty, level"),
+        ("level", 4.0, "no level by its name"),
+        (None, -9.0, "there is nothing to draw"),
+    ):
+        fields.write_field(one(opacity=opacity), tmp_path / "field.ply")
+        with pytest.raises(InputError, match=said):
+            seen.build_field(tmp_path / "field.ply", ViewOptions(colour=colour))
 
 
-def test_a_field_whose_name_tells_no_level_has_none(tmp_path):
-    fields.write_field(one([0.1] * 3), tmp_path / "field.ply")
-    with pytest.raises(InputError, match="no level by its name"):
-        seen.build_field(tmp_path / "field.ply", ViewOptions(colour="level"))
+def test_colours_run_from_one_end_of_a_bar_to_the_other_and_what_is_no_number_is_grey():
+    found = scene.map_colours(np.array([2.0, -9.0, 4.0, 99.0, 3.0, np.nan, np.inf]), scene.ColourBar("", 2.0, 4.0))
+    cool, warm = (scene.to_bytes(np.array(colormaps["coolwarm"](x)[:3])) for x in (0, 255))
+    np.testing.assert_array_equal(found[:4], [cool, cool, warm, warm])
+    assert np.ptp(found[4].astype(int)) < 10  # grey in the middle
+    np.testing.assert_array_equal(found[5:], [scene.UNKNOWN] * 2)
+    assert scene.make_bar("a", np.full(3, 7.0)) == scene.ColourBar("a", 7.0, 8.0)
+    assert scene.make_bar("a", np.array([np.nan])) == scene.ColourBar("a", 0.0, 1.0)
 
 
-def test_a_field_of_nothing_opaque_is_said(tmp_path):
-    fields.write_field(one([0.1] * 3, opacity=-9.0), tmp_path / "field.ply")
-    with pytest.raises(InputError, match="there is nothing to draw"):
-        seen.build_field(tmp_path / "field.ply", ViewOptions())
-
-
-def test_levels_stand_side_by_side_and_one_can_be_picked(tree):
+def test_levels_stand_side_by_side_one_can_be_picked_and_maps_of_poses_colour_a_field(tree):
     both = seen.build_levels_scene(tree.round / "levels", ViewOptions(colour="level"))
     assert list(both.legend[0].named) == ["level 0", "level 1"]
     finest, coarse = both.layers[0], both.layers[2]
@@ -92,13 +96,7 @@ def test_levels_stand_side_by_side_and_one_can_be_picked(tree):
     assert sum(len(layer.cells) for layer in single.layers) < sum(len(layer.cells) for layer in both.layers)
     with pytest.raises(InputError, match="levels 0 to 1"):
         seen.build_levels_scene(tree.round / "levels", ViewOptions(level=2))
-
-
-def test_maps_of_poses_colour_the_field_beside_them(tree):
-    from dav_gswt.inspect import map_scenes
-
     shown = map_scenes.build_pose_maps(tree.round / "maps.npz", ViewOptions())
-    ground = shown.layers[0].colours
-    cool, warm = ground[0].astype(int), ground[-1].astype(int)
-    assert cool[2] > cool[0] and warm[0] > cool[0]  # uncertainty grows along the file
+    cool, warm = shown.layers[0].colours[[0, -1]].astype(int)  # uncertainty grows along the file
+    assert cool[2] > cool[0] and warm[0] > cool[0]
     assert shown.legend == [scene.ColourBar("uncertainty", 0.0, 1.0)]

@@ -39,7 +39,7 @@ def test_a_cut_is_a_ribbon_wherever_labels_change_just_above_the_ground(cut):
     np.testing.assert_allclose(lift, seen.CUT_LIFT * cut.spacing, atol=1e-5)
 
 
-def test_gaussians_have_the_patch_of_the_cell_they_lie_over(cut):
+def test_gaussians_have_the_patch_of_their_cell(cut):
     some = cut.fields[0][3]
     found = seen.find_patches(some, cut, 3)
     inside = (some.means[:, :2] >= 0).all(1) & (some.means[:, :2] < cut.side).all(1)
@@ -62,11 +62,6 @@ def test_sixteen_tiles_are_laid_with_their_numbers_and_all_levels_if_levels_are_
 def test_tiles_that_are_not_what_seams_json_says_are_refused(tree, tmp_path):
     told = read_json(tree.tiles / "seams.json")
     (tmp_path / "tiles").symlink_to(tree.tiles / "tiles")
-    for change, message in (
-        ({"tiles": "many"}, "not the table of a tile set"),
-        ({"side": 99.0}, "their maps are not"),
-        ({"levels": 9}, "no such file"),
-    ):
-        write_json(tmp_path / "seams.json", told | change)
-        with pytest.raises(InputError, match=message):
-            seen.build_tiles(tmp_path, ViewOptions())
+    write_json(tmp_path / "seams.json", told | {"side": 99.0})
+    with pytest.raises(InputError, match="their maps are not"):
+        seen.build_tiles(tmp_path, ViewOptions())

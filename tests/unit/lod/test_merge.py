@@ -74,19 +74,6 @@ def test_merged_moments_are_those_of_the_mixture():
     np.testing.assert_allclose(np.diag(merge.compute_covariances(back)[0]), [0.0125, 0.0025, 0.0025], rtol=1e-4)
 
 
-def test_merging_does_not_depend_on_the_order(scene):
-    many = things(50, seed=3)
-    turned = many[np.random.default_rng(0).permutation(50)]
-    a, b = merge.merge_by_voxel(many, 0.5), merge.merge_by_voxel(turned, 0.5)
-    np.testing.assert_allclose(a.means, b.means, atol=1e-6)
-    np.testing.assert_allclose(a.opacity_logits, b.opacity_logits, atol=1e-5)
-    assert len(a) < 50
-
-
-def test_nothing_merges_to_nothing():
-    assert len(merge.merge_by_voxel(things(1)[:0], 0.5)) == 0
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("change", [{"opacity_logits": -800.0}, {"log_scales": -400.0}], ids=["clear", "tiny"])
 def test_gaussians_that_weigh_nothing_are_left_out(change):

@@ -27,34 +27,28 @@ def test_masks_of_any_size_are_read_north_up(draw):
     assert masks.excluded[:8].all() and not masks.excluded[8:].any()
 
 
-def test_the_first_of_two_that_overlap_counts_and_larger_ones_come_first(draw):
-    files = {"small": draw("small", north(rows=16)), "all": draw("all", np.ones((64, 64)))}
-    labels, names = mask_images.read_masks(files, 32).label()
-    assert names == ["all", "small"]
-    assert (labels[24:] == 1).all() and (labels[:24] == 0).all()
+def test_the_first_of_two_that_overlap_counts_larger_ones_come_first_and_other_cells_have_none(draw):
+    files = {"small": draw("small", north(rows=16)), "large": draw("large", north(rows=48))}
+    labels, names = mask_images.read_masks(files | {"exclude": draw("out", north(rows=4))}, 32).label()
+    assert names == ["large", "small"]
+    wanted = np.repeat([-1, 0, 1, -1], [8, 16, 6, 2])[:, None]
+    np.testing.assert_array_equal(labels, np.tile(wanted, 32))
 
 
-def test_cells_without_a_name_have_none(draw):
-    labels, _ = mask_images.read_masks({"lawn": draw("lawn", north())}, 32).label()
-    assert (labels[:24] == -1).all()
-
-
-def test_a_mask_that_is_not_square_is_refused(draw):
-    with pytest.raises(InputError, match=r"wide\.png: is 64 x 32 pixels.*ground\.png"):
-        mask_images.read_masks({"lawn": draw("wide", np.ones((32, 64)))}, 32)
-
-
-def test_a_black_mask_is_refused(draw):
-    with pytest.raises(InputError, match=r"black\.png: is white nowhere"):
-        mask_images.read_masks({"lawn": draw("black", np.zeros((32, 32)))}, 32)
-
-
-def test_masks_that_leave_nothing_are_refused(draw):
-    with pytest.raises(InputError, match="leave no ground"):
-        mask_images.read_masks({"exclude": draw("out", np.ones((32, 32)))}, 32)
-
-
-def test_a_file_that_is_no_picture_is_refused(tmp_path):
-    (tmp_path / "lawn.png").write_text("no picture")
-    with pytest.raises(InputError, match=r"lawn\.png"):
-        mask_images.read_masks({"lawn": tmp_path / "lawn.png"}, 32)
+@pytest.mark.parametrize(
+    "name, cells, message",
+    [
+        ("lawn", np.ones((32, 64)), r"a\.png: is 64 x 32 pixels.*ground\.png"),
+        ("lawn", np.zeros((32, 32)), r"a\.png: is white nowhere"),
+        ("exclude", np.ones((32, 32)), "leave no ground"),
+        ("lawn", None, r"a\.png"),
+    ],
+)
+def test_masks_that_are_not_square_or_leave_nothing_and_what_is_no_picture_are_refused(
+    draw, tmp_path, name, cells, message
+):
+    (tmp_path / "a.png").write_text("no picture")
+    if cells is not None:
+        draw("a", cells)
+    with pytest.raises(InputError, match=message):
+        mask_images.read_masks({name: tmp_path / "a.png"}, 32)

@@ -12,32 +12,27 @@ def segment(colour):
     return segmentation.segment_ground(colour)[0]
 
 
-def test_two_materials_are_told_apart():
-    labels = segment(made.maps(shrubs=False).colour)
-    assert (labels == made.true_materials()).mean() > 0.95  # a strip along the border may be a class of its own
+def test_two_materials_are_told_apart_and_numbered_by_their_share():
+    colour, true = made.maps(shrubs=False).colour, made.true_materials()
+    labels = segment(colour)
+    assert (labels == true).mean() > 0.95  # a strip along the border may be a class of its own
+    assert (np.diff(np.bincount(labels.ravel())) <= 0).all()
+    np.testing.assert_array_equal(segment(0.5 * colour), labels)  # in another exposure, too
 
 
-def test_even_ground_is_one_class():
-    assert segment(made.maps(mixed=False, shrubs=False).colour).max() == 0
+def test_large_maps_are_averaged_and_their_classes_enlarged(monkeypatch):
+    monkeypatch.setattr(segmentation, "WORKING_SIZE", 50)
+    colour, true = made.maps(shrubs=False).colour, made.true_materials()
+    np.testing.assert_allclose(segmentation._shrink(colour)[1, 2], colour[3:6, 6:9].mean((0, 1)))
+    labels = segment(colour)
+    assert labels.shape == true.shape and (labels == true).mean() > 0.93
 
 
-def test_a_constant_picture_is_one_class():
-    assert segment(np.full((64, 64, 3), 0.4)).max() == 0
-
-
-def test_a_black_picture_is_one_class():
+def test_a_picture_of_one_colour_and_even_ground_are_one_class_without_strips_although_light_fades():
     assert segment(np.zeros((64, 64, 3))).max() == 0
-
-
-def test_light_that_fades_over_the_ground_makes_no_second_class():
     colour = made.maps(mixed=False, shrubs=False).colour
-    light = np.linspace(1.0, 0.55, len(colour))[None, :, None]
-    assert segment(colour * light).max() == 0
-
-
-def test_exposure_changes_no_label():
-    colour = made.maps(shrubs=False).colour
-    np.testing.assert_array_equal(segment(colour), segment(0.5 * colour))
+    labels, crossing = segmentation.segment_ground(colour * np.linspace(1.0, 0.55, len(colour))[None, :, None])
+    assert labels.max() == 0 and crossing == []
 
 
 def test_a_few_white_stones_change_no_other_feature():
@@ -50,12 +45,6 @@ def test_a_few_white_stones_change_no_other_feature():
     assert beside[48:, 48:, 3].mean() > 0.6 * plain[48:, 48:, 3].mean()
 
 
-def test_classes_are_numbered_by_their_share():
-    labels = segment(made.maps().colour)
-    counts = np.bincount(labels.ravel())
-    assert (np.diff(counts) <= 0).all()
-
-
 def test_grain_alone_can_make_a_class():
     """Rough and smooth ground of one mean colour."""
     rng = np.random.default_rng(0)
@@ -66,21 +55,14 @@ def test_grain_alone_can_make_a_class():
     assert (labels[10:54] != labels[74:118]).mean() > 0.95
 
 
-def test_the_same_picture_has_the_same_labels():
-    colour = made.maps().colour
-    np.testing.assert_array_equal(segment(colour), segment(colour.copy()))
-
-
 def test_a_path_is_a_strip_of_its_own():
     colour = made.maps(mixed=False, shrubs=False).colour.copy()
     rows, columns = np.mgrid[: len(colour), : len(colour)]
     path = np.abs(columns - 60 - 12 * np.sin(rows / 20)) < 4
     rng = np.random.default_rng(3)
     colour[path] = np.array([0.52, 0.44, 0.36]) + 0.02 * rng.normal(size=(path.sum(), 1))
-    _, strips = segmentation.segment_ground(np.clip(colour, 0, 1))
-    assert len(strips) == 1
-    assert (strips[0] & path).sum() > 0.9 * path.sum()
-    assert strips[0].sum() < 1.7 * path.sum()
+    (strip,) = segmentation.segment_ground(np.clip(colour, 0, 1))[1]
+    assert (strip & path).sum() > 0.9 * path.sum() and strip.sum() < 1.7 * path.sum()
 
 
 def test_a_strip_that_one_start_of_many_sets_apart_is_found(monkeypatch):
@@ -96,10 +78,6 @@ def test_a_strip_that_one_start_of_many_sets_apart_is_found(monkeypatch):
     assert found[:, path].mean() > 0.9 and found.mean() < 1.7 * path.mean()
 
 
-def test_even_ground_has_no_strip():
-    assert segmentation.segment_ground(made.maps(mixed=False, shrubs=False).colour)[1] == []
-
-
 def test_each_merger_is_the_cheapest_of_all_that_are_allowed():
     features = segmentation.describe_cells(made.maps(shrubs=False).colour[:96, :96])
     trace = segmentation.merge_clusters(features, np.arange(96 * 96).reshape(96, 96) // 1024)
@@ -112,8 +90,4 @@ def test_each_merger_is_the_cheapest_of_all_that_are_allowed():
         best = min(alike, key=lambda each: each.cost)
         merged = np.where(before == best.second, best.first, before)
         assert np.array_equal(after, merged - (merged > best.second))
-
-
-def test_a_class_of_one_cell_has_finite_costs():
-    features = np.random.default_rng(0).normal(size=(6, 6, 3))
-    assert np.isfinite(segmentation._negative_log_likelihood(features, features[:1, 0])).all()
+    assert np.isfinite(segmentation._negative_log_likelihood(features, features[:1, 0])).all()  # of one cell, too

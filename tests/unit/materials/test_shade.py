@@ -10,13 +10,10 @@ from dav_gswt.materials import shade
 def test_shade_is_darker_and_bluer(ratio, shaded):
     light = np.array([0.5, 0.4, 0.3])
     assert shade.is_shade(light * ratio, light) == shaded
-
-
-def test_linear_light_is_that_of_srgb():
     np.testing.assert_allclose(shade.linear_light(np.full((2, 3), 0.5)), 0.21404114, rtol=1e-6)
 
 
-def test_dapples_beside_larger_shade_are_found():
+def test_dapples_beside_larger_shade_are_found_and_shade_that_is_everywhere_is_texture():
     ground, dark = np.ones((100, 100), bool), np.array([0.5, 0.55, 0.65])
     colour = np.full((100, 100, 3), 0.6)
     colour[20:40, 20:30] *= dark
@@ -27,9 +24,6 @@ def test_dapples_beside_larger_shade_are_found():
     assert shaded[22:38, 22:28].all() and not shaded[60:].any()
     assert not shade.find_shade(colour, ground, ~ground).any()
     assert not shade.find_shade(colour, ~ground, beside).any()
-
-
-def test_shade_that_is_everywhere_is_texture():
     stripes = np.full((100, 100, 3), 0.6)
     stripes[:, np.arange(100) % 6 < 2] *= [0.5, 0.55, 0.65]
     beside = np.zeros((100, 100), bool)

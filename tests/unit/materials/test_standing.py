@@ -1,7 +1,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from fixtures import mixed_ground as made
 from scipy.ndimage import gaussian_filter
 
@@ -48,13 +47,12 @@ def test_bumps_are_found_with_their_outlines():
     assert np.sum(things, 0).max() == 1
 
 
-def test_even_ground_has_none():
-    assert find(scene([])) == []
-
-
-def test_what_rises_without_another_colour_is_none():
+def test_even_and_sloping_ground_has_none_nor_has_what_rises_without_another_colour():
     """The heights of a fit are wrong in places where nothing stands."""
-    assert find(scene([(60, 60, 7, 6)], colour_too=False)) == []
+    maps = scene([])
+    slope = 0.5 * made.SPACING * np.arange(M)[None, :]
+    for each in (maps, replace(maps, surface=maps.surface + slope), scene([(60, 60, 7, 6)], colour_too=False)):
+        assert find(each) == []
 
 
 def test_one_stone_among_many_is_none():
@@ -63,18 +61,8 @@ def test_one_stone_among_many_is_none():
     assert find(scene(field)) == []
 
 
-def test_ground_that_slopes_has_none():
-    maps = scene([])
-    slope = 0.5 * made.SPACING * np.arange(M)[None, :]
-    assert find(replace(maps, surface=maps.surface + slope)) == []
-
-
-@pytest.mark.parametrize(("bumps", "rough"), [([], False), ("field", True)])
-def test_roughness_is_that_of_usual_blobs(bumps, rough):
-    field = [(r, c, 5, 5) for r in range(4, M, 9) for c in range(4, M, 9)] if bumps else []
-    rise = standing.measure_rise(scene(field))
-    assert (standing.measure_roughness(rise, np.ones((M, M), bool)) > 0.5) == rough
-
-
-def test_no_ground_has_no_roughness():
-    assert standing.measure_roughness(np.zeros((64, 64)), np.zeros((64, 64), bool)) == 0.0
+def test_roughness_is_that_of_usual_blobs():
+    everything, field = np.ones((M, M), bool), [(r, c, 5, 5) for r in range(4, M, 9) for c in range(4, M, 9)]
+    smooth, rough = (standing.measure_roughness(standing.measure_rise(scene(each)), everything) for each in ([], field))
+    assert smooth < 0.5 < rough
+    assert standing.measure_roughness(np.zeros((M, M)), ~everything) == 0.0

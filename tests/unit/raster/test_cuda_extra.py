@@ -6,8 +6,6 @@ from importlib import import_module
 import pytest
 from fixtures import fake_gsplat
 
-from dav_gswt.raster import backends
-
 gsplat = pytest.importorskip("gsplat", reason="gsplat is not installed: .ci/run tests it in a folder of its own")
 CALLED = "rasterization", "rasterize_to_indices_in_range"
 
@@ -25,11 +23,3 @@ def test_the_stand_in_takes_what_gsplat_takes(name):
 @pytest.mark.parametrize("module", ["raster.cuda", "reconstruction.fitting.device_descent", "study.gsplat_fit"])
 def test_what_is_written_for_a_gpu_can_be_imported(module):
     assert import_module(f"dav_gswt.{module}")
-
-
-def test_without_a_gpu_another_backend_is_taken_and_the_reason_is_said(monkeypatch):
-    if not (why := backends.explain_unavailable("cuda")):
-        pytest.skip("there is a GPU")
-    assert "GPU" in why
-    monkeypatch.delenv(backends.VARIABLE, raising=False)
-    assert backends.select_backend() != "cuda"

@@ -11,25 +11,29 @@ from fixtures import lpips_arrays
 from dav_gswt.reconstruction import evaluation
 
 
+def evaluate(views, groups=None, weights=None):
+    return evaluation.evaluate_field(patch.field(), views, groups, weights)
+
+
 def test_a_field_that_is_right_has_no_psnr_and_full_marks():
-    found = evaluation.evaluate_field(patch.field(), patch.photos(), weights=lpips_arrays.random())
+    found = evaluate(patch.photos(), weights=lpips_arrays.random())
     assert found["psnr"] is None  # equal pictures
     assert found["ssim"] == pytest.approx(1) and found["lpips"] == 0
     assert [row["view"] for row in found["test_views"]] == ["photo_0", "photo_1", "photo_2"]
 
 
-def off(amount, views=None):
+def off(amount):
     """Photos that differ from the field by noise of a deviation each."""
-    rng = np.random.default_rng(0)
-    photos = views or patch.photos(len(amount), size=64)
-    noisy = (np.clip(v.image + s * rng.normal(size=v.image.shape), 0, 1) for v, s in zip(photos, amount, strict=True))
-    return [replace(v, image=image.astype(np.float32)) for v, image in zip(photos, noisy, strict=True)]
+    rng, photos = np.random.default_rng(0), patch.photos(len(amount), size=64)
+    for view, deviation in zip(photos, amount, strict=True):
+        view.image[:] = np.clip(view.image + deviation * rng.normal(size=view.image.shape), 0, 1)
+    return photos
 
 
 def test_means_groups_and_the_worst_tenth():
     tests = off([0.02, 0.02, 0.1])
     groups = {"high": ["photo_0", "photo_1"], "low": ["photo_2"], "none": ["elsewhere"]}
-    found = evaluation.evaluate_field(patch.field(), tests, groups, lpips_arrays.random())
+    found = evaluate(tests, groups, lpips_arrays.random())
     rows = found["test_views"]
     for key in evaluation.MEASURES:
         values = [row[key] for row in rows]
@@ -39,25 +43,17 @@ def test_means_groups_and_the_worst_tenth():
     assert rows[0]["psnr"] == pytest.approx(-20 * np.log10(0.02), abs=1.5) and rows[2]["lpips"] > rows[0]["lpips"]
 
 
-def test_exposure_is_forgiven_where_it_is_said():
-    dim = [replace(v, image=0.8 * v.image) for v in off([0.01], patch.photos(1))]
-    found = evaluation.evaluate_field(patch.field(), dim)
-    assert found["psnr_colour_corrected"] > found["psnr"] + 5
-
-
-def test_pixels_that_do_not_count_change_nothing():
-    (view,) = off([0.05], patch.photos(1, size=64))
+def test_pixels_that_do_not_count_change_nothing_and_exposure_is_forgiven_where_it_is_said():
+    (view,) = off([0.05])
+    dim = evaluate([replace(view, image=0.5 * view.image)])
+    assert dim["psnr_colour_corrected"] > dim["psnr"] + 5
     weight = view.weight.copy()
     weight[:, 32:] = 0
     spoilt = view.image.copy()
     spoilt[:, 33:] = 1
-    one, two = (
-        evaluation.evaluate_field(patch.field(), [replace(view, image=image, weight=weight)])
-        for image in (view.image, spoilt)
-    )
+    one, two = (evaluate([replace(view, image=image, weight=weight)]) for image in (view.image, spoilt))
     assert one["psnr"] == pytest.approx(two["psnr"]) and one["psnr_colour_corrected"] == two["psnr_colour_corrected"]
-    blind = replace(view, weight=np.zeros_like(weight))
-    assert evaluation.evaluate_field(patch.field(), [blind])["psnr"] is None
+    assert evaluate([replace(view, weight=np.zeros_like(weight))])["psnr"] is None
 
 
 def test_lpips_counts_by_the_area_that_counts():
@@ -67,20 +63,16 @@ def test_lpips_counts_by_the_area_that_counts():
     wrong[:, :48] = 1 - wrong[:, :48]
     half = np.zeros_like(view.weight)
     half[:, :48] = 1
-    weights = lpips_arrays.random()
     alone, beside = (
-        evaluation.evaluate_field(patch.field(), [replace(view, image=wrong, weight=w)], weights=weights)["lpips"]
-        for w in (half, view.weight)
+        evaluate([replace(view, image=wrong, weight=weight)], weights=lpips_arrays.random())["lpips"]
+        for weight in (half, view.weight)
     )
     assert alone == pytest.approx(2 * beside, rel=1e-3)
 
 
-def test_without_weights_lpips_is_null_and_that_is_said(caplog):
+def test_without_weights_lpips_is_null_which_is_said_and_so_is_all_without_test_views(caplog):
     with caplog.at_level(logging.INFO):
-        found = evaluation.evaluate_field(patch.field(), off([0.02]))
+        found = evaluate(off([0.02]))
     assert found["lpips"] is found["worst_decile"]["lpips"] is None and "metrics lack LPIPS" in caplog.text
-
-
-def test_no_test_view_is_null():
-    found = evaluation.evaluate_field(patch.field(), [])
-    assert found["psnr"] is found["worst_decile"]["ssim"] is None and found["test_views"] == []
+    none = evaluate([])
+    assert none["psnr"] is none["worst_decile"]["ssim"] is None and none["test_views"] == []

@@ -1,3 +1,5 @@
+"""The ground of a scene: its place, its surface, its file, and what photos see of it through all that is between."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -5,33 +7,42 @@ import pytest
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
+from dav_gswt.field import GaussianField, rgb_to_sh
+from dav_gswt.geometry import cameras
 from dav_gswt.geometry.scene_frame import Extent
-from dav_gswt.reconstruction import ground
+from dav_gswt.images import image_files
+from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.reconstruction import external_field, ground, visibility
 
 FRAME = scene_frame(exemplar=(0.0, 0.0, 8.0), extent=(-2.0, -1.0, 10.0, 9.0))
 
 
-def test_the_exemplar_is_a_block_of_whole_cells_inside_the_well_seen_square():
-    grid = ground.fit_ground(FRAME, np.zeros((0, 3)), spacing=0.1, max_cells=10**6, block=32, margin=0.25)
-    west, south, side = grid.exemplar
-    assert grid.cells == 64
+def place(frame=FRAME, spacing=0.1, max_cells=10**6, margin=0.25):
+    return ground.fit_ground(frame, np.zeros((0, 3)), spacing, max_cells, 32, margin)
+
+
+@pytest.fixture
+def flat():
+    return place()
+
+
+def test_the_exemplar_is_whole_cells_inside_the_well_seen_square_and_the_margin_ends_where_no_photo_sees(flat):
+    west, south, side = flat.exemplar
+    assert flat.cells == 64 and not flat.heights.any()
     assert side == pytest.approx(6.4)
     assert west >= 0 and south >= 0 and west + side <= 8 + 1e-9 and south + side <= 8 + 1e-9
-
-
-def test_the_margin_ends_where_no_photo_sees():
-    grid = ground.fit_ground(FRAME, np.zeros((0, 3)), spacing=0.1, max_cells=10**6, block=32, margin=1.0)
+    grid = place(margin=1.0)
     rows, columns = grid.shape
     assert grid.west >= -2 - 1e-9 and grid.west + columns * grid.spacing <= 10 + 1e-9
     assert grid.south >= -1 - 1e-9 and grid.south + rows * grid.spacing <= 9 + 1e-9
 
 
 def test_judged_is_the_exemplar_unless_far_more_is_modelled():
-    usual = ground.fit_ground(FRAME, np.zeros((0, 3)), spacing=0.1, max_cells=10**6, block=32, margin=ground.MARGIN)
+    usual = place(margin=ground.MARGIN)
     west, south, side = usual.exemplar
     assert usual.judged == pytest.approx((west, south, west + side, south + side))
     wide = replace(FRAME, extent=Extent(-20.0, 0.0, 10.0, 9.0))
-    whole = ground.fit_ground(wide, np.zeros((0, 3)), spacing=0.1, max_cells=10**6, block=32, margin=ground.WHOLE)
+    whole = place(wide, margin=ground.WHOLE)
     west, south, side = whole.exemplar
     rows, columns = whole.shape
     assert whole.judged[0] == pytest.approx(whole.west + ground.MARGIN * side)
@@ -39,24 +50,11 @@ def test_judged_is_the_exemplar_unless_far_more_is_modelled():
     assert whole.judged[2] <= whole.west + columns * whole.spacing
 
 
-def test_the_cap_widens_the_spacing():
-    grid = ground.fit_ground(FRAME, np.zeros((0, 3)), spacing=0.01, max_cells=10_000, block=32, margin=0.25)
-    assert grid.heights.size <= 10_000
-    assert grid.spacing > 0.01
-
-
-def test_an_exemplar_too_small_for_the_levels_says_what_to_do():
+def test_the_cap_widens_the_spacing_and_an_exemplar_too_small_for_the_levels_is_refused():
+    grid = place(spacing=0.01, max_cells=10_000)
+    assert grid.heights.size <= 10_000 and grid.spacing > 0.01
     with pytest.raises(InputError, match="fewer levels"):
-        ground.fit_ground(FRAME, np.zeros((0, 3)), spacing=1.0, max_cells=10**6, block=32, margin=0.25)
-
-
-@pytest.fixture
-def flat():
-    return ground.fit_ground(FRAME, np.zeros((0, 3)), spacing=0.1, max_cells=10**6, block=32, margin=0.25)
-
-
-def test_without_points_the_ground_is_flat(flat):
-    assert not flat.heights.any()
+        place(spacing=1.0)
 
 
 def test_a_tilted_plane_is_met_exactly_even_where_no_point_lies(flat):
@@ -76,22 +74,88 @@ def test_points_that_stand_out_do_not_lift_the_ground(flat):
     assert np.abs(ground.fit_surface(flat, points)).max() < 0.05
 
 
-def test_height_at_a_cells_centre_is_the_cells_height(flat):
-    from dataclasses import replace
-
+def test_a_cells_height_is_that_at_its_centre_and_comes_back_from_an_exr_with_north_on_top(tmp_path, flat):
     hilly = replace(flat, heights=np.random.default_rng(0).normal(size=flat.shape))
     np.testing.assert_allclose(hilly.height_at(hilly.centres), hilly.heights.ravel(), atol=1e-9)
-
-
-def test_a_ground_comes_back_from_its_exr_with_north_on_top(tmp_path, flat):
-    from dataclasses import replace
-
-    from dav_gswt.images import image_files
-
-    hilly = replace(flat, heights=np.arange(flat.heights.size, dtype=float).reshape(flat.shape))
     ground.write_ground(hilly, tmp_path / "g.exr")
     back = ground.read_ground(tmp_path / "g.exr")
     np.testing.assert_array_equal(back.heights, hilly.heights.astype(np.float32))
     assert (back.west, back.spacing, back.cells) == (hilly.west, hilly.spacing, hilly.cells)
     channels, _ = image_files.read_exr(tmp_path / "g.exr")
-    assert channels["Z"][0, 0] == hilly.heights[-1, 0]
+    assert channels["Z"][0, 0] == np.float32(hilly.heights[-1, 0])
+
+
+def test_the_surface_under_a_finished_field_is_found_and_what_lies_beyond_is_cut_off():
+    frame = scene_frame(kind="field", flying_height=5.0, exemplar=(0.0, 0.0, 4.0), extent=(0.0, 0.0, 4.0, 4.0))
+    xy, n = np.random.default_rng(0).uniform(-1, 5, (30_000, 2)), 30_000
+    field = GaussianField(
+        np.column_stack([xy, 0.3 + 0.1 * xy[:, 0]]).astype(np.float32),
+        np.full((n, 3), np.log(0.05), np.float32),
+        np.tile(np.array([1, 0, 0, 0], np.float32), (n, 1)),
+        np.full(n, 3.0, np.float32),
+        rgb_to_sh(np.full((n, 3), 0.5)),
+        np.zeros(n, np.float32),
+        np.ones(n, bool),  # as if it came from a ground layer of ours
+    )
+    inside, grid = external_field.prepare_external_field(field, frame, 20_000)
+    assert 0 < len(inside) < n and not inside.ground.any()
+    assert inside.means[:, :2].min() >= 0 and inside.means[:, :2].max() <= 4
+    x = grid.centres[:, 0].reshape(grid.shape)
+    # the topmost of overlapping round Gaussians is seen, up to a standard deviation above the surface
+    assert np.abs(grid.heights - (0.3 + 0.1 * x)).max() < 0.06
+    assert grid.spacing == pytest.approx(0.05 / external_field.WIDTH)
+
+
+def around(heights=None):
+    """4 x 4 units from (-2, -2)."""
+    flat = np.zeros((40, 40)) if heights is None else heights
+    return ground.Ground(-2.0, -2.0, 0.1, 0, 0, 40, flat, np.ones((40, 40), bool))
+
+
+def photo(eye, at=(0.0, 0.0, 0.0), weight=1.0):
+    camera = cameras.pinhole(list(eye), list(at), 64, 64, 80.0)
+    blank = np.zeros((64, 64, 3), np.float32)
+    return TrainingView("photo", camera, blank, np.full((64, 64), weight, np.float32))
+
+
+def eastings(grid):
+    return grid.centres[:, 0].reshape(grid.shape).astype(np.float32)
+
+
+def one(places, *photos, heights=None, values=None, least=1):
+    grid = around(heights)
+    values = eastings(grid) if values is None else values
+    return visibility.median_behind(grid, values, np.asarray(places, np.float32), list(photos), least)
+
+
+def test_behind_a_place_is_where_the_ray_through_it_meets_the_ground():
+    # from (0, 0, 4) through (.5, 0, 2): 4 units down when twice as far from the eye
+    found = one([[0.5, 0.0, 2.0], [0.0, 0.7, 1.0]], photo((0, 0.01, 4)))
+    np.testing.assert_allclose(found, [1.0, 0.0], atol=0.06)  # half a cell and a little
+    assert one(np.zeros((0, 3)), photo((0, 0.01, 4))).shape == (0,)
+    # from (-1, 0, 3) along (1, 0, -1.5): meets a slope z = x / 4 where 3 - 1.5 (x + 1) = x / 4
+    found = one([[0.0, 0.0, 1.5]], photo((-1, 0.01, 3)), heights=0.25 * eastings(around()))
+    np.testing.assert_allclose(found, 1.5 / 1.75, atol=0.07)
+
+
+def test_where_no_ground_is_seen_there_is_no_value():
+    """The ray rises, or leaves the ground; the place is behind the camera; the pixel does not count."""
+    found = [one([[0, 0, 3.5]], photo((0, 1.5, 3)))]
+    found += [one([place], photo((0, 0.01, 4))) for place in ((1.5, 0, 2), (0, 0, 5))]
+    found += [one([(0.5, 0, 2)], photo((0, 0.01, 4), weight=0.0))]
+    np.testing.assert_array_equal(found, np.full((4, 1), np.nan))
+
+
+def test_most_photos_decide_and_few_have_no_say():
+    grid = around()
+    values = np.where(eastings(grid) > 0.5, np.float32(1), np.float32(0.2))
+    values[eastings(grid) < -0.5] = np.nan
+    west, middle, east = photo((-2, 0.01, 3)), photo((0, 0.01, 3)), photo((2, 0.01, 3))  # they see 1, .2 and nothing
+    place = [[0.0, 0.0, 1.5]]
+
+    def tell(*photos, least=1):
+        return float(one(place, *photos, values=values, least=least)[0])
+
+    assert tell(west) == 1 and tell(middle) == pytest.approx(0.2) and np.isnan(tell(east))
+    assert tell(west, middle) == pytest.approx(0.6) and tell(west, middle, middle, east) == pytest.approx(0.2)
+    assert tell(west, middle, east, least=2) == pytest.approx(0.6) and np.isnan(tell(west, middle, east, least=3))

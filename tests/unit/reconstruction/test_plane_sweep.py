@@ -23,18 +23,19 @@ def texture(x, y, seed):
     return np.clip(0.5 + out, 0, 1)
 
 
+def meet(camera, z):
+    """Where its rays meet a height."""
+    origin, step = camera.rays()
+    t = (z - origin[..., 2]) / step[..., 2]
+    return origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
+
+
 def photo(eye, size=96):
     """A table of height TALL over textured ground, as rays see it from above."""
     camera = cameras.pinhole(eye, [1.6, 1.6, 0.0], size, size, 50.0)
-    origin, step = camera.rays()
-
-    def at(z):
-        t = (z - origin[..., 2]) / step[..., 2]
-        return origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
-
-    x, y = at(TALL)
+    x, y = meet(camera, TALL)
     top = (x > BOX[0]) & (x < BOX[1]) & (y > BOX[0]) & (y < BOX[1])
-    image = np.where(top[..., None], texture(x, y, 1), texture(*at(0.0), 2)).astype(np.float32)
+    image = np.where(top[..., None], texture(x, y, 1), texture(*meet(camera, 0.0), 2)).astype(np.float32)
     return TrainingView(str(eye), camera, image, np.ones((size, size), np.float32))
 
 
@@ -53,27 +54,24 @@ def inner(grid: Ground, low: float, high: float):
     return (x > low) & (x < high) & (y > low) & (y < high)
 
 
-def test_what_stands_is_found_where_it_stands_and_as_high_as_it_is(found):
+def test_what_stands_is_found_where_it_stands_and_as_high_as_it_is_and_the_ground_around_stays_ground(found):
     top = inner(found.grid, BOX[0] + 0.1, BOX[1] - 0.1)
     assert found.stands[top].mean() > 0.95
     # a step of the sweep: half of it by the parabola, as much again by the window
     assert np.median(np.abs(found.above[top] - TALL)) < found.step
-
-
-def flicker(eye, seed):
-    """Nearly plain sand, and in the middle what looks otherwise in every photo, as thin leaves do."""
-    view = photo(eye)
-    origin, step = view.camera.rays()
-    t = -origin[..., 2] / step[..., 2]
-    x, y = origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
-    leaves = (np.hypot(x - 1.6, y - 1.6) < 0.25)[..., None]
-    look = np.random.default_rng(seed).uniform(0, 1, (*x.shape, 3))
-    return replace(view, image=np.where(leaves, look, 0.5 + 0.04 * (texture(x, y, 2) - 0.5)).astype(np.float32))
+    around = inner(found.grid, 0.4, 2.8) & ~inner(found.grid, BOX[0] - 0.25, BOX[1] + 0.25)
+    assert found.stands[around].mean() < 0.01
+    assert np.abs(found.above[around]).max() <= 2 * found.step
 
 
 def test_sand_that_looks_like_sand_is_no_tower_over_what_no_two_photos_show_alike():
-    eyes = [(0, 0), (0.9, 0), (-0.9, 0), (0, 0.9), (0, -0.9), (0.6, 0.6), (-0.6, 0.6)]
-    views = [flicker([1.6 + x, 1.6 + y, 4.0], i) for i, (x, y) in enumerate(eyes)]
+    """Nearly plain sand, and in the middle what looks otherwise in every photo, as thin leaves do."""
+    views, rng = [], np.random.default_rng(0)
+    for dx, dy in [(0, 0), (0.9, 0), (-0.9, 0), (0, 0.9), (0, -0.9), (0.6, 0.6), (-0.6, 0.6)]:
+        view = photo([1.6 + dx, 1.6 + dy, 4.0])
+        x, y = meet(view.camera, 0.0)
+        leaves, sand = (np.hypot(x - 1.6, y - 1.6) < 0.25)[..., None], 0.5 + 0.04 * (texture(x, y, 2) - 0.5)
+        views.append(view.with_pixels(image=np.where(leaves, rng.random(sand.shape), sand).astype(np.float32)))
     found = plane_sweep.sweep_heights(made.grid(0.05), views, flying_height=4.0, pixel=0.04)
     assert found.above.max() < 0.25  # of 1.2 that are tried
 
@@ -97,16 +95,9 @@ def test_a_wider_grid_goes_on_as_high_as_its_border():
     np.testing.assert_allclose(wide.height_at(at), grid.height_at(at), atol=1e-12)
 
 
-def test_the_ground_around_stays_ground(found):
-    around = inner(found.grid, 0.4, 2.8) & ~inner(found.grid, BOX[0] - 0.25, BOX[1] + 0.25)
-    assert found.stands[around].mean() < 0.01
-    assert np.abs(found.above[around]).max() <= 2 * found.step
-
-
 def test_ground_that_fewer_than_two_photos_see_is_not_known(photos):
     alone = plane_sweep.sweep_heights(made.grid(0.1), photos[:1], flying_height=4.0, pixel=0.08)
-    assert not alone.known.any() and not alone.stands.any()
-    assert (alone.above == 0).all()
+    assert not alone.known.any() and not alone.stands.any() and not alone.above.any()
 
 
 def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
@@ -115,26 +106,35 @@ def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
     assert not shell.ground.any()
     assert heights.max() == pytest.approx(TALL, abs=2 * found.step)
     assert heights.min() < 0.2 * TALL  # walls reach down
-    ceiling = objects.compute_ceiling(made.grid(0.05), found, shell)
     grid = made.grid(0.05)
+    ceiling = objects.compute_ceiling(grid, found, shell)
     assert ceiling[inner(grid, 0.3, 0.7)].max() < 0.3 * TALL  # free space over bare ground
     assert ceiling[inner(grid, 1.4, 1.8)].min() > TALL
 
 
-def test_costs_without_steps_are_each_cells_own():
-    rng = np.random.default_rng(0)
-    costs = rng.uniform(0, 1, (5, 4, 6)).astype(np.float32)
-    free = plane_sweep.aggregate_costs(costs, 0.0, 0.0)
-    np.testing.assert_array_equal(free.argmin(0), costs.argmin(0))  # changes cost nothing
-
-
-def test_a_cell_that_says_nothing_takes_the_height_of_its_neighbours():
+def test_a_cell_that_says_nothing_takes_the_height_of_its_neighbours_where_steps_cost():
     costs = np.full((5, 7, 7), 0.5, np.float32)
     costs[3] = 0.1
     costs[:, 3, 3] = 0.3
     costs[1, 3, 3] = 0.29  # a little better elsewhere
-    assert costs.argmin(0)[3, 3] == 1
     assert (plane_sweep.aggregate_costs(costs, 0.01, 0.06).argmin(0) == 3).all()
+    np.testing.assert_array_equal(plane_sweep.aggregate_costs(costs, 0.0, 0.0).argmin(0), costs.argmin(0))
+
+
+def test_costs_add_up_over_paths_from_four_sides_by_a_plain_loop():
+    costs = np.random.default_rng(0).uniform(0, 1, (4, 3, 5)).astype(np.float32)
+    one, more, total = 0.1, 0.25, np.zeros((4, 3, 5))
+    for down, across in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        path = costs.astype(float)
+        for r in range(3)[:: down or 1]:
+            for c in range(5)[:: across or 1]:
+                if 0 <= r - down < 3 and 0 <= c - across < 5:
+                    last = path[:, r - down, c - across]
+                    steps = np.abs(np.subtract.outer(np.arange(4), np.arange(4)))
+                    best = (last + np.where(steps == 0, 0, np.where(steps == 1, one, more))).min(1)
+                    path[:, r, c] += best - last.min()
+        total += path
+    np.testing.assert_allclose(plane_sweep.aggregate_costs(costs, one, more), total, rtol=1e-5)
 
 
 def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_nothing():
@@ -148,27 +148,15 @@ def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_n
     assert not len(objects.make_isolated_points(grid, taken, points, np.full((7, 3), 0.5), band=1.0))
 
 
-def test_photos_of_ground_that_many_see_are_left_out(monkeypatch):
+def test_photos_of_ground_that_many_see_are_left_out_and_those_that_alone_see_theirs_are_kept(monkeypatch):
     monkeypatch.setattr(plane_sweep, "ENOUGH_PHOTOS", 4)
-    shown = photo([1.6, 1.6, 4.0], 24)
-    from_above = [
-        replace(shown, name=str(i), camera=cameras.pinhole([1.6 + 0.01 * i, 1.6, 4.0], [1.6, 1.6, 0], 24, 24, 50.0))
-        for i in range(12)
-    ]
-    kept = plane_sweep.leave_out_photos(made.grid(0.1), from_above)
+    shown, grid = photo([1.6, 1.6, 4.0], 24), made.grid(0.1)
+    above = [cameras.pinhole([1.6 + 0.01 * i, 1.6, 4.0], [1.6, 1.6, 0], 24, 24, 50.0) for i in range(12)]
+    from_above = [replace(shown, name=str(i), camera=camera) for i, camera in enumerate(above)]
+    kept = plane_sweep.leave_out_photos(grid, from_above)
     assert len(kept) == 4
     assert [view.name for view in kept][::3] == ["0", "11"]  # those farthest apart, in their order
-
-
-def test_photos_that_alone_see_their_ground_are_kept(monkeypatch):
     monkeypatch.setattr(plane_sweep, "ENOUGH_PHOTOS", 1)
-    shown = photo([1.6, 1.6, 4.0], 24)
-    apart = [
-        replace(shown, camera=cameras.pinhole([x, 1.6, 0.8], [x, 1.6, 0], 24, 24, 30.0)) for x in (0.4, 1.2, 2.0, 2.8)
-    ]
-    assert plane_sweep.leave_out_photos(made.grid(0.1), apart) == apart
-
-
-def test_few_photos_are_all_kept():
-    views = [photo([1.6, 1.6, 4.0], 24)] * 9
-    assert plane_sweep.leave_out_photos(made.grid(0.1), views) == views
+    low = [cameras.pinhole([x, 1.6, 0.8], [x, 1.6, 0], 24, 24, 30.0) for x in (0.4, 1.2, 2.0, 2.8)]
+    apart = [replace(shown, camera=camera) for camera in low]
+    assert plane_sweep.leave_out_photos(grid, apart) == apart

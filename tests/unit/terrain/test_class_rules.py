@@ -1,21 +1,33 @@
-"""Rules of classes from the config."""
+"""Rules of classes from the config, and files of painted materials that they read."""
+
+import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from fixtures.land_covers import SIDE, two_classes
 
-from dav_gswt.bundle.land_cover import ImageTerm, RangeTerm
+from dav_gswt.bundle.land_cover import ImageTerm, ObjectOrders, RangeTerm, ScatterEntry
 from dav_gswt.bundle.manifest import MaterialEntry, TileSetInfo
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.terrain import class_rules
+from dav_gswt.terrain.class_rules import apply_rule
 from dav_gswt.terrain.classes import Classes
+from dav_gswt.terrain.paint_file import read_paint
+
+NAMES = ["sand", "grass"]
+RANGE = {"material": "grass", "low": 1, "high": None, "soft": 0.5, "weight": 2}
+FILE = {"format": "davgswt-paint", "version": 1, "materials": ["grass", "sand"], "runs": [[0, 0, 3, 0], [1, 1, 1, 1]]}
 
 
 @pytest.fixture
 def manifest():
     materials = [MaterialEntry("sand", 0.6, 0, [0.5] * 3), MaterialEntry("grass", 0.4, 16, [0.5] * 3)]
-    return TileSetInfo(SIDE, 7, 1.0, [0.5] * 3, [], [], [], materials, classes=two_classes())
+    shrub = ObjectOrders("shrub", 0.4, [0.0, 1.0], 0.0, 1, 0.1, 0.3, [])
+    objects = [shrub, replace(shrub, name="stone", material=0), replace(shrub, name="tuft")]
+    cover = {"classes": two_classes(), "objects": objects, "scatter": ScatterEntry(4, 15.0, 0.15, 7)}
+    return TileSetInfo(SIDE, 7, 1.0, [0.5] * 3, [], [], [], materials, **cover)
 
 
 @pytest.fixture
@@ -24,63 +36,116 @@ def picture(tmp_path):
     image[:, 0] = [1, 1, 0]
     image[:, 1] = [0, 0.98, 0]
     image_files.write_png(tmp_path / "classes.png", image)
-    entry = {"kind": "image", "file": str(tmp_path / "classes.png"), "width": 30, "colours": {"grass": "#00ff00"}}
-    return entry | {"colours": {"grass": "#00ff00", "sand": "#ffff00"}}
+    colours = {"grass": "#00ff00", "sand": "#ffff00"}
+    return {"kind": "image", "file": str(tmp_path / "classes.png"), "width": 30, "colours": colours}
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(**changes) -> dict:
+        (tmp_path / "painted.json").write_text(json.dumps(FILE | changes))
+        return {"kind": "painted", "file": str(tmp_path / "painted.json")}
+
+    return write
 
 
 def test_the_default_is_the_noise_of_the_bundle(manifest):
-    changed, pictures = class_rules.apply_rule(manifest, class_rules.NOISE)
-    assert changed == manifest and pictures == {}
-
-
-def test_a_weight_of_the_noise_replaces_its_own(manifest):
-    changed, _ = class_rules.apply_rule(manifest, [{"kind": "noise", "weight": 0.5}])
+    assert apply_rule(manifest, class_rules.NOISE) == (manifest, {})
+    changed, _ = apply_rule(manifest, [{"kind": "noise", "weight": 0.5}])
     assert changed.classes.rule[0].weight == 0.5
 
 
 def test_heights_are_given_in_tile_sides_and_slopes_as_they_are(manifest):
-    entry = {"material": "grass", "low": 1, "high": None, "soft": 0.5, "weight": 2}
-    changed, _ = class_rules.apply_rule(manifest, [{"kind": "height"} | entry, {"kind": "slope"} | entry])
-    high, steep = changed.classes.rule
-    assert high == RangeTerm("height", 2.0, 1, SIDE, None, 0.5 * SIDE)
-    assert steep == RangeTerm("slope", 2.0, 1, 1.0, None, 0.5)
+    changed, _ = apply_rule(manifest, [{"kind": "height"} | RANGE, {"kind": "slope"} | RANGE])
+    assert changed.classes.rule == [
+        RangeTerm("height", 2.0, 1, SIDE, None, 0.5 * SIDE),
+        RangeTerm("slope", 2.0, 1, 1.0, None, 0.5),
+    ]
 
 
-def test_a_picture_becomes_numbers_of_materials(manifest, picture):
-    changed, pictures = class_rules.apply_rule(manifest, [picture])
+def test_a_picture_becomes_numbers_of_materials(manifest, picture, caplog):
+    changed, pictures = apply_rule(manifest, [picture])
     (term,) = changed.classes.rule
     assert isinstance(term, ImageTerm) and (term.rows, term.columns, term.width) == (2, 3, 30.0)
     assert pictures[term.file].tolist() == [[0, 1, 255]] * 2
-
-
-def test_pixels_of_no_material_are_counted_in_a_warning(manifest, picture, caplog):
-    class_rules.apply_rule(manifest, [picture])
     assert "33.3 % of the pixels" in caplog.text
 
 
-def test_a_picture_of_none_of_the_materials_is_refused(manifest, picture):
-    with pytest.raises(InputError, match="no pixel has the colour"):
-        class_rules.apply_rule(manifest, [picture | {"colours": {"sand": "#ff00ff"}}])
-
-
-def test_a_material_that_is_not_there_is_named_with_those_that_are(manifest):
-    with pytest.raises(InputError, match="no material 'mud'; the terrain has sand, grass"):
-        class_rules.apply_rule(manifest, [{"kind": "slope", "material": "mud", "soft": 1}])
+def test_a_bad_term_is_refused_by_name(manifest, picture, write, monkeypatch):
+    noiseless = replace(manifest, classes=replace(manifest.classes, rule=[]))
+    for given, rule, said in (
+        (manifest, [{"kind": "slope"} | RANGE | {"material": "mud"}], "no material 'mud'; the terrain has sand, grass"),
+        (manifest, [picture | {"colours": {"sand": "#ff00ff"}}], "no pixel has the colour"),
+        (noiseless, [{"kind": "noise"}], "no noise of its own"),
+        (manifest, [write()], "one file, beside other terms"),
+        (manifest, [{"kind": "noise"}, write(), write()], "one file, beside other terms"),
+    ):
+        with pytest.raises(InputError, match=said):
+            apply_rule(given, rule)
+    monkeypatch.setattr(class_rules, "MAX_SIDE", 2)
+    with pytest.raises(InputError, match="3 x 2 pixels; at most 2"):
+        apply_rule(manifest, [picture])
 
 
 def test_a_material_without_any_place_is_named_in_a_warning(manifest, caplog):
-    entry = {"kind": "slope", "material": "grass", "low": 1, "soft": 0.1, "weight": 9}
-    changed, _ = class_rules.apply_rule(manifest, [entry])
-    class_rules.warn_of_missing(Classes(changed.classes, 2, SIDE), ["sand", "grass"])
+    class_rules.warn_of_missing(Classes(manifest.classes, 2, SIDE), NAMES)
+    assert not caplog.records
+    changed, _ = apply_rule(manifest, [{"kind": "slope"} | RANGE | {"soft": 0.1, "weight": 9}])
+    class_rules.warn_of_missing(Classes(changed.classes, 2, SIDE), NAMES)
     assert "leaves grass without any place (the ground is sand 100%)" in caplog.text
 
 
-def test_materials_with_places_are_not_warned_of(manifest, caplog):
-    class_rules.warn_of_missing(Classes(manifest.classes, 2, SIDE), ["sand", "grass"])
-    assert not caplog.records
-
-
 def test_a_rule_for_a_terrain_of_one_material_is_ignored_with_a_warning(manifest, caplog):
-    one = TileSetInfo(SIDE, 7, 1.0, [0.5] * 3, [], [], [], manifest.materials[:1])
-    changed, _ = class_rules.apply_rule(one, [{"kind": "slope", "material": "sand", "soft": 1}])
-    assert changed is one and "has one material" in caplog.text
+    one = replace(manifest, materials=manifest.materials[:1], classes=None)
+    assert apply_rule(one, class_rules.NOISE)[0] is one and not caplog.records
+    assert apply_rule(one, [{"kind": "slope"} | RANGE])[0] is one and "has one material" in caplog.text
+
+
+def test_painted_materials_are_found_by_their_names(manifest, write):
+    made, _ = apply_rule(manifest, [{"kind": "noise"}, write()])
+    assert made.classes.painted == [[0, 0, 3, 1], [1, 1, 1, 0]]
+    assert made.classes.rule == manifest.classes.rule and made.objects == manifest.objects
+
+
+def test_offsets_are_added_to_the_noise_and_densities_to_probabilities(manifest, write, caplog):
+    entry = write(densities={"shrub": 0.5, "stone": 2, "tower": 2}, offsets={"grass": 0.25})
+    made, _ = apply_rule(manifest, [{"kind": "noise"}, entry])
+    assert made.classes.rule[0].biases == [0.05, 0.25]
+    assert [each.probability for each in made.objects] == pytest.approx([0.15, 0.6, 0.3])
+    assert "not there: tower" in caplog.text
+
+
+def test_no_more_objects_stand_than_there_is_room_for(manifest, write):
+    entry = write(densities={"shrub": 3, "tuft": 3})
+    made, _ = apply_rule(manifest, [{"kind": "noise"}, entry])
+    assert [each.probability for each in made.objects] == pytest.approx([0.5, 0.3, 0.5]), "1 for a material's objects"
+    dense = replace(manifest, scatter=replace(manifest.scatter, cells=64))
+    made, _ = apply_rule(dense, [{"kind": "noise"}, entry])
+    assert 64**2 * sum(each.probability for each in made.objects) == pytest.approx(512), "what the page draws on a tile"
+
+
+def test_with_one_material_densities_count_alone(manifest, write):
+    objects = [replace(each, material=0) for each in manifest.objects]
+    alone = replace(manifest, materials=manifest.materials[:1], classes=None, objects=objects)
+    made, _ = apply_rule(alone, [{"kind": "noise"}, write(materials=["sand"], runs=[], densities={"stone": 0})])
+    assert made.classes is None and made.objects[1].probability == 0
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"version": 2}, "version"),
+        ({"runs": [[0, 0, 1.5, 0]]}, "runs"),
+        ({"runs": [[0, 0, 1, 5]]}, "a material that is not there"),
+        ({"materials": ["mud", "sand"]}, "no material 'mud'; the terrain has sand, grass"),
+        ({"densities": {"shrub": 4}}, "densities: beyond 0 to 3"),
+        ({"densities": {"shrub": -1}}, "densities: beyond 0 to 3"),
+        ({"offsets": {"sand": -9}}, "offsets: beyond 8"),
+        ({"format": "x" * 2**24}, "more than 16777216 bytes"),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_a_bad_painted_file_is_refused_by_name(write, changes, message):
+    path = write(**changes)["file"]
+    with pytest.raises(InputError, match="painted.json.*" + message):
+        read_paint(path, NAMES)

@@ -1,4 +1,4 @@
-"""Classes: the numbers shared with the page, bounds of cells, covered ground, and what reaches over a border."""
+"""Classes: the numbers shared with the page, bounds of cells, what reaches over a border, and painted places."""
 
 import json
 from dataclasses import replace
@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from fixtures.land_covers import SIDE, gaussians, two_classes
 
-from dav_gswt.bundle.land_cover import ClassesEntry, ImageTerm, RangeTerm
+from dav_gswt.bundle.land_cover import ClassesEntry, ImageTerm, RangeTerm, find_run_fault
 from dav_gswt.files import parse_record
-from dav_gswt.terrain.classes import JITTER, LATTICE, NOISE, Classes
+from dav_gswt.terrain.classes import LATTICE, Classes
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills
+from dav_gswt.terrain.painted import Painted, paint_lead
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "classes.json").read_text())["terrains"]
 
@@ -65,26 +66,11 @@ def test_numbers_are_those_shared_with_the_page(terrain):
         assert kept.tolist() == [place["kept"] for place in places]
 
 
-def test_no_axis_of_the_hash_serves_two_noises():
-    assert NOISE + 8 * 8 <= JITTER
-
-
-@pytest.mark.parametrize("cell", [(0, 0), (-5, 3), (1_000_000, -1_000_000)])
-def test_neighbouring_cells_agree_on_the_scores_along_their_edge(sand_and_grass, cell):
-    i, j = (np.full(9, v) for v in cell)
-    along = np.linspace(0, 1, 9)
-    east = sand_and_grass.scores_at(i, j, np.ones(9), along)
-    np.testing.assert_allclose(sand_and_grass.scores_at(i + 1, j, np.zeros(9), along), east, rtol=0, atol=1e-12)
-    jitter = sand_and_grass.jitter_at(*cell, np.ones(9), along)
-    beside = sand_and_grass.jitter_at(cell[0] + 1, cell[1], np.zeros(9), along)
-    np.testing.assert_allclose(beside, jitter, rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize("amplitude", [0.0, 0.05])
 def test_every_place_keeps_the_disc_of_a_material(amplitude):
     classes = Classes(two_classes(amplitude), 2, SIDE)
     rng = np.random.default_rng(1)
-    for i, j in rng.integers(-1000, 1000, (20, 2)).tolist():
+    for i, j in rng.integers(-1000, 1000, (8, 2)).tolist():
         discs = discs_at(rng.random((200, 2)))
         sand, grass = (classes.keep(i, j, discs, np.full(200, m)) for m in (0, 1))
         assert (sand | grass).all()
@@ -110,17 +96,6 @@ def test_what_stands_above_the_ground_reaches_over_the_border(sand_and_grass, bo
     assert (deep == tall).all(), "what lies below the ground stays under the border as far"
 
 
-def test_jitter_frays_a_border_by_its_amplitude_at_most(sand_and_grass, border):
-    places = np.random.default_rng(5).random((4000, 2))
-    cell = [np.full(4000, v) for v in border]
-    scores = sand_and_grass.scores_at(*cell, *places.T)
-    margin = scores[:, 0] - scores[:, 1]
-    kept = sand_and_grass.keep(*border, discs_at(places), np.zeros(4000, int))
-    amplitude = sand_and_grass.entry.jitter.amplitude
-    assert kept[margin > 2 * amplitude].all() and not kept[margin < -2 * amplitude].any()
-    assert (kept != (margin >= 0)).any()
-
-
 def rule_of(*terms, heights=None, pictures=None):
     entry = replace(two_classes(0.0), rule=list(terms))
     return Classes(entry, 2, SIDE, heights or FlatSurface(), pictures or {})
@@ -144,11 +119,53 @@ def test_a_picture_names_materials_in_the_middles_of_its_pixels():
     assert scores.tolist() == [[1, 0], [0, 1], [0, 0], [1, 0]]
 
 
-def test_a_mirrored_picture_repeats_and_a_clamped_one_goes_on():
-    pixels = np.array([[0, 1], [0, 1]], np.uint8)
-    found = {}
-    for beyond in ("mirror", "clamp"):
-        term = ImageTerm("image", 1.0, "a.bin", 4, "0" * 64, 2, 2, 8.0, beyond)
-        far = np.array([12, 20, 28])  # 6, 10 and 14 units to the east: pixels 2, 3 and 4
-        found[beyond] = rule_of(term, pictures={"a.bin": pixels}).lattice_scores(far, np.zeros(3, int)).argmax(1)
-    assert found["mirror"].tolist() == [1, 0, 0] and found["clamp"].tolist() == [1, 1, 1]
+SQUARE = [[-8, j, 24, 1] for j in range(-8, 16)]  # the cell (0, 0) and all around it
+
+
+def with_paint(runs):
+    return Classes(replace(two_classes(), painted=runs), 2, SIDE)
+
+
+def lattice(low, high):
+    i, j = np.mgrid[low:high, low:high].astype(np.int64)
+    return i.ravel(), j.ravel()
+
+
+@pytest.mark.parametrize("shift", [(0, 0), (-8, 3), (8 * 10**5, -17)])
+def test_weights_are_those_of_a_sum_over_all_points(shift):
+    rng = np.random.default_rng(1)
+    points = {(int(i), int(j)): int(m) for i, j, m in rng.integers(0, [20, 20, 3], (150, 3)) + [*shift, 0]}
+    i, j = lattice(-4, 24)
+    i, j = i + shift[0], j + shift[1]
+    expected = np.zeros((len(i), 3), int)
+    spread = {-2: 1, -1: 4, 0: 6, 1: 4, 2: 1}
+    for (x, y), material in points.items():
+        expected[:, material] += [spread.get(a - x, 0) * spread.get(b - y, 0) for a, b in zip(i, j, strict=True)]
+    painted = Painted([[x, y, 1, m] for (x, y), m in points.items()])
+    assert len(painted) == len(points)
+    assert (painted.weights_at(i, j, 3) == expected).all()
+
+
+def test_three_steps_beyond_paint_scores_are_those_of_the_rule():
+    i, j = lattice(-40, 48)
+    painted, plain = with_paint(SQUARE).lattice_scores(i, j), with_paint([]).lattice_scores(i, j)
+    beyond = np.maximum(np.abs(i - 3.5), np.abs(j - 3.5)) > 11.5 + 2
+    assert (painted[beyond] == plain[beyond]).all()
+    lead = paint_lead(two_classes())
+    inner = np.maximum(np.abs(i - 3.5), np.abs(j - 3.5)) <= 11.5 - 2
+    assert (painted[inner] == [-lead, 0]).all()
+
+
+@pytest.mark.parametrize(
+    "run, fault",
+    [
+        ([0, 0, 1], "not four numbers"),
+        ([0, 0, 0, 0], "beyond the bounds"),
+        ([2**23, 0, 1, 0], "beyond the bounds"),
+        ([0, -(2**23), 1, 0], "beyond the bounds"),
+        ([0, 1, 2**18, 0], "more than 262144 places"),
+        ([0, 0, 1, 2], "not there"),
+    ],
+)
+def test_runs_that_make_no_sense_are_named(run, fault):
+    assert find_run_fault([[0, 0, 5, 1]], 2) is None and fault in find_run_fault([[0, 0, 5, 1], run], 2)

@@ -1,83 +1,123 @@
-"""A page folder as a terrain in Python: the same surface and classes as the config gave; nothing damaged passes."""
-
-import json
+"""Pieces of finished terrains: a page folder as a terrain in Python, and a finite piece against what is drawn of it."""
 
 import numpy as np
 import pytest
-from fixtures.land_covers import write_cover_bundle
+from fixtures.land_covers import SIDE, write_cover_bundle
 
 from dav_gswt.bundle import store
 from dav_gswt.errors import InputError
-from dav_gswt.terrain import endless, finished
+from dav_gswt.geometry import cameras
+from dav_gswt.images import image_files
+from dav_gswt.images.metrics import psnr
+from dav_gswt.raster import render
+from dav_gswt.terrain import classes, endless, finished, finite, scatter, stills
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills
-from dav_gswt.terrain.page import write_page
+from dav_gswt.terrain.page import describe_surface, write_page
+from dav_gswt.terrain.sphere import make_sphere
 
 SURFACES = {
     "flat": FlatSurface(),
     "hills": Hills(2.0, 30.0, 3, 5),
     "image": HeightMap(np.random.default_rng(1).uniform(0, 3, (9, 7)).astype(np.float32), 60.0, "clamp"),
 }
+HILLS = {"kind": "hills", "height": 0.4, "wavelength": 4}
 RULE = [{"kind": "noise"}, {"kind": "height", "material": "grass", "low": 0.1, "soft": 0.2}]
 
 
-@pytest.fixture
-def page_of(root, tmp_path):
-    """Make the page folder of two materials on a surface."""
+def test_a_page_is_the_terrain_that_it_was_made_of(root, tmp_path):
     schema = root / "workflow/schemas/davgswt.schema.json"
-
-    def make(surface, rule=RULE):
-        write_cover_bundle(tmp_path / "bundle", schema)
-        write_page(tmp_path / "bundle", root / "workflow/viewer", tmp_path / "page", surface, rule)
-        return tmp_path / "page", schema
-
-    return make
-
-
-@pytest.mark.parametrize("name", SURFACES)
-def test_a_page_is_the_terrain_that_it_was_made_of(page_of, tmp_path, name):
-    page, schema = page_of(SURFACES[name])
-    terrain = finished.terrain_from_page(store.read_bundle(page, schema))
-    x, y = np.random.default_rng(2).uniform(-50, 50, (2, 40))
-    np.testing.assert_array_equal(terrain.heights.at(x, y)[0], SURFACES[name].at(x, y)[0])
-    bundle = store.read_bundle(tmp_path / "bundle", schema)
-    wanted = endless.terrain_from_bundle(bundle, {"kind": "flat"}, RULE)
-    assert terrain.classes is not None and wanted.classes is not None
-    if name == "flat":  # a rule of heights needs the same surface
-        points = np.random.default_rng(3).integers(-60, 60, (2, 200))
-        np.testing.assert_array_equal(terrain.classes.lattice_scores(*points), wanted.classes.lattice_scores(*points))
-    assert terrain.side == wanted.side and len(terrain.objects) == len(wanted.objects)
+    colours = np.array([[[200, 180, 120], [60, 120, 50]]]).repeat(2, 0) / 255
+    image_files.write_png(tmp_path / "m.png", colours)
+    picture = {"kind": "image", "file": str(tmp_path / "m.png"), "width": 40.0, "weight": 9}
+    rule = [*RULE, picture | {"colours": {"sand": "#c8b478", "grass": "#3c7832"}}]
+    write_cover_bundle(tmp_path / "bundle", schema)
+    write_page(tmp_path / "bundle", root / "workflow/viewer", tmp_path / "page", SURFACES["hills"], rule)
+    terrain = finished.terrain_from_page(store.read_bundle(tmp_path / "page", schema))
+    surface = {"kind": "hills", "height": 2 / SIDE, "wavelength": 30 / SIDE, "octaves": 3, "seed": 5}
+    wanted = endless.terrain_from_bundle(store.read_bundle(tmp_path / "bundle", schema), surface, rule)
+    assert terrain.heights == wanted.heights == SURFACES["hills"]
+    points = np.random.default_rng(3).integers(-60, 60, (2, 200))
+    np.testing.assert_array_equal(terrain.classes.lattice_scores(*points), wanted.classes.lattice_scores(*points))
+    sides = terrain.classes.lattice_scores(np.array([-20, 20]), np.array([0, 0]))
+    assert sides.argmax(1).tolist() == [0, 1], "the western half of the picture is sand"
+    assert terrain.side == wanted.side and len(terrain.objects) == len(wanted.objects) == 1
 
 
-def test_a_picture_of_materials_comes_from_the_page(page_of, tmp_path):
-    from PIL import Image
-
-    colours = np.array([[[200, 180, 120], [60, 120, 50]]], np.uint8).repeat(2, 0)
-    Image.fromarray(colours).save(tmp_path / "m.png")
-    file = str(tmp_path / "m.png")
-    rule = [{"kind": "image", "file": file, "width": 40.0, "colours": {"sand": "#c8b478", "grass": "#3c7832"}}]
-    page, schema = page_of(FlatSurface(), rule)
-    terrain = finished.terrain_from_page(store.read_bundle(page, schema))
-    scores = terrain.classes.lattice_scores(np.array([-20, 20]), np.array([0, 0]))
-    assert scores.argmax(1).tolist() == [0, 1]
+@pytest.mark.parametrize("surface", [*SURFACES.values(), make_sphere(10.0, 4.0)], ids=[*SURFACES, "sphere"])
+def test_a_surface_that_was_described_reads_back(tmp_path, surface):
+    entry, pixels = describe_surface(surface)
+    (tmp_path / "heights.bin").write_bytes(pixels)
+    found = finished.read_surface(tmp_path, entry, 4.0)
+    assert vars(found).keys() == vars(surface).keys()
+    for name, value in vars(surface).items():
+        np.testing.assert_array_equal(getattr(found, name), value)
 
 
 @pytest.mark.parametrize(
     "changes, said",
     [
         ({"rows": 10}, "bytes instead of"),
-        ({"rows": -1}, "a size is out of range"),
+        ({"rows": 0}, "a size is out of range"),
+        ({"width": np.inf}, "a size is out of range"),
         ({"rows": "many"}, "make no sense"),
         ({"file": "../heights.bin"}, "does not lie beside it"),
         ({"file": "nowhere.bin"}, "missing"),
+        ({"file": "nan.bin", "sha256": None}, "not finite"),
         ({"sha256": "0" * 64}, "damaged"),
         ({"kind": "hills"}, "make no sense"),
-        ({"kind": "torus"}, "is not one of"),
     ],
 )
-def test_what_is_damaged_is_named(page_of, changes, said):
-    page, schema = page_of(SURFACES["image"])
-    manifest = json.loads((page / "davgswt.json").read_text())
-    manifest["heights"] |= changes
-    (page / "davgswt.json").write_text(json.dumps(manifest))
+def test_a_surface_that_is_damaged_is_named(tmp_path, changes, said):
+    entry, pixels = describe_surface(SURFACES["image"])
+    (tmp_path / "heights.bin").write_bytes(pixels)
+    (tmp_path / "nan.bin").write_bytes(pixels[:-4] + np.float32(np.nan).tobytes())
     with pytest.raises(InputError, match=said):
-        finished.terrain_from_page(store.read_bundle(page, schema))
+        finished.read_surface(tmp_path, entry | changes, 4.0)
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory, root):
+    folder, schema = tmp_path_factory.mktemp("cover") / "b", root / "workflow/schemas/davgswt.schema.json"
+    write_cover_bundle(folder, schema)
+    return store.read_bundle(folder, schema)
+
+
+@pytest.mark.parametrize("surface, corner", [({"kind": "flat"}, (0, 0)), (HILLS, (4000, -7000))], ids=["flat", "hills"])
+def test_it_looks_as_the_terrain_does(bundle, surface, corner):
+    terrain = endless.terrain_from_bundle(bundle, surface)
+    west, south = corner
+    field = finite.collect_cells(terrain, west - 4, south - 4, 9, 9, 0)
+    x, y = (west + 0.5) * SIDE, (south + 0.5) * SIDE
+    ground = float(terrain.heights.at(np.array([x]), np.array([y]))[0][0])
+    eye = np.array([x, y, ground + 2 * SIDE])
+    camera = cameras.pinhole(eye, eye + [0.3, 0.2, -1.0], 96, 96, 40.0)
+    expected = stills.render_view(terrain, camera, bundle.manifest.sky, bundle.manifest.ground_colour)
+    origin = np.array([(west - 4) * SIDE, (south - 4) * SIDE, 0.0])
+    near = cameras.pinhole(eye - origin, eye - origin + [0.3, 0.2, -1.0], 96, 96, 40.0)
+    assert psnr(render(field, near).colour, expected, np.ones((96, 96))) > 35
+    assert np.abs(field.means[:, :2]).max() < 10 * SIDE, "positions count from the corner"
+
+
+def test_every_object_is_there_once(bundle):
+    terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
+    whole = finite.collect_cells(terrain, 0, 0, 6, 6, 1)
+    parts = [finite.collect_cells(terrain, i, j, 3, 3, 1) for i in (0, 3) for j in (0, 3)]
+    assert len(whole) == sum(len(part) for part in parts)
+    i, j, _, _ = finite.list_cells(terrain, 0, 0, 6, 6)
+    assert len(terrain.scatter.instances_in(i, j)) > 0
+
+
+def test_a_wide_area_is_counted_in_slices(bundle, monkeypatch):
+    """The same counts and blocks, while no more cells are known at a time than a slice has."""
+    area, eye = finite.Area(-7, 3, 8, 7), np.array([0.0, 0.0, 2.0])
+    whole = endless.terrain_from_bundle(bundle, HILLS)
+    counts = finite.count_gaussians(whole, finite.list_grid(whole, area, eye))
+    monkeypatch.setattr(finite, "SLICE", 20)
+    monkeypatch.setattr(classes, "SLICE", 20)
+    monkeypatch.setattr(classes, "CACHED", 40)
+    monkeypatch.setattr(scatter, "CACHED", 40)
+    sliced = endless.terrain_from_bundle(bundle, HILLS)
+    np.testing.assert_array_equal(finite.count_cells(sliced, area, eye), counts)
+    assert len(sliced.classes._known) <= 40 and len(sliced.scatter._known) <= 40
+    blocks = finite.list_blocks(sliced, area, eye)
+    assert sum(map(len, blocks)) == len(counts) and len(sliced.scatter._known) <= 40

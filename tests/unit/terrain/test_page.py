@@ -1,15 +1,28 @@
-"""The page folder appears whole or not at all, and nothing but a sound bundle gets into it."""
+"""Page folders: whole or not at all, of sound bundles alone; the front, of which nothing becomes HTML; the story."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.terrain import page
-from dav_gswt.terrain.heights import HeightMap, Hills
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, read_scene_frame, write_scene_frame
+from dav_gswt.images import image_files
+from dav_gswt.photos import colmap_model
+from dav_gswt.photos.taken_photos import TakenPhoto
+from dav_gswt.terrain import page, page_front, page_story
+from dav_gswt.terrain.heights import HeightMap
 from dav_gswt.terrain.page import write_page
+from dav_gswt.terrain.page_front import Front, encode_still, fill_front, front_of_scene, name_of_scene
+from dav_gswt.terrain.page_story import Story, draw_sheet, make_small, spread, tell_story
 from dav_gswt.terrain.sphere import make_sphere
+
+SOURCE = (
+    '<meta content="An endless terrain made from a few photos"><title>Endless terrain</title><!-- modules -->'
+    '<!-- first --><h1 id="name">Endless terrain</h1><p id="line">An endless terrain made from a few photos</p>'
+)
 
 
 @pytest.fixture
@@ -17,7 +30,8 @@ def viewer(tmp_path):
     folder = tmp_path / "viewer"
     folder.mkdir()
     (folder / "index.html").write_text("<html><!-- modules --><!-- first --></html>")
-    (folder / "main.js").write_text("//")
+    (folder / "draw").mkdir()
+    (folder / "draw" / "main.js").write_text("//")
     return folder
 
 
@@ -41,40 +55,25 @@ def names(folder):
 
 
 def test_a_page_is_the_viewer_the_manifest_and_the_chunks_it_names(tmp_path, viewer, bundle):
-    write_page(bundle, viewer, tmp_path / "terrain" / "page")
-    assert names(tmp_path / "terrain") == [
-        f"page/{n}" for n in ("chunks/a.bin", "davgswt.json", "index.html", "main.js")
-    ]
+    (tmp_path / "terrain" / ".page.part").mkdir(parents=True)  # what a killed run left behind
+    for _ in range(2):
+        write_page(bundle, viewer, tmp_path / "terrain" / "page")
+        assert names(tmp_path / "terrain") == [
+            f"page/{n}" for n in ("chunks/a.bin", "davgswt.json", "draw/main.js", "index.html")
+        ]
+        (tmp_path / "terrain/page/old.js").write_text("gone soon")
     assert (tmp_path / "terrain/page/chunks/a.bin").read_bytes() == b"1234"
+    assert 'href="draw/main.js"' in (tmp_path / "terrain/page/index.html").read_text()
 
 
-def test_a_new_page_takes_the_place_of_the_old_one(tmp_path, viewer, bundle):
-    out = tmp_path / "page"
-    write_page(bundle, viewer, out)
-    (out / "old.js").write_text("gone soon")
-    write_page(bundle, viewer, out)
-    assert "old.js" not in names(out)
-
-
-def test_what_a_killed_run_left_behind_is_cleared(tmp_path, viewer, bundle):
-    (tmp_path / ".page.part").mkdir()
-    (tmp_path / ".page.part" / "half").write_text("")
-    write_page(bundle, viewer, tmp_path / "page")
-    assert "half" not in names(tmp_path / "page") and not (tmp_path / ".page.part").exists()
-
-
-def test_a_failure_in_the_middle_leaves_the_old_page_and_nothing_half_made(tmp_path, viewer, bundle, monkeypatch):
-    out = tmp_path / "page"
-    write_page(bundle, viewer, out)
-    before = names(tmp_path)
-
-    def full(source, target):
-        raise OSError(28, "No space left on device", str(target))
-
-    monkeypatch.setattr(page, "_copy_file", full)
-    with pytest.raises(OSError, match="No space left"):
-        write_page(bundle, viewer, out)
-    assert names(tmp_path) == before
+def test_the_front_of_a_scene_is_beside_its_page(root, tmp_path, viewer, bundle):
+    (viewer / "index.html").write_text((root / "workflow/viewer/index.html").read_text())
+    story = Story({"grade": None, "rounds": [], "photos": []}, b"sheet")
+    write_page(bundle, viewer, tmp_path / "page", front=Front("Desert", "A line", b"still", story))
+    assert (tmp_path / "page/first.jpg").read_bytes() == b"still"
+    assert (tmp_path / "page/photos.jpg").read_bytes() == b"sheet"
+    assert json.loads((tmp_path / "page/story.json").read_text()) == story.value
+    assert json.loads((tmp_path / "page/front.json").read_text())["name"] == "Desert"
 
 
 @pytest.mark.parametrize(
@@ -86,59 +85,35 @@ def test_a_failure_in_the_middle_leaves_the_old_page_and_nothing_half_made(tmp_p
         pytest.param({"file": "/etc/hostname", "bytes": 4}, "lies outside", id="absolute"),
         pytest.param({"file": "", "bytes": 4}, "lies outside", id="no name"),
         pytest.param({"bytes": 4}, "incomplete tile table", id="no entry"),
+        pytest.param(None, "not a bundle of format 'davgswt', version 3", id="another version"),
     ],
 )
 def test_an_unsound_chunk_is_refused_by_name(tmp_path, viewer, bundle, chunk, message):
     (tmp_path / "secret").write_bytes(b"1234")
-    rewrite(bundle, chunk)
+    rewrite(bundle, chunk, 3 if chunk else 1)
     with pytest.raises(InputError, match=message):
         write_page(bundle, viewer, tmp_path / "page")
     assert not (tmp_path / "page").exists()
 
 
-def test_another_version_is_refused(tmp_path, viewer, bundle):
-    rewrite(bundle, {"file": "chunks/a.bin", "bytes": 4}, version=1)
-    with pytest.raises(InputError, match=r"davgswt\.json: not a bundle of format 'davgswt', version 3"):
-        write_page(bundle, viewer, tmp_path / "page")
-
-
-def test_the_viewer_is_the_folder_of_index_html(tmp_path):
+def test_the_viewer_is_the_folder_of_index_html(tmp_path, bundle):
     files = ["data/a.js", "index.html", "main.js"]
     assert page.find_viewer([str(tmp_path / name) for name in files]) == tmp_path
     with pytest.raises(InputError, match=r"no index\.html"):
         page.find_viewer(["data/a.js"])
-
-
-def test_modules_in_folders_are_copied_as_they_lie(tmp_path, viewer, bundle):
-    (viewer / "draw").mkdir()
-    (viewer / "draw" / "sky.js").write_text("export {}")
-    write_page(bundle, viewer, tmp_path / "page")
-    assert (tmp_path / "page" / "draw" / "sky.js").read_text() == "export {}"
-
-
-def test_a_viewer_without_its_page_is_refused(tmp_path, viewer, bundle):
-    (viewer / "index.html").unlink()
     with pytest.raises(InputError, match="no viewer here"):
-        write_page(bundle, viewer, tmp_path / "page")
+        write_page(bundle, tmp_path, tmp_path / "page")
 
 
 def surface_of(folder):
     return json.loads((folder / "davgswt.json").read_text())["heights"]
 
 
-def test_the_page_knows_the_surface_and_the_bundle_does_not(tmp_path, viewer, bundle):
-    write_page(bundle, viewer, tmp_path / "flat")
-    write_page(bundle, viewer, tmp_path / "hilly", Hills(0.5, 3.0, 2, 9))
-    assert surface_of(tmp_path / "flat") == {"kind": "flat"}
-    hills = {"kind": "hills", "height": 0.5, "wavelength": 3.0, "octaves": 2, "salt": 9}
-    assert surface_of(tmp_path / "hilly") == hills
-    assert "heights" not in json.loads((bundle / "davgswt.json").read_text())
-
-
-def test_the_page_of_a_planet_knows_its_radius_and_cells_and_takes_no_objects(tmp_path, viewer, bundle):
+def test_the_page_of_a_planet_takes_no_objects(tmp_path, viewer, bundle):
     write_page(bundle, viewer, tmp_path / "round", make_sphere(10.0, 2.0))
     assert surface_of(tmp_path / "round") == {"kind": "sphere", "radius": 20.0, "cells": 14}
     manifest = json.loads((bundle / "davgswt.json").read_text())
+    assert "heights" not in manifest
     (bundle / "davgswt.json").write_text(json.dumps(manifest | {"objects": [{"chunks": []}]}))
     with pytest.raises(InputError, match="materials: one"):
         write_page(bundle, viewer, tmp_path / "page", make_sphere(10.0, 2.0))
@@ -148,7 +123,128 @@ def test_the_page_of_a_planet_knows_its_radius_and_cells_and_takes_no_objects(tm
 def test_a_height_map_comes_with_its_pixels(tmp_path, viewer, bundle):
     pixels = np.arange(6, dtype=np.float32).reshape(2, 3)
     write_page(bundle, viewer, tmp_path / "page", HeightMap(pixels, 7.5, "clamp"))
+    assert (tmp_path / "page/heights.bin").read_bytes() == pixels.astype("<f4").tobytes()
     entry = surface_of(tmp_path / "page")
-    stored = np.frombuffer((tmp_path / "page" / entry["file"]).read_bytes(), "<f4").reshape(2, 3)
-    assert (stored == pixels).all() and entry["bytes"] == 24
-    assert (entry["rows"], entry["columns"], entry["width"], entry["beyond"]) == (2, 3, 7.5, "clamp")
+    assert entry.pop("sha256") and entry == {
+        "kind": "image", "file": "heights.bin", "rows": 2, "columns": 3, "width": 7.5, "beyond": "clamp", "bytes": 24,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("scene, name", [("desert", "Desert"), ("my_own-meadow", "My own meadow"), ("_", "")])
+def test_a_key_becomes_a_title(scene, name):
+    assert name_of_scene(scene) == name
+
+
+def test_name_line_still_and_modules_are_in_the_page_as_text():
+    filled = fill_front(SOURCE, Front("<script>", '"&', b""), ["main.js", 'ui/a".js'])
+    name, line = "&lt;script&gt;", "&quot;&amp;"
+    assert f"<title>{name} · {line}</title>" in filled and f'<h1 id="name">{name}</h1>' in filled
+    assert f'content="{name}: {line}"' in filled and f'<p id="line">{line}</p>' in filled
+    assert '<img id="first" src="first.jpg" alt="">' in filled
+    assert filled.count("modulepreload") == 2 and "ui/a&quot;.js" in filled and "<!--" not in filled
+
+
+def test_without_a_front_the_page_keeps_its_own_texts_and_asks_for_no_still():
+    filled = fill_front(SOURCE, None, [])
+    assert "first.jpg" not in filled and "<title>Endless terrain</title>" in filled
+
+
+def test_the_verdict_is_what_tests_said():
+    for grade, values, text in (
+        (None, [None], ""),
+        ("good", [], "The photos fit together well."),
+        (None, [20.0, 31.88, None], "Photos that were not used are predicted to 31.9 dB."),
+        ("doubtful", [], "It is doubtful that the photos fit together."),
+        ("good", [5], "The photos fit together well. Photos that were not used are predicted to 5.0 dB."),
+    ):
+        story = Story({"grade": grade, "rounds": [{"psnr": value} for value in values]}, b"")
+        assert Front("Desert", "A line", b"", story).to_dict()["verdict"] == text
+
+
+@pytest.mark.parametrize("source", [SOURCE.replace("<!-- first -->", ""), SOURCE + SOURCE])
+def test_a_viewer_without_the_places_is_refused(source):
+    with pytest.raises(InputError, match="must hold"):
+        fill_front(source, None, [])
+
+
+def test_a_still_is_small_and_the_same_each_time(tmp_path):
+    image = np.random.default_rng(0).random((300, 1600, 3)).astype(np.float32)
+    image_files.write_png(tmp_path / "noise.png", image)
+    image_files.write_png(tmp_path / "smooth.png", np.tile(np.linspace(0, 1, 640)[None, :, None], (360, 1, 3)))
+    fronts = [front_of_scene("desert", None, tmp_path / "smooth.png") for _ in range(2)]
+    assert fronts[0] == fronts[1] and fronts[0].line.endswith("made from a Gaussian field")
+    assert front_of_scene("a", Story({"photos": [1]}, b""), tmp_path / "smooth.png").line.endswith("made from 1 photo")
+    still = fronts[0].still
+    assert len(still) < page_front.STILL_BYTES
+    (tmp_path / "still.jpg").write_bytes(still)
+    assert image_files.read_size(tmp_path / "still.jpg") == (640, 360)
+    seen = image_files.read_photo(tmp_path / "still.jpg")
+    assert abs(seen - image_files.read_photo(tmp_path / "smooth.png")).mean() < 0.01
+    (tmp_path / "noise.jpg").write_bytes(encode_still(tmp_path / "noise.png"))
+    assert image_files.read_size(tmp_path / "noise.jpg") == (1280, 240)
+
+
+@pytest.mark.parametrize("count, most, found", [(0, 5, []), (3, 5, [0, 1, 2]), (9, 3, [0, 4, 8])])
+def test_photos_that_are_shown_are_spread_over_all(count, most, found):
+    assert spread(count, most) == found
+
+
+def test_a_sheet_holds_each_photo_in_the_middle_of_its_square():
+    wide, tall = np.full((60, 240, 3), 1, np.float32), np.full((40, 20, 3), 0.5, np.float32)
+    sheet = draw_sheet([make_small(photo) for photo in [wide] * 8 + [tall]])
+    thumb = page_story.THUMB
+    assert sheet.shape == (2 * thumb, 8 * thumb, 3)
+    assert (sheet[thumb // 2, :thumb] == 1).all() and (sheet[:40, :thumb] == 0).all()
+    below = sheet[thumb:, :thumb]
+    assert (below[40:80, 50:70] == 0.5).all() and below.sum() == pytest.approx(0.5 * 40 * 20 * 3)
+
+
+@pytest.fixture
+def made(tmp_path, monkeypatch):
+    """What a round of two photos at the start and one captured leaves."""
+    images = tmp_path / "images"
+    images.mkdir()
+    for name in ("a.png", "b.png", "c.png"):
+        image_files.write_png(images / name, np.full((30, 40, 3), 0.5))
+    eyes = {"a.png": (1.0, 2.0, 3.0), "b.png": (-1.0, 0.0, 3.0), "c.png": (0.0, -4.0, 5.0)}
+    taken = [
+        TakenPhoto(name, images / name, cameras.pinhole(np.array(eye), np.zeros(3), 40, 30, 60.0), int(name == "c.png"))
+        for name, eye in eyes.items()
+    ]
+    monkeypatch.setattr(page_story, "list_photos", lambda given: taken)
+    write_scene_frame(
+        tmp_path / "ground.json",
+        SceneFrame("synthetic", "metre", 3.0, Square(-2.0, -2.0, 4.0), Extent(-5.0, -5.0, 5.0, 5.0), images=3),
+    )
+    for number, psnr in enumerate((27.123, None)):
+        (tmp_path / f"{number}.json").write_text(json.dumps({"psnr": psnr}))
+    metrics = [tmp_path / "0.json", tmp_path / "1.json"]
+    return {"views": "views.json", "frame": tmp_path / "ground.json", "metrics": metrics}
+
+
+def test_places_rounds_and_pictures_are_told(made):
+    story = tell_story(made)
+    assert story.value["rounds"] == [{"photos": 2, "psnr": 27.12}, {"photos": 1, "psnr": None}]
+    assert [photo["at"] for photo in story.value["photos"]] == [[1, 2, 3], [-1, 0, 3], [0, -4, 5]]
+    assert [photo["picture"] for photo in story.value["photos"]] == [0, 1, 2]
+    assert story.value["photos"][1]["look"][0] > 0, "it looks at the middle, which lies to the east"
+    assert story.value["grade"] is None and story.value["half"] == 2 and story.sheet[:3] == b"\xff\xd8\xff"
+    assert story == tell_story(made) and tell_story({"views": None}) is None, "a finished field has none"
+
+
+def test_of_real_photos_the_psnr_after_their_exposure_is_fitted_is_told(made):
+    write_scene_frame(made["frame"], replace(read_scene_frame(made["frame"]), kind="photos"))
+    made["metrics"][0].write_text(json.dumps({"psnr": 20.0, "psnr_colour_corrected": 27.5}))
+    assert [each["psnr"] for each in tell_story(made).value["rounds"]] == [27.5, None]
+
+
+def test_photos_that_contradicted_the_others_are_not_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(colmap_model, "read_colmap_model", lambda path: f"cameras of {path}")
+    asked = []
+    monkeypatch.setattr(page_story, "list_taken_photos", lambda *given: asked.extend(given) or [])
+    (tmp_path / "views.json").write_text(json.dumps({"start": ["a.png"], "test": [], "pool": []}))
+    report = {"taken": False, "views": [{"view": "d.png"}]}
+    (tmp_path / "fit.json").write_text(json.dumps({"new_views": report}))
+    given = {"views": tmp_path / "views.json", "images": "images", "model": "sparse", "captures": ["capture"]}
+    page_story.list_photos(given | {"fits": [tmp_path / "fit.json"]})
+    assert asked == ["images", "cameras of sparse", ("a.png",), ["capture"], {"d.png"}]

@@ -11,11 +11,11 @@ from scipy.spatial import cKDTree
 
 from dav_gswt.bundle.land_cover import ClassesEntry, ObjectOrders, ScatterEntry
 from dav_gswt.files import parse_record
-from dav_gswt.terrain.classes import JITTER, MAX_OCTAVES, Classes
-from dav_gswt.terrain.scatter import FORM, PLACE, Scatter
+from dav_gswt.terrain.classes import Classes
+from dav_gswt.terrain.scatter import Scatter
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "scatter.json").read_text())["terrains"]
-WINDOW = 40  # tiles
+WINDOW = 24  # tiles
 
 
 def thing(radius, material=0, probability=0.5):
@@ -59,10 +59,6 @@ def test_instances_are_those_shared_with_the_page(terrain):
             np.testing.assert_allclose(getattr(found, name), [each[name] for each in expected], rtol=0, atol=1e-12)
 
 
-def test_no_axis_of_the_hash_serves_classes_and_scatter():
-    assert JITTER + 2 * MAX_OCTAVES <= PLACE < FORM
-
-
 def test_footprints_never_overlap(covered):
     found = window_of(covered)
     radius = np.array([each.radius for each in covered.objects])[found.number] * found.size
@@ -72,43 +68,14 @@ def test_footprints_never_overlap(covered):
     assert len(pairs) > 100 and gap.min() >= 0
 
 
-def test_every_thing_stands_on_its_material(covered):
-    found = window_of(covered)
-    scores = covered.classes.scores_at(found.i, found.j, found.u, found.v)
-    assert (scores.argmax(1) == [covered.objects[k].material for k in found.number]).all()
-
-
-def test_nothing_reaches_into_another_material(covered):
+@pytest.mark.parametrize("east, north", [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
+def test_a_footprint_lies_on_its_material(covered, east, north):
     found = window_of(covered)
     radius = np.array([each.radius for each in covered.objects])[found.number] * found.size / SIDE
-    u = found.u + radius
-    i, u = found.i + np.floor(u).astype(int), u - np.floor(u)
-    scores = covered.classes.scores_at(i, found.j, u, found.v)
+    x, y = found.i + found.u + east * radius, found.j + found.v + north * radius
+    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+    scores = covered.classes.scores_at(i, j, x - i, y - j)
     assert (scores.argmax(1) == [covered.objects[k].material for k in found.number]).all()
-
-
-@pytest.mark.parametrize("period", [SIDE / 4, SIDE], ids=["scatter grid", "tiles"])
-def test_places_show_no_lattice(plain, period):
-    # without order the structure factor is exponential with mean 1; that of a lattice is the number of places
-    places = places_of(window_of(plain, size=60))
-    for way in ((1, 0), (0, 1), (1, 1), (1, -1), (2, 0), (0, 2)):
-        factor = abs(np.exp(2j * np.pi / period * (places @ np.array(way))).sum()) ** 2 / len(places)
-        assert factor < 10
-
-
-def test_pairs_are_as_frequent_along_the_grid_as_across_it(plain):
-    places = places_of(window_of(plain, size=60))
-    pairs = cKDTree(places).query_pairs(2 * SIDE, output_type="ndarray")
-    x, y = np.abs(places[pairs[:, 0]] - places[pairs[:, 1]]).T
-    folded = np.arctan2(np.minimum(x, y), np.maximum(x, y))  # 0: along the grid, pi / 4: across
-    count, _ = np.histogram(folded, 4, (0, np.pi / 4))
-    assert np.abs(count / count.mean() - 1).max() < 0.05
-
-
-def test_turns_and_sizes_fill_their_ranges(plain):
-    found = window_of(plain)
-    assert np.abs(found.turn).max() <= 15.0 and found.turn.std() == pytest.approx(15 / 3**0.5, rel=0.05)
-    assert np.abs(found.size - 1).max() <= 0.15 and found.size.mean() == pytest.approx(1, abs=0.01)
 
 
 @pytest.mark.parametrize("scatter", ["plain", "covered"])
@@ -128,10 +95,6 @@ def test_something_wider_than_a_tile_keeps_its_distance():
     assert len(places) > 5 and len(cKDTree(places).query_pairs(5 * SIDE)) == 0
 
 
-def test_no_cells_have_no_things(plain):
-    assert len(plain.instances_in(np.zeros(0, np.int64), np.zeros(0, np.int64))) == 0
-
-
 def test_an_object_of_probability_0_is_nowhere(plain):
     none = replace(plain, objects=[thing(0.3, 0, 0.0)])
-    assert len(window_of(none, size=10)) == 0
+    assert len(window_of(none, size=10)) == len(window_of(plain, size=0)) == 0

@@ -15,13 +15,6 @@ from dav_gswt.terrain.sphere import frame_at, make_sphere
 from dav_gswt.terrain.sphere_placement import place_on_sphere
 
 PINK = Sky(MAGENTA, MAGENTA)
-SIDEWAYS = {
-    "corner": (1, 1, 1),
-    "turned edge": (1, 0.2, 1),
-    "edge": (1, 1, 0.2),
-    "face": (1, 0.1, 0.2),
-    "pole": (0, 0, 1),
-}
 
 
 @pytest.fixture(scope="module")
@@ -40,27 +33,19 @@ def through(picture):
     return np.clip(1 - picture[..., 1] / 0.5, 0, 1)
 
 
-@pytest.mark.parametrize("radius", [8.0, 300.0, 1e6])
-@pytest.mark.parametrize("point", SIDEWAYS.values(), ids=SIDEWAYS)
-def test_the_ground_has_no_holes(tiles, point, radius):
+@pytest.mark.parametrize(
+    "radius, point, height, pitch",
+    [
+        pytest.param(8.0, (1, 1, 1), 6.0, -89.0, id="corner"),
+        pytest.param(300.0, (1, 0.2, 1), 1.0, -60.0, id="turned edge"),
+        pytest.param(8.0, (1, 1, 0.2), 1.0, -60.0, id="edge"),
+        pytest.param(1e6, (0, 0, 1), 1.0, -60.0, id="pole"),
+    ],
+)
+def test_the_ground_has_no_holes(tiles, radius, point, height, pitch):
     planet = replace(tiles, heights=make_sphere(radius, SIDE))
-    for height, pitch in ((1.0, -60.0), (6.0, -89.0)):
-        picture = stills.render_view(planet, camera_over(planet, point, height, pitch), PINK, MAGENTA)
-        assert (
-            through(picture).max() < 0.1
-        )  # of opaque discs whose deviation is 0.7 of their spacing, stretched to 1.26
-
-
-def test_from_an_orbit_the_planet_is_round_and_whole(tiles):
-    planet = replace(tiles, heights=make_sphere(8.0, SIDE))
-    camera = camera_over(planet, (1, 1, 1), 80.0, -89.99)
-    picture = stills.render_view(planet, camera, PINK, MAGENTA)
-    rays = camera.rays()[1]
-    way = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
-    off = np.linalg.norm(np.cross(way, camera.centre), axis=-1)  # distance of rays from the planet's middle
-    radius = planet.heights.radius
-    assert through(picture)[off < 0.97 * radius].max() < 0.1
-    assert through(picture)[off > 1.15 * radius].min() > 0.9
+    picture = stills.render_view(planet, camera_over(planet, point, height, pitch), PINK, MAGENTA)
+    assert through(picture).max() < 0.1  # opaque discs' deviation is 0.7 of their spacing, stretched to 1.26
 
 
 def test_a_large_sphere_is_the_plane(tiles):
@@ -81,33 +66,25 @@ def test_a_large_sphere_is_the_plane(tiles):
     np.testing.assert_allclose(first, second, atol=1e-3)
 
 
-def test_far_out_the_sky_is_that_of_the_plane(tiles):
-    ball = make_sphere(1e7, SIDE)
-    planet, eye = replace(tiles, heights=ball), np.array([0.0, 0.0, ball.radius + 2.0])
-    way = np.random.default_rng(2).normal(size=(50, 3))
-    round_, flat = (
-        made.colours_along(way)
-        for made in (
-            mapping_of(planet).make_backdrop(eye, SKY, [0.4, 0.3, 0.2]),
-            Backdrop.for_eye(tiles, np.array([0.0, 0.0, 2.0]), SKY, [0.4, 0.3, 0.2]),
-        )
-    )
-    # the horizon lies 3e-4 lower
-    np.testing.assert_allclose(round_, flat, atol=0.02)
-
-
-@pytest.mark.parametrize("height", [1e-3, 1.0, 1e3, 1e9])
-def test_the_backdrop_is_finite_and_dark_far_away(tiles, height):
-    planet = replace(tiles, heights=make_sphere(8.0, SIDE))
+def backdrop_on(terrain, radius, height):
+    planet = replace(terrain, heights=make_sphere(radius, SIDE))
     eye = np.array([0.0, 0.0, planet.heights.radius + height])
-    colours = (
-        mapping_of(planet)
-        .make_backdrop(eye, SKY, [0.4, 0.3, 0.2])
-        .colours_along(np.random.default_rng(1).normal(size=(200, 3)))
-    )
+    return mapping_of(planet).make_backdrop(eye, SKY, [0.4, 0.3, 0.2])
+
+
+def test_far_out_the_sky_is_that_of_the_plane(tiles):
+    way = np.random.default_rng(2).normal(size=(50, 3))
+    flat = Backdrop.for_eye(tiles, np.array([0.0, 0.0, 2.0]), SKY, [0.4, 0.3, 0.2])
+    # the horizon lies 3e-4 lower
+    np.testing.assert_allclose(backdrop_on(tiles, 1e7, 2.0).colours_along(way), flat.colours_along(way), atol=0.02)
+
+
+@pytest.mark.parametrize("height", [1e-3, 1.0, 1e9])
+def test_the_backdrop_is_finite_and_dark_far_away(tiles, height):
+    backdrop = backdrop_on(tiles, 8.0, height)
+    colours = backdrop.colours_along(np.random.default_rng(1).normal(size=(200, 3)))
     assert np.isfinite(colours).all() and colours.min() >= 0 and colours.max() <= 1
-    up = mapping_of(planet).make_backdrop(eye, SKY, [0.4, 0.3, 0.2]).colours_along(np.array([[0.0, 0.0, 1.0]]))
-    assert (up.max() < 1e-3) == (height > 100)
+    assert (backdrop.colours_along(np.array([[0.0, 0.0, 1.0]])).max() < 1e-3) == (height > 100)
 
 
 def test_the_last_tiles_end_at_the_horizon_or_before_it():
@@ -118,7 +95,7 @@ def test_the_last_tiles_end_at_the_horizon_or_before_it():
 
 
 def test_the_stills_of_a_planet_are_a_walker_a_hill_and_an_orbit(tiles):
-    planet = replace(tiles, heights=make_sphere(8.0, SIDE))
+    planet = replace(tiles, heights=make_sphere(4.0, SIDE))
     assert [shot.name for shot in stills.list_shots(planet, 0.5)] == [shot.name for shot in stills.SHOTS]
     assert stills.list_shots(tiles, 0.5) == list(stills.SHOTS)
     manifest = manifest_of(0.5, MAGENTA)

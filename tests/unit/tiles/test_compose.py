@@ -1,18 +1,19 @@
-"""Tiles as Gaussians: no holes, no doubles, no seam at a border, equal heights."""
+"""Tiles as Gaussians: no holes, no doubles, no seam at a border, equal heights; levels merged from their cells."""
 
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures import tile_sets
+from fixtures.tile_sets import splats
 
 from dav_gswt.errors import InputError
-from dav_gswt.tiles import build, compose, store
-from dav_gswt.tiles.layout import CENTRE, edge_colours
-
-
-def cells(field, spacing):
-    return np.floor(field.means[:, :2] / np.float32(spacing)).astype(int)
+from dav_gswt.field import concatenate_fields
+from dav_gswt.reconstruction import discs, underlay
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.tiles import coarse_levels, compose, store
+from dav_gswt.tiles.layout import CENTRE
 
 
 def test_every_tile_holds_exactly_one_disc_a_cell_at_every_level(tiles):
@@ -20,13 +21,8 @@ def test_every_tile_holds_exactly_one_disc_a_cell_at_every_level(tiles):
         spacing = tiles.spacing * 2**level
         n = round(tiles.side / spacing)
         for field in fields:
-            x, y = cells(field[field.ground], spacing).T
+            x, y = np.floor(field[field.ground].means[:, :2] / np.float32(spacing)).astype(int).T
             np.testing.assert_array_equal(np.bincount(y * n + x, minlength=n * n), 1)
-
-
-def test_centres_lie_inside_the_tile(tiles):
-    for fields in tiles.fields:
-        for field in fields:
             assert (field.means[:, :2] >= 0).all() and (field.means[:, :2] <= np.float32(tiles.side)).all()
 
 
@@ -46,22 +42,6 @@ def test_tiles_with_the_same_colour_on_a_side_hold_the_same_gaussians_along_it(t
                 # sin^2(pi 4 / 48) = 0.067 of it one block inside
                 np.testing.assert_array_equal(other.means[:, :2], strips[0].means[:, :2])
                 np.testing.assert_array_equal(other.sh, strips[0].sh)
-
-
-def test_a_strip_goes_on_over_the_border_as_one_piece_of_the_exemplar(tiles, sample_ground):
-    """The two halves of a vertical strip, seen in two tiles, are neighbours in the exemplar."""
-    n, columns = tiles.labels.shape[1], sample_ground.exemplar.cells
-    left, right = 2, 8  # E = 1 of the one is W = 1 of the other
-    assert edge_colours(left)[2] == edge_colours(right)[0] == 1
-    rows = np.arange(n)
-    source = [
-        tiles.shifts[tile][tiles.labels[tile][rows, x]] + np.stack([np.full(n, x), rows], 1)
-        for tile, x in ((left, n - 1), (right, 0))
-    ]
-    step = source[1] - source[0]
-    together = (step == [1, 0]).all(1)
-    # only where the seam between strip and corner patch crosses the border do the pieces differ
-    assert together.mean() > 0.9 and (source[0] < columns).all()
 
 
 def test_the_centre_reaches_neither_the_border_nor_is_it_missing(tiles):
@@ -109,56 +89,10 @@ def test_things_follow_the_cell_under_their_centre(sample_ground):
     np.testing.assert_allclose(order(found), order(expected), atol=1e-6)  # float32 positions near 10
 
 
-def test_the_same_seed_gives_the_same_tiles(tiles, sample_ground):
-    options = build.TilingOptions(share=0.5, strip=0.17, candidates=40, tries=2)
-    again = build.cut_tiles(
-        sample_ground.levels,
-        sample_ground.exemplar,
-        sample_ground.colour,
-        np.zeros((96, 96)),
-        options,
-        np.random.default_rng(2),
-    )
-    np.testing.assert_array_equal(again.labels, tiles.labels)
-    for a, b in zip(again.fields[0], tiles.fields[0], strict=True):
-        np.testing.assert_array_equal(a.means, b.means)
-
-
-def test_variants_are_other_centres_in_the_same_frames(sample_ground):
-    options = build.TilingOptions(share=0.5, strip=0.17, variants=2, candidates=40, tries=1)
-    two = build.cut_tiles(
-        sample_ground.levels,
-        sample_ground.exemplar,
-        sample_ground.colour,
-        np.zeros((96, 96)),
-        options,
-        np.random.default_rng(2),
-    )
-    assert len(two.labels) == 32 and two.variants == 2
-    frame = two.labels[:, :4]
-    np.testing.assert_array_equal(frame[:16], frame[16:])
-    assert (two.shifts[:16, CENTRE] != two.shifts[16:, CENTRE]).any(1).all()
-
-
-def test_uncertain_ground_is_not_used_where_certain_ground_is_available(sample_ground):
-    uncertainty = np.zeros((96, 96))
-    uncertainty[:, :30] = 1
-    options = build.TilingOptions(share=0.5, strip=0.17, candidates=400, tries=1)
-    found = build.cut_tiles(
-        sample_ground.levels,
-        sample_ground.exemplar,
-        sample_ground.colour,
-        uncertainty,
-        options,
-        np.random.default_rng(2),
-    )
-    # a patch may be up to UNCERTAINTY_MARGIN more uncertain than the least uncertain one, which is 0
-    assert found.uncertainty.max() < 0.1
-
-
-def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, tmp_path):
-    for name in ("a", "b"):
-        store.write_tiles(tiles, tmp_path / name / "tiles", tmp_path / name / "seams.json", {"from": "a test"})
+def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, sample_ground, tmp_path):
+    again = tile_sets.tiles_of(sample_ground)
+    for name, made in (("a", tiles), ("b", again)):
+        store.write_tiles(made, tmp_path / name / "tiles", tmp_path / name / "seams.json", {"from": "a test"})
     back = store.read_tiles(tmp_path / "a" / "tiles", tmp_path / "a" / "seams.json")
     np.testing.assert_array_equal(back.labels, tiles.labels)
     np.testing.assert_array_equal(back.shifts, tiles.shifts)
@@ -168,32 +102,90 @@ def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, tmp_path
         assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes(), path.name
 
 
-def test_a_set_with_a_missing_tile_names_it(tiles, tmp_path):
-    store.write_tiles(tiles, tmp_path / "tiles", tmp_path / "seams.json", {})
-    (tmp_path / "tiles" / "lod1_tile_07.ply").unlink()
-    with pytest.raises(InputError, match="lod1_tile_07.ply"):
-        store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
-
-
 @pytest.mark.parametrize(
-    "changes", [{"levels": "x"}, {"levels": -1}, {"tiles": 1.5}, {"side": None}, {"side": -1}, {"seams": []}]
+    "changes", [{"levels": "x"}, {"tiles": 0}, {"side": None}, {"side": -1}, {"seams": []}, {"materials": 3}]
 )
-def test_a_table_that_is_none_is_refused_by_name(tiles, tmp_path, changes):
-    store.write_tiles(tiles, tmp_path / "tiles", tmp_path / "seams.json", {})
-    values = json.loads((tmp_path / "seams.json").read_text())
+def test_a_set_that_is_none_is_refused_by_name(tiles, tmp_path, changes):
+    store.write_tiles(replace(tiles, fields=[]), tmp_path / "tiles", tmp_path / "seams.json", {})
+    values = json.loads((tmp_path / "seams.json").read_text()) | {"levels": 1}
     (tmp_path / "seams.json").write_text(json.dumps(values | changes))
     with pytest.raises(InputError, match="seams.json: not the table of a tile set"):
+        store.read_material_tiles(tmp_path / "tiles", tmp_path / "seams.json")
+    (tmp_path / "seams.json").write_text(json.dumps(values))
+    with pytest.raises(InputError, match="lod0_tile_00.ply"):
         store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
 
 
-def test_a_level_from_elsewhere_is_refused(sample_ground):
-    away = [replace(f, means=f.means + np.float32(1000)) for f in sample_ground.levels]
-    with pytest.raises(InputError, match="ground.json"):
-        build.cut_tiles(
-            [sample_ground.levels[0], *away[1:]],
-            sample_ground.exemplar,
-            sample_ground.colour,
-            np.zeros((96, 96)),
-            build.TilingOptions(tries=1, candidates=5),
-            np.random.default_rng(0),
-        )
+def test_tiles_of_another_table_or_with_damaged_labels_are_refused(tiles, tmp_path):
+    store.write_tiles(replace(tiles, fields=tiles.fields[-1:]), tmp_path / "tiles", tmp_path / "seams.json", {})
+    (tmp_path / "tiles/labels.npz").write_bytes(b"PK")
+    with pytest.raises(InputError, match="labels.npz: not readable"):
+        store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
+    values = json.loads((tmp_path / "seams.json").read_text())
+    (tmp_path / "seams.json").write_text(json.dumps(values | {"counts": []}))
+    with pytest.raises(InputError, match="are not those of"):
+        store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
+
+
+CELLS, SPACING = 16, 0.25
+
+
+@pytest.fixture
+def tile():
+    """A slope with random colours, an underlay and things, in no order."""
+    rng = np.random.default_rng(3)
+    x, y = np.meshgrid((np.arange(CELLS) + 0.5) * SPACING, (np.arange(CELLS) + 0.5) * SPACING)
+    grid = Ground(0.0, 0.0, SPACING, 0, 0, CELLS, 0.2 * x - 0.1 * y, np.ones((CELLS, CELLS), bool))
+    layer = discs.make_ground_discs(grid, rng.uniform(0.2, 0.8, (CELLS**2, 3)))
+    layer = replace(layer, uncertainty=rng.random(CELLS**2).astype(np.float32))
+    things = splats(rng.random((200, 3)) * CELLS * SPACING, rng.random((200, 3)), [0.02, 0.02, 0.05], False)
+    whole = concatenate_fields([layer, underlay.make_underlay(grid, layer), things])
+    return whole[rng.permutation(len(whole))]
+
+
+def test_four_discs_become_one_of_their_means(tile):
+    half = coarse_levels.merge_cells(tile, CELLS, SPACING)
+    flat, fine = half[half.ground], tile[tile.ground]
+    assert len(flat) == CELLS**2 // 4
+    for disc in (0, 9, 37):
+        x, y = flat.means[disc, :2]
+        under = (np.abs(fine.means[:, :2] - [x, y]) < SPACING).all(1)
+        assert under.sum() == 4
+        for values in (lambda f: f.base_colours, lambda f: f.means, lambda f: f.uncertainty):
+            np.testing.assert_allclose(values(flat)[disc], values(fine)[under].mean(0), atol=1e-5)
+        sizes = fine.log_scales[under, :2].mean()
+        np.testing.assert_allclose(flat.log_scales[disc, :2], sizes + np.log(2), atol=1e-5)
+
+
+def test_the_underlay_is_renewed_and_nothing_else_is_taken_for_it(tile):
+    assert coarse_levels.find_underlay(tile, SPACING).sum() == CELLS**2 // 4
+    half = coarse_levels.merge_cells(tile, CELLS, SPACING)
+    assert coarse_levels.find_underlay(half, 2 * SPACING).sum() == CELLS**2 // 16
+    bare = coarse_levels.merge_cells(tile[~coarse_levels.find_underlay(tile, SPACING)], CELLS, SPACING)
+    assert not coarse_levels.find_underlay(bare, 2 * SPACING).any() and bare.ground.sum() == half.ground.sum()
+
+
+def test_a_cell_without_a_disc_stays_empty(tile):
+    inside = (tile.means[:, :2] < 2 * SPACING).all(1) & tile.ground
+    half = coarse_levels.merge_cells(tile[~inside], CELLS, SPACING)
+    assert half.ground.sum() == CELLS**2 // 4 - 1 and np.isfinite(half.means).all()
+
+
+@pytest.mark.parametrize("cells", [7, 2])
+def test_cells_that_do_not_halve_are_refused(tile, cells):
+    with pytest.raises(ValueError, match=f"{cells} cells"):
+        coarse_levels.merge_cells(tile, cells, SPACING)
+
+
+def test_tiles_go_on_where_the_exemplar_ends(cut, tiles):
+    five = cut(wanted=5)
+    assert five.report.layout.levels == 5 and five.report.layout.composed_levels == 3
+    assert five.side == tiles.side
+    scales = [[float(np.exp(f.log_scales).mean()) for f in level] for level in five.fields]
+    assert (np.diff(scales, axis=0) > 0).all()
+    for level, fields in enumerate(five.fields):
+        n = 48 >> level
+        for field in fields:
+            x, y = np.floor(field[field.ground].means[:, :2] / (five.spacing * 2**level)).astype(int).T
+            np.testing.assert_array_equal(np.bincount(y * n + x, minlength=n * n), 1)
+            assert (field.means[:, :2] >= 0).all() and (field.means[:, :2] <= np.float32(five.side)).all()

@@ -6,19 +6,8 @@ import pytest
 from dav_gswt.tiles import layout, patches, repetition
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(2)
-
-
 def exemplar(seed=0, m=40):
     return np.random.default_rng(seed).random((m, m, 3))
-
-
-def test_ground_has_mean_zero_and_variance_one():
-    shown = repetition.start_overlay(exemplar(), 16, (16, 16))
-    np.testing.assert_allclose(shown.ground.mean((0, 1)), 0, atol=1e-12)
-    assert (shown.ground**2).sum(-1).mean() == pytest.approx(1)
 
 
 def power(picture):
@@ -50,29 +39,8 @@ def test_only_what_shows_counts():
     assert shown.compute_costs(place[None])[0] == pytest.approx((power(tile) - own(tile)) * 16 * 16 / (6 * 8))
 
 
-@pytest.mark.parametrize("upright", [True, False])
-def test_what_adds_up_to_a_line_is_dearer_than_the_same_strewn_about(rng, upright):
-    colour = np.zeros((64, 64, 3))
-    dots = colour[:, :32] if upright else colour[:32].swapaxes(0, 1)  # [along, across]: a line, and as much at random
-    dots[:, 2] = 1
-    dots[np.arange(64), 12 + rng.integers(0, 8, 64)] = 1
-    shown = repetition.start_overlay(colour, 64, (8, 64) if upright else (64, 8))
-    line, strewn = shown.compute_costs(np.array([[0, 0], [12, 0]]) if upright else np.array([[0, 0], [0, 12]]))
-    assert line > 1.3 * strewn > 0
-
-
-def test_the_same_landmark_at_the_same_place_is_dearer_than_at_another():
-    """A dot on plain ground: a second tile that shows it there, beside there, or not at all."""
-    colour = np.full((60, 60, 3), 0.5)
-    colour[30:34, 30:34] = 0
-    shown = repetition.start_overlay(colour, 20, (20, 20)).with_patch(np.array([22, 22]))
-    there, beside, none = shown.compute_costs(np.array([[22, 22], [14, 26], [0, 0]]))
-    assert there > 2 * beside > 2 * none
-
-
-@pytest.mark.parametrize("value", [0.0, 0.3])
-def test_ground_of_one_colour_costs_nothing(value):
-    shown = repetition.start_overlay(np.full((30, 30, 3), value), 16, (16, 16))
+def test_ground_of_one_colour_costs_nothing():
+    shown = repetition.start_overlay(np.full((30, 30, 3), 0.3), 16, (16, 16))
     assert shown.compute_costs(np.array([[0, 0], [3, 3]])).tolist() == pytest.approx([0, 0], abs=1e-12)
 
 
@@ -100,18 +68,6 @@ def test_what_lies_over_a_patch_shows_in_its_place():
     np.testing.assert_array_equal(crop[~over], shown.ground[6:22, 4:12][~over])
 
 
-def test_of_two_strips_one_makes_good_what_the_other_lacks():
-    """Light ground, dark ground, and light once more."""
-    colour = np.full((60, 60, 3), 0.5)
-    colour[:, :20], colour[:, 20:40] = 0.7, 0.3
-    shown = repetition.start_overlay(colour, 20, (8, 20))
-    light, dark, other = np.array([[4, 0], [28, 0], [10, 0]])
-    charges = shown.compute_pair_costs(np.stack([light, dark, other]))
-    assert charges[0, 1] < 0 < charges[0, 2]
-    pairs = patches.rank_pairs(np.stack([light, dark, other]), np.zeros(3), charges, (8, 20), [])
-    assert pairs[0].tolist() == [light.tolist(), dark.tolist()]
-
-
 def test_two_strips_of_a_direction_never_show_nearly_the_same():
     places = np.array([[0, 0], [2, 0], [8, 1], [9, 40]])
     size = (12, 80)
@@ -128,7 +84,8 @@ def test_ground_seen_beside_a_strip_is_dearer():
     assert pairs[0].tolist() == [[20, 0], [40, 0]]
 
 
-def test_a_strip_is_no_better_for_being_barer_than_the_ground(rng):
+def test_a_strip_is_no_better_for_being_barer_than_the_ground():
+    rng = np.random.default_rng(2)
     colour = np.full((60, 60, 3), 0.5)
     colour[20:] -= 0.2 * (rng.random((40, 60, 1)) < 0.1)  # flowers on two thirds of it
     colour[40:44, 4:8] = 0
@@ -141,3 +98,21 @@ def test_a_strip_is_no_better_for_being_barer_than_the_ground(rng):
     assert plain[bare].max() < np.median(plain)
     assert set(odd[bare]) == {odd.min()} == {np.median(plain)}
     assert odd[-1] > 2 * odd.min()  # a landmark is dear
+
+
+def test_the_mismatch_is_the_mean_of_the_least_differences_along_the_lines():
+    rng = np.random.default_rng(4)
+    guide = patches.GuidanceMaps(rng.random((20, 20, 2)), np.zeros((20, 20)))
+    zone, shown = rng.integers(0, 8, (2, 5, 3)), rng.integers(0, 20, (2, 5, 3))  # five lines of three cells
+    found = patches.compute_mismatch(guide, (zone[0], zone[1]), (shown[0], shown[1]), np.array([[3, 4], [0, 12]]))
+    for cost, (x, y) in zip(found, ((3, 4), (0, 12)), strict=True):
+        off = guide.features[zone[0] + y, zone[1] + x] - guide.features[shown[0], shown[1]]
+        assert cost == pytest.approx((off**2).sum(-1).min(1).mean())
+
+
+def test_ground_that_is_seen_beside_or_was_taken_comes_last():
+    places = np.array([[0, 0], [1, 0], [30, 0], [60, 0]])
+    costs, beside, taken = np.array([0, 0, 0.1, 0.2]), [(places[2], (10, 10))], places[:1]
+    ranked = patches.rank_places(places, costs, (10, 10), beside, taken)
+    assert ranked.tolist() == [[60, 0], [30, 0], [1, 0], [0, 0]]
+    assert patches.find_fitting(np.array([1.0, 1.7, 1.9, 9.0])).tolist() == [0, 1]

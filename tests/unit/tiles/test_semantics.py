@@ -1,14 +1,23 @@
-"""What the ground is: features of segments, whatever the segments are called."""
+"""What the ground is: features of segments, whatever they are called; masks of SAM 2 from a folder.
+
+The network here is tiny and learned nothing: published weights were never at hand.
+"""
 
 import logging
+import shutil
+import sys
 
 import numpy as np
 import pytest
 import torch
 from fixtures import lpips_arrays
+from safetensors.torch import load_file, save_file
 
-from dav_gswt.tiles import energy, semantics
+from dav_gswt.errors import InputError
+from dav_gswt.tiles import sam2, semantics
 from dav_gswt.tiles.semantics import SemanticSource, describe_segments, overlay_masks, segment_superpixels
+
+WEIGHT = "no_memory_embedding"
 
 
 @pytest.fixture(scope="module")
@@ -29,14 +38,6 @@ def stones():
 
 def at(*cells):
     return tuple(np.array(axis) for axis in zip(*cells, strict=True))
-
-
-def test_cells_of_one_segment_are_not_apart_and_distances_are_symmetric(stones, weights):
-    found = describe_segments(segment_superpixels(stones, 6.0), stones, weights, {})
-    assert isinstance(found, energy.CostLayer)
-    assert (np.diag(found.distance) == 0).all() and (found.distance == found.distance.T).all()
-    cells = np.arange(48), np.arange(48)
-    assert (found.distances(cells, cells) == 0).all()
 
 
 def test_stone_is_far_from_sand_and_near_to_other_stones(stones):
@@ -72,14 +73,6 @@ def test_gradients_are_central_differences_of_the_features():
     assert (found.slope[:, :, 1] == 0).all()
 
 
-def test_grain_of_one_kind_of_ground_is_no_distance():
-    rng = np.random.default_rng(1)
-    sand = np.clip(0.5 + 0.05 * rng.normal(size=(40, 40, 3)), 0, 1)
-    found = describe_segments(np.kron(np.arange(100).reshape(10, 10), np.ones((4, 4), int)), sand, None, {})
-    # three neighbours in four are no more apart than that, and most others are no other kind
-    assert np.mean(found.distance == 0) > 0.6
-
-
 @pytest.mark.parametrize("alexnet", [False, True])
 def test_one_segment_alone_and_flat_ground_are_finite(weights, alexnet):
     flat = np.full((40, 40, 3), 0.5)
@@ -87,6 +80,15 @@ def test_one_segment_alone_and_flat_ground_are_finite(weights, alexnet):
         found = describe_segments(segments, flat, weights if alexnet else None, {})
         assert np.isfinite(found.distance).all() and np.isfinite(found.slope).all()
         assert found.unit.difference > 0 and found.unit.gradient > 0
+
+
+def test_grain_of_one_kind_of_ground_is_no_distance():
+    rng = np.random.default_rng(1)
+    sand = np.clip(0.5 + 0.05 * rng.normal(size=(40, 40, 3)), 0, 1)
+    found = describe_segments(np.kron(np.arange(100).reshape(10, 10), np.ones((4, 4), int)), sand, None, {})
+    # three neighbours in four are no more apart than that, and most others are no other kind
+    assert np.mean(found.distance == 0) > 0.6
+    assert (found.distance == found.distance.T).all()
 
 
 def test_a_segment_has_the_features_of_the_place_where_it_lies(weights):
@@ -111,19 +113,16 @@ def test_the_same_bytes_on_any_number_of_threads(stones, weights):
     np.testing.assert_array_equal(found[0].distance, found[1].distance)
 
 
-def test_without_weights_it_says_that_colours_and_superpixels_are_all(stones, caplog):
-    with caplog.at_level(logging.INFO):
-        found = semantics.make_semantic_layer(stones, SemanticSource())
-    assert "set it to `installed`" in caplog.text
-    assert found.description == {"alexnet": False, "segments": "slic", "count": len(found.distance)}
-
-
-def test_superpixels_have_about_the_size_asked_and_never_too_many(stones):
+def test_superpixels_have_about_the_size_asked_and_never_too_many(stones, monkeypatch, caplog):
     assert 30 < segment_superpixels(stones, 8.0).max() < 60  # 36 of 8 x 8
     noise = np.random.default_rng(0).random((120, 120, 3))
-    assert (
-        len(semantics.make_semantic_layer(noise, SemanticSource()).distance) <= 1.2 * 120**2 / semantics.MIN_WIDTH**2
-    )  # SLIC takes it roughly
+    with caplog.at_level(logging.INFO):
+        found = semantics.make_semantic_layer(noise, SemanticSource())
+    assert len(found.distance) <= 1.2 * 120**2 / semantics.MIN_WIDTH**2  # SLIC takes it roughly
+    assert found.description == {"alexnet": False, "segments": "slic"} | {"count": len(found.distance)}
+    assert "set it to `installed`" in caplog.text
+    monkeypatch.setattr(semantics, "SUPERPIXELS", 100)
+    assert len(semantics.make_semantic_layer(noise, SemanticSource()).distance) < len(found.distance) / 2
 
 
 def test_of_two_masks_over_one_another_the_smaller_lies_on_top():
@@ -133,3 +132,120 @@ def test_of_two_masks_over_one_another_the_smaller_lies_on_top():
         found = overlay_masks(np.zeros((6, 6), int), masks)
         assert len({found[0, 0], found[1, 1], found[2, 2]}) == 3 and (found[2:4, 2:4] == found[2, 2]).all()
     np.testing.assert_array_equal(overlay_masks(np.eye(6, dtype=int), []), np.eye(6))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    transformers = pytest.importorskip("transformers", reason="needs transformers: pip install transformers==5.23.0")
+    torch.manual_seed(3)
+    backbone = transformers.Sam2HieraDetConfig(
+        hidden_size=8,
+        image_size=[64, 64],
+        blocks_per_stage=[1, 1, 2, 1],
+        embed_dim_per_stage=[8, 16, 32, 64],
+        num_attention_heads_per_stage=[1, 1, 2, 2],
+        window_size_per_stage=[4, 4, 4, 2],
+        global_attention_blocks=[3],
+    )
+    vision = transformers.Sam2VisionConfig(
+        backbone_config=backbone,
+        backbone_channel_list=[64, 32, 16, 8],
+        backbone_feature_sizes=[[16, 16], [8, 8], [4, 4]],
+        fpn_hidden_size=32,
+    )
+    prompts = {"hidden_size": 32, "image_size": 64, "patch_size": 16, "mask_input_channels": 4}
+    decoder = {"hidden_size": 32, "mlp_dim": 32, "num_attention_heads": 2, "iou_head_hidden_dim": 16}
+    config = transformers.Sam2Config(
+        vision_config=vision.to_dict(), prompt_encoder_config=prompts, mask_decoder_config=decoder
+    )
+    path = tmp_path_factory.mktemp("sam2") / "tiny"
+    transformers.Sam2Model(config).save_pretrained(path)
+    return path
+
+
+@pytest.fixture
+def copy(folder, tmp_path):
+    return shutil.copytree(folder, tmp_path / "copy")
+
+
+@pytest.fixture
+def lenient(monkeypatch):
+    """What learned nothing is sure of nothing: any answer counts, and a few points are enough."""
+    monkeypatch.setattr(sam2, "MIN_PREDICTED_IOU", -np.inf)
+    monkeypatch.setattr(sam2, "MIN_STABILITY", -np.inf)
+    monkeypatch.setattr(sam2, "GRID_POINTS", 4)
+    monkeypatch.setattr(sam2, "BATCH", 5)
+
+
+@pytest.fixture
+def picture():
+    rng = np.random.default_rng(1)
+    picture = np.full((40, 40, 3), 0.7)
+    picture[10:20, 15:30] = [0.2, 0.3, 0.1]
+    return np.clip(picture + 0.02 * rng.normal(size=picture.shape), 0, 1)
+
+
+def test_masks_lie_on_the_exemplars_cells_and_are_not_alike(folder, picture, lenient):
+    found = sam2.predict_masks(sam2.load_model(folder), picture)
+    assert found and all(mask.shape == (40, 40) and mask.dtype == bool for mask in found)
+    assert all(mask.sum() >= sam2.MIN_CELLS for mask in found)
+    for i, one in enumerate(found):
+        for other in found[:i]:
+            assert (one & other).sum() / (one | other).sum() < sam2.MAX_IOU + 0.05  # compared on another grid
+
+
+def test_with_masks_the_semantics_are_of_them_and_of_superpixels_between(folder, picture, lenient):
+    first, again = (semantics.make_semantic_layer(picture, semantics.SemanticSource(sam2=folder)) for _ in range(2))
+    plain = semantics.make_semantic_layer(picture, semantics.SemanticSource())
+    assert first.description["segments"] == "sam2 and slic" and first.description["masks"] > 0
+    assert (first.segments != plain.segments).any()
+    np.testing.assert_array_equal(first.distance, again.distance)
+
+
+def test_of_masks_alike_the_surest_stays():
+    whole, part, other = np.ones((16, 16), bool), np.ones((16, 16), bool), np.zeros((16, 16), bool)
+    part[0], other[:4] = False, True
+    assert sam2.suppress_overlaps([part, other, whole], np.array([0.9, 0.8, 0.95])) == [2, 1]
+    assert sam2.suppress_overlaps([part, whole], np.array([0.9, 0.9])) == [0]
+
+
+def test_stability_is_the_overlap_at_two_thresholds():
+    logits = torch.tensor([[[2.0, 2.0, 0.5, -2.0]], [[-2.0, -2.0, -2.0, -2.0]]])
+    torch.testing.assert_close(sam2._stability(logits), torch.tensor([2 / 3, 0.0]))
+
+
+def cut_short(path):
+    path.write_bytes(path.read_bytes()[:1000])
+
+
+def change_weights(change):
+    def apply(path):
+        values = load_file(path)
+        change(values)
+        save_file(values, path, {"format": "pt"})
+
+    return apply
+
+
+@pytest.mark.parametrize(
+    "name, change, said",
+    [
+        ("", shutil.rmtree, "there is no such folder"),
+        ("model.safetensors", lambda path: path.rename(path.parent / "weights.bin"), "weights.bin is a pickle"),
+        ("config.json", lambda path: path.write_text('{"model_type": "clip"}'), "config.json: is not of SAM 2"),
+        ("model.safetensors", cut_short, "cannot be read"),
+        ("model.safetensors", change_weights(lambda values: values.pop(WEIGHT)), f"{WEIGHT} is missing"),
+        ("model.safetensors", change_weights(lambda values: values[WEIGHT].fill_(np.nan)), f"{WEIGHT} has values that"),
+    ],
+    ids=["no folder", "a pickle", "another model", "cut short", "one weight missing", "not finite"],
+)
+def test_a_folder_that_is_not_right_is_named(copy, name, change, said):
+    change(copy / name)
+    with pytest.raises(InputError, match=said):
+        sam2.load_model(copy)
+
+
+def test_without_transformers_it_says_what_to_install(folder, monkeypatch):
+    monkeypatch.setitem(sys.modules, "transformers", None)
+    with pytest.raises(InputError, match="pip install 'transformers=="):
+        sam2.load_model(folder)

@@ -1,13 +1,10 @@
 """The scale of a texture, on noise whose correlation is known, what follows for tiles, and patterns."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from dav_gswt.lod.levels import AUTO
-from dav_gswt.tiles import build, texture
+from dav_gswt.tiles import texture
 
 
 def noise(width, cells=256, seed=0):
@@ -16,7 +13,7 @@ def noise(width, cells=256, seed=0):
     return 0.5 + 0.1 * soft / soft.std()
 
 
-@pytest.mark.parametrize("width", [1.5, 3, 5])
+@pytest.mark.parametrize("width", [1.5, 5])
 def test_blurred_noise_has_the_scale_that_its_correlation_says(width):
     # r = exp(-d^2 / 4 s^2) to where it is .1: 2 int r d = 4 s^2 (1 - .1)
     assert texture.measure_texture_scale(noise(width)) == pytest.approx(2 * width * np.sqrt(0.9), rel=0.12)
@@ -31,14 +28,8 @@ def test_neither_brightness_nor_contrast_nor_a_trend_changes_the_scale():
 
 
 @pytest.mark.parametrize("ground", [np.zeros((40, 40, 3)), np.full((40, 40, 3), 0.1), np.full((10, 10, 3), 1 / 3)])
-def test_even_ground_has_no_scale(ground):
-    assert texture.measure_texture_scale(ground) == 0
-
-
-def test_a_stripe_as_wide_as_the_ground_is_finite():
-    ground = np.zeros((30, 30, 3))
-    ground[:, 15:] = 1
-    assert 0 < texture.measure_texture_scale(ground) < 30
+def test_even_ground_has_no_scale_and_no_pattern(ground):
+    assert texture.measure_texture_scale(ground) == 0 and texture.measure_pattern(ground) is None
 
 
 def lay_bricks(course=8, turn=17, cells=224):
@@ -55,45 +46,20 @@ def lay_bricks(course=8, turn=17, cells=224):
     return np.repeat(gaussian_filter(np.where(joint, 0.35, tones) + grain, 0.7)[..., None], 3, -1)
 
 
-@pytest.mark.parametrize("turn", [0, 17, 60])
-def test_courses_of_brick_are_a_pattern_however_they_are_turned(turn):
-    found = texture.measure_pattern(lay_bricks(turn=turn))
-    assert found is not None and found > 0.25
-
-
-def test_furrows_and_a_bold_line_across_the_ground_are_patterns():
+def test_courses_of_brick_furrows_and_a_bold_line_are_patterns():
     y, x = np.mgrid[:224, :224].astype(float)
+    found = texture.measure_pattern(lay_bricks())
+    assert found is not None and 0.25 < found < 1
     for lines in (0.15 * np.sin(2 * np.pi * (x + 0.4 * y) / 14), 0.5 * (np.abs(x + 0.2 * y - 130) < 6)):
         assert texture.measure_pattern(noise(2, 224) + lines[..., None]) is not None
 
 
-@pytest.mark.parametrize("width", [1, 3, 6, 10])
-@pytest.mark.parametrize("seed", range(3))
-def test_noise_has_no_pattern_however_coarse_it_is(width, seed):
-    assert texture.measure_pattern(noise(width, 224, seed)) is None
-
-
-def test_even_ground_has_no_pattern():
-    assert texture.measure_pattern(np.full((64, 64, 3), 0.3)) is None
+@pytest.mark.parametrize("width", [1, 10])
+def test_noise_has_no_pattern_however_coarse_it_is(width):
+    assert texture.measure_pattern(noise(width, 224)) is None
 
 
 def test_tiles_get_smaller_and_strips_wider_with_the_scale():
     assert texture.choose_sizes(0.0) == texture.choose_sizes(texture.SCALES[0]) == (0.5, 0.06)
     assert texture.choose_sizes(0.022) == pytest.approx((0.44, 1.6 * 0.022 / 0.44))
     assert texture.choose_sizes(texture.SCALES[1])[0] == 0.38 and texture.choose_sizes(0.3) == (0.38, 0.125)
-
-
-def test_tiles_by_their_texture_are_those_of_its_sizes(sample_ground):
-    options = build.TilingOptions(share=AUTO, strip=AUTO, candidates=40, tries=1)
-    share, strip = texture.choose_sizes(texture.measure_texture_scale(sample_ground.colour) / 96)
-
-    def cut(options):
-        rng = np.random.default_rng(2)
-        return build.cut_tiles(
-            sample_ground.levels, sample_ground.exemplar, sample_ground.colour, np.zeros((96, 96)), options, rng
-        )
-
-    own, given = cut(options), cut(replace(options, share=share, strip=strip))
-    np.testing.assert_array_equal(own.labels, given.labels)
-    assert own.side == given.side and own.report == given.report
-    assert cut(replace(options, share=0.6)).side != given.side

@@ -77,12 +77,6 @@ def test_a_bright_patch_in_a_dark_frame_is_darkened_by_the_step():
     np.testing.assert_allclose(found, np.where(labels[..., None], -0.1, 0) * np.ones(4), atol=1e-7)
 
 
-def test_equal_patches_are_not_corrected():
-    labels, shift = patched()
-    found = poisson_blending.solve_tile(labels, shift, np.zeros((24, 24, 4)), PLAN, flat_ground(0.0))
-    assert (found == 0).all()
-
-
 def test_a_tile_takes_the_correction_of_its_border():
     ring = np.full((24, 24, 4), 0.25)
     found = poisson_blending.solve_tile(

@@ -7,23 +7,15 @@ import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.tiles import build, energy, layout
+from dav_gswt.lod.levels import AUTO
+from dav_gswt.study.expansion import compute_costs_along
+from dav_gswt.tiles import build, energy, layout, texture
 from dav_gswt.tiles.layout import CENTRE
-
-CERTAIN = np.zeros((96, 96))
-FEW = build.TilingOptions(share=0.5, strip=0.17, candidates=20, tries=1)
-
-
-def cut(sample_ground, kind, colour=None, uncertainty=CERTAIN, options=FEW, levels=None):
-    colour, rng = sample_ground.colour if colour is None else colour, np.random.default_rng(2)
-    return build.cut_tiles(
-        levels or sample_ground.levels, sample_ground.exemplar, colour, uncertainty, replace(options, kind=kind), rng
-    )
 
 
 @pytest.fixture(scope="module")
-def every(sample_ground):
-    return {kind: cut(sample_ground, kind) for kind in energy.KINDS}
+def every(cut):
+    return {kind: cut(kind=kind) for kind in energy.KINDS}
 
 
 def test_every_way_says_what_it_used(every):
@@ -37,14 +29,11 @@ def test_every_way_says_what_it_used(every):
         assert found.report.tile_gamma + found.report.strip_gamma == pytest.approx([gamma] * 20)
 
 
-def test_a_straight_seam_costs_more_than_the_cheapest_one_between_the_same_patches(every):
-    # the first strips were chosen before anything was cut
-    for k in (0, 2):
-        assert every["none"].report.strip_energy[k] > every["semantic"].report.strip_energy[k]
-    assert every["none"].report.places.vertical == every["semantic"].report.places.vertical
-
-
-def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap(every):
+def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap_and_dearer(every):
+    straight, cheapest = every["none"].report, every["semantic"].report
+    for k in (0, 2):  # the first strips were chosen before anything was cut
+        assert straight.strip_energy[k] > cheapest.strip_energy[k]
+    assert straight.places.vertical == cheapest.places.vertical
     plan = layout.plan_layout(96, 3, 0.5, 0.17)
     depth = (plan.block + plan.strip) // 2
     for labels in every["none"].labels:
@@ -53,82 +42,92 @@ def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap(every
         np.testing.assert_array_equal(labels == CENTRE, inner)
 
 
-def test_uncertain_ground_is_cut_by_semantics_more_than_by_colour(sample_ground):
-    uncertain = cut(sample_ground, "semantic", uncertainty=np.full((96, 96), 0.75)).report
-    assert uncertain.tile_gamma == pytest.approx([1 / (1 + np.exp(0.5))] * 16)
-    steep = cut(sample_ground, "semantic", uncertainty=np.full((96, 96), 0.75), options=replace(FEW, slope=8.0)).report
-    assert steep.tile_gamma == pytest.approx([1 / (1 + np.exp(2))] * 16)
-
-
-@pytest.mark.parametrize("kind", energy.KINDS)
-def test_patches_that_are_all_the_same_cost_nothing(sample_ground, kind):
-    bare = [level[level.ground] for level in sample_ground.levels]
-    found = cut(sample_ground, kind, colour=np.full((96, 96, 3), 0.5), levels=bare)
-    # colours without their trend differ by rounding
-    assert found.report.tile_energy + found.report.strip_energy == pytest.approx([0] * 20, abs=1e-9)
-    assert np.isfinite(found.fields[0][0].means).all()
-
-
-@pytest.mark.parametrize("kind", ["colour", "semantic"])
-def test_tiles_go_around_holes_where_they_can(sample_ground, kind, caplog):
-    colour = sample_ground.colour.copy()
-    colour[30:44, 0:50] = np.nan
-    options = replace(FEW, candidates=400)
+def test_uncertain_ground_is_cut_by_semantics_more_than_by_colour_and_is_logged(cut, caplog):
+    uncertainty = np.full((96, 96), 0.75)
     with caplog.at_level(logging.WARNING):
-        found = cut(sample_ground, kind, colour=colour, options=options)
+        report = cut(kind="semantic", slope=8.0, uncertainty=uncertainty).report
+    assert report.tile_gamma == pytest.approx([1 / (1 + np.exp(2))] * 16)
+    assert "a smaller `tile`" in caplog.text
+
+
+def test_tiles_go_around_holes_and_unknown_ground_where_they_can(cut, sample_ground, caplog):
+    colour, uncertainty = sample_ground.colour.copy(), np.zeros((96, 96))
+    colour[30:44, 0:50], uncertainty[:, :20] = np.nan, np.nan
+    with caplog.at_level(logging.WARNING):
+        found = cut(kind="colour", colour=colour, uncertainty=uncertainty, candidates=400)
     assert "700 of 9216 cells of the exemplar are holes" in caplog.text
-    # a patch may be up to 0.05 more uncertain than the surest one
+    # a patch may be up to UNCERTAINTY_MARGIN more uncertain than the least uncertain one
     assert found.uncertainty.max() < 0.1
     assert all(np.isfinite(field.sh).all() for level in found.fields for field in level)
 
 
-def test_unknown_uncertainty_counts_as_1(sample_ground):
-    uncertainty = np.zeros((96, 96))
-    uncertainty[:, :30] = np.nan
-    assert (
-        cut(sample_ground, "semantic", uncertainty=uncertainty, options=replace(FEW, candidates=400)).uncertainty.max()
-        < 0.1
-    )
+def test_variants_are_other_centres_in_the_same_frames(cut):
+    two = cut(variants=2)
+    assert len(two.labels) == 32 and two.variants == 2
+    frame = two.labels[:, :4]
+    np.testing.assert_array_equal(frame[:16], frame[16:])
+    assert (two.shifts[:16, CENTRE] != two.shifts[16:, CENTRE]).any(1).all()
 
 
-@pytest.mark.parametrize(
-    "colour, uncertainty",
-    [
-        pytest.param(np.full((96, 96, 3), np.nan), CERTAIN, id="holes only"),
-        pytest.param(None, np.ones((96, 96)), id="all of it masked"),
-        pytest.param(None, np.full((96, 96), np.nan), id="nothing known"),
-    ],
-)
-def test_an_exemplar_without_any_known_ground_is_refused(sample_ground, colour, uncertainty):
-    with pytest.raises(InputError, match="nothing is known of the exemplar.*masks"):
-        cut(sample_ground, "semantic", colour=colour, uncertainty=uncertainty)
+def test_an_exemplar_without_any_known_ground_is_refused(cut):
+    holes = np.full((96, 96, 3), np.nan)
+    for given in ({"colour": holes}, {"uncertainty": np.ones((96, 96))}, {"uncertainty": holes[..., 0]}):
+        with pytest.raises(InputError, match="nothing is known of the exemplar.*masks"):
+            cut(**given)
 
 
-def test_uncertain_ground_that_cannot_be_avoided_is_logged(sample_ground, caplog):
-    uncertainty = np.ones((96, 96))
-    uncertainty[40:50, 40:50] = 0
-    with caplog.at_level(logging.WARNING):
-        cut(sample_ground, "semantic", uncertainty=uncertainty)
-    assert "a smaller `tile`" in caplog.text
-
-
-def test_a_finest_level_from_elsewhere_is_refused(sample_ground):
-    levels = [replace(f, means=f.means + np.float32(1000)) for f in sample_ground.levels]
-    with pytest.raises(InputError, match=r"level 0.*ground\.json"):
-        build.cut_tiles(levels, sample_ground.exemplar, sample_ground.colour, CERTAIN, FEW, np.random.default_rng(0))
+@pytest.mark.parametrize("level", [0, 1])
+def test_a_level_from_elsewhere_is_refused(cut, sample_ground, level):
+    levels = list(sample_ground.levels)
+    levels[level] = replace(levels[level], means=levels[level].means + np.float32(1000))
+    with pytest.raises(InputError, match=rf"level {level}.*ground\.json"):
+        cut(levels=levels)
 
 
 def test_options_are_those_of_the_configs_entry():
     seam = {"tile": 0.4, "strip": 0.1, "candidates": 7, "variants": 3, "energy": "colour", "slope": 4.0, "sam2": "a"}
-    found = build.TilingOptions.from_config(seam, FEW.source)
+    found = build.TilingOptions.from_config(seam, build.TilingOptions().source)
     assert (found.share, found.strip, found.candidates, found.variants) == (0.4, 0.1, 7, 3)
     assert (found.kind, found.slope) == ("colour", 4.0)
-    older = build.TilingOptions.from_config(
-        {key: seam[key] for key in ("tile", "strip", "candidates", "variants")}, FEW.source
-    )
-    assert (older.kind, older.slope) == ("semantic", 2.0)
-
-
-def test_an_energy_that_is_not_the_products_is_an_error():
     with pytest.raises(ValueError, match="'expansion' is no energy of seams: none, colour, semantic, semantic-nogamma"):
-        build.TilingOptions.from_config({"energy": "expansion"}, FEW.source)
+        build.TilingOptions.from_config({"energy": "expansion"}, found.source)
+
+
+def test_tiles_by_their_texture_have_its_sizes(sample_ground):
+    share, strip = texture.choose_sizes(2.2 / 96)
+    wanted = layout.plan_layout(96, 3, share, strip, 3)
+    options = build.TilingOptions(share=AUTO, strip=AUTO)
+    assert build._plan_layout(options, 2.2, sample_ground.exemplar, 3) == wanted
+    assert wanted != layout.plan_layout(96, 3, 0.5, strip, 3)
+
+
+def test_the_energy_of_a_tile_is_that_of_the_seam_around_its_centre(cut):
+    """Priced again in the finished tile, edge by edge; they differ only where a strip's own seam meets the centre's."""
+    pairs = []
+
+    def price_again(problem, centre, labels, shift):
+        own = labels.astype(int)
+        cells = [problem.source_cells(np.full_like(own, label), shift) for label in range(len(layout.LABELS))]
+        rows, columns = (np.stack(part) for part in zip(*cells, strict=True))
+        total = 0.0
+        for dy, dx in ((0, 1), (1, 0)):
+            here, there = own[: len(own) - dy, : len(own) - dx], own[dy:, dx:]
+            at = np.nonzero((here == CENTRE) != (there == CENTRE))
+            ends = [(at[0], at[1]), (at[0] + dy, at[1] + dx)]
+            a, b = here[at], there[at]
+            tails, heads = (tuple((rows[label, *end], columns[label, *end]) for label in (a, b)) for end in ends)
+            axis = np.full(len(a), dy)
+            total += float(compute_costs_along(problem.energy.terms(centre.gamma), tails, heads, axis).sum())
+        pairs.append((centre.seam.energy, total))
+        return labels
+
+    cut(kind="semantic", candidates=40, tries=2, relabel=price_again)
+    reported, own = np.array(pairs).T
+    np.testing.assert_allclose(reported, own, rtol=0.02)
+    assert reported.sum() == pytest.approx(own.sum(), rel=2e-3)
+
+
+def test_each_replicate_and_material_has_random_numbers_of_its_own():
+    for replicate, material, seeds in ((0, 0, [3]), (2, 0, [3, 2]), (None, 1, [3, 0, 1]), (2, 1, [3, 2, 1])):
+        made = build.make_generator(3, {"replicate": replicate}, material)
+        assert made.random() == np.random.default_rng(seeds).random()

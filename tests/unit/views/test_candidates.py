@@ -1,14 +1,23 @@
-"""Candidate poses: free ones, on an orbit, along a route."""
+"""Candidate poses: free ones, on an orbit, along a route; and those that are buried, hidden or out of the limits.
+
+These are judged over a flat exemplar with a steep ridge to the east of it.
+"""
+
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
+import trimesh
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
+from dav_gswt.geometry.poses import Pose
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.photos.view_split import ViewSplit
-from dav_gswt.views import candidates
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.views import candidates, feasibility
 
 FRAME = scene_frame(kind="photos", flying_height=5.0, exemplar=(10.0, 20.0, 4.0))
 MIDDLE = np.array([12.0, 22.0, 0.0])
@@ -27,11 +36,11 @@ def aim(camera):
     return (camera.centre + away * camera.forward)[:2] - MIDDLE[:2], away
 
 
-def test_an_orbit_looks_at_the_middle_from_the_flying_height():
-    found = stand(kind="orbit")
-    assert all(aim(camera)[1] == pytest.approx(5.0) for _, camera in found)
-    assert max(np.abs(aim(camera)[0]).max() for _, camera in found) < 1e-9
-    assert min(pose.elevation for pose, _ in found) >= 30 - 1e-9
+def test_an_orbit_which_is_what_is_taken_unless_told_otherwise_looks_at_the_middle_from_the_flying_height():
+    for found in (stand(kind="orbit", count=20), stand("serial", count=20)):
+        assert all(aim(camera)[1] == pytest.approx(5.0) for _, camera in found)
+        assert max(np.abs(aim(camera)[0]).max() for _, camera in found) < 1e-9
+        assert min(pose.elevation for pose, _ in found) >= 30 - 1e-9
 
 
 def test_free_poses_spread_over_distances_aim_points_and_directions():
@@ -39,26 +48,15 @@ def test_free_poses_spread_over_distances_aim_points_and_directions():
     assert 2 <= min(away) < 2.2 and 7.2 < max(away) <= 7.5
     counts = np.histogram2d(*np.array(aims).T, bins=3, range=[[-2, 2], [-2, 2]])[0]
     assert counts.min() >= 10 and counts.sum() == 120  # 13.3 in each of nine parts of the exemplar
-    assert np.corrcoef(np.column_stack([aims, away, [c.forward[2] for _, c in stand("render", kind="free")]]).T)[
-        0, 1:
-    ] == pytest.approx(0, abs=0.1)
+    steep = [camera.forward[2] for _, camera in stand("render", kind="free")]
+    assert np.corrcoef(np.column_stack([aims, away, steep]).T)[0, 1:] == pytest.approx(0, abs=0.1)
 
 
-def test_radii_and_aims_of_free_poses_are_those_asked_for():
-    found = stand(kind="free", radii=[2.0, 3.0], aims=0.0)
+def test_radii_and_aims_are_those_asked_for_and_nobody_is_sent_higher_than_the_first_photos_were_taken():
+    found = stand(kind="free", radii=[2.0, 3.0], aims=0.0, count=20)
     assert all(10 <= aim(camera)[1] <= 15 and np.abs(aim(camera)[0]).max() < 1e-9 for _, camera in found)
-
-
-@pytest.mark.parametrize("agent", ["handheld", "plan"])
-def test_nobody_is_sent_higher_than_the_first_photos_were_taken(agent):
-    found = stand(agent, kind="free")
-    assert max(camera.centre[2] for _, camera in found) <= 5.0
-    assert min(aim(camera)[1] for _, camera in found) >= 2 and max(aim(camera)[1] for _, camera in found) <= 5.0
-
-
-@pytest.mark.parametrize("agent", ["render", "serial", "plan", "handheld"])
-def test_photos_are_taken_on_an_orbit_unless_told_otherwise(agent):
-    assert {round(aim(camera)[1], 6) for _, camera in stand(agent)} == {5.0}
+    found = [aim(camera)[1] for _, camera in stand("handheld", kind="free")]
+    assert min(found) >= 2 and max(found) <= 5.0
 
 
 def test_a_route_has_stops_along_it_with_headings_to_all_sides():
@@ -70,6 +68,8 @@ def test_a_route_has_stops_along_it_with_headings_to_all_sides():
     assert all(camera.forward[2] == pytest.approx(-0.5) for _, camera in found)
     headings = np.degrees([np.arctan2(camera.forward[1], camera.forward[0]) for _, camera in found[:4]]) % 360
     assert headings == pytest.approx([0, 90, 180, 270], abs=1e-6)
+    with pytest.raises(InputError, match=r"poses\.places: a route needs two places"):
+        stand(kind="route", places=[[0.1, 0.1], [0.1, 0.1]], height=0.2)
 
 
 def test_photos_are_asked_for_with_the_lens_of_most_pictures(tmp_path):
@@ -82,14 +82,133 @@ def test_photos_are_asked_for_with_the_lens_of_most_pictures(tmp_path):
     assert {(camera.width, camera.height) for _, camera in found} == {(60, 40)}
 
 
-def test_a_route_without_length_is_refused():
-    with pytest.raises(InputError, match=r"poses\.places: a route needs two places"):
-        stand(kind="route", places=[[0.1, 0.1], [0.1, 0.1]], height=0.2)
-
-
 @pytest.mark.parametrize("kind", ["orbit", "free", "route"])
 def test_every_candidate_has_the_lens_it_is_given_and_a_name_of_its_own(kind):
-    found = stand(kind=kind, places=[[0, 0], [1, 0]], height=0.3, count=8)
-    assert len({pose.name for pose, _ in found}) == 8
+    none, found = (stand(kind=kind, places=[[0, 0], [1, 0]], height=0.3, count=count) for count in (0, 8))
+    assert none == [] and len({pose.name for pose, _ in found}) == 8
     assert all((c.fx, c.cx, c.width, c.height) == (LENS.fx, LENS.cx, 60, 40) for _, c in found)
-    assert stand(kind=kind, places=[[0, 0], [1, 0]], height=0.3, count=0) == []
+
+
+CELLS, SPACING = 192, 6 / 192
+RIDGE = 147.5 * SPACING - 3  # 1.609, in the middle of a cell; the exemplar is the square from -1 to 1 in x and y
+
+
+@cache
+def ground(shift=(0.0, 0.0, 0.0), scale=1.0) -> Ground:
+    """A ridge of height 1 along x = RIDGE: h = exp(-(x - RIDGE)^2 / (2 0.05^2))."""
+    x = (np.arange(CELLS) + 0.5) * SPACING - 3
+    heights = np.tile(np.exp(-((x - RIDGE) ** 2) / (2 * 0.05**2)), (CELLS, 1))
+    west, south = scale * -3 + shift[0], scale * -3 + shift[1]
+    return Ground(west, south, scale * SPACING, 64, 64, 64, scale * heights + shift[2], np.ones((CELLS, CELLS), bool))
+
+
+def candidate(name, eye, target=(0, 0, 0), shift=(0.0, 0.0, 0.0), scale=1.0, fov=100.0):
+    away = scale * float(np.linalg.norm(eye))
+    eye, target = (scale * np.array(v, float) + shift for v in (eye, target))
+    return Pose(name, 0.0, 0.0, away), cameras.pinhole(eye, target, 64, 64, fov)
+
+
+PLACES = {
+    "above": (0, 0.01, 2.5),
+    "aside": (-2, 0, 1.5),
+    "over the ridge": (2.6, 0, 2),
+    "behind the ridge": (2.6, 0, 1.5),
+    "in its shadow": (2.6, 0, 0.4),
+    "in the ridge": (RIDGE, 0, 0.5),
+    "under the ground": (0, 0, -0.2),
+    "near the ground": (-0.5, 0, 0.05),
+    "near its slope": (RIDGE - 0.2, 0, 0.5),
+}
+
+
+def verdicts(limits=None, **move):
+    pool = [candidate(name, eye, **move) for name, eye in PLACES.items()]
+    return feasibility.find_infeasible(pool, ground(**move), limits, 0.15 * move.get("scale", 1.0))
+
+
+def kinds(reasons):
+    return {name: reason.split(":")[0] for name, reason in reasons.items()}
+
+
+@pytest.fixture(scope="module")
+def usual():
+    return verdicts()
+
+
+def test_poses_in_the_ground_near_it_and_behind_the_ridge_are_rejected_and_no_others(usual):
+    assert usual["behind the ridge"] == "hidden: 27 of 81 points of the exemplar are visible"
+    assert kinds(usual) == {
+        "behind the ridge": "hidden",
+        "in its shadow": "hidden",
+        "in the ridge": "buried",
+        "under the ground": "buried",
+        "near the ground": "too near the ground",
+        "near its slope": "too near the ground",
+    }
+
+
+@pytest.mark.parametrize("height, columns", [(1.5, 3), (1.7, 5), (2.0, 7)])
+def test_what_is_in_sight_over_the_ridge_by_hand(height, columns):
+    """From (2.6, 0, z) the ground at x shows where the line passes over the ridge: z (RIDGE - x) / (2.6 - x) >= 1,
+    that is x <= (2.6 - RIDGE z) / (1 - z). The lattice's columns stand at (2 i - 8) / 9."""
+    last = (2.6 - RIDGE * height) / (1 - height)
+    assert np.sum((2 * np.arange(9) - 8) / 9 <= last) == columns
+    site = feasibility._build_mesh(ground())
+    camera = candidate("", (2.6, 0, height))[1]
+    shown, seen = feasibility._count_visible(site, [camera], camera.centre[None])
+    assert (shown[0], seen[0]) == (81, 9 * columns)
+
+
+def test_the_distance_to_the_ground_is_not_the_height_over_it():
+    """Beside a wall of 45 degrees that rises from x = 0: the distance is the height over the wall by the root of 2."""
+    x = (np.arange(CELLS) + 0.5) * SPACING - 3
+    wall = replace(ground(), heights=np.tile(np.maximum(x, 0), (CELLS, 1)))
+    site = feasibility._build_mesh(wall)
+    place = np.array([[1.0, 0.0, 1.3]])
+    assert 2 * feasibility._measure_distance(site, site.local(place))[0] == pytest.approx(0.3 / 2**0.5, rel=1e-6)
+
+
+@pytest.mark.parametrize("move", [{"shift": (1e6, -1e6, 1e6)}, {"scale": 1e-3}], ids=str)
+def test_the_world_may_lie_anywhere_and_have_any_unit(usual, move):
+    found = verdicts(**move)
+    assert kinds(found) == kinds(usual)
+    assert found["behind the ridge"] == usual["behind the ridge"]  # the same points in sight
+
+
+def test_limits_bar_what_is_beyond_them(usual):
+    for limits, out in (
+        ({"min_height": 2.2}, {"aside": "too low", "over the ridge": "too low"}),
+        ({"max_height": 2.2}, {"above": "too high"}),
+        ({"max_distance": 3.0}, {"over the ridge": "too far"}),
+        ({"min_height": 0.1, "max_height": 9, "max_distance": 9}, {}),
+    ):
+        found = kinds(verdicts(limits=limits))
+        assert found.items() >= out.items() and set(found) - set(out) == set(usual)
+
+
+def test_pictures_that_miss_the_exemplar_or_all_ground_are_rejected():
+    away, half = (-2, 0, 1), (0, 0, 2)
+    pool = [candidate("away", away, (-3, 0, 0), fov=40.0), candidate("half", half, (0, 3, 1.5), fov=140.0)]
+    found = feasibility.find_infeasible(pool, ground(), clearance=0.1)
+    assert kinds(found) == {"away": "off the exemplar", "half": "past the ground"}
+
+
+def test_the_clearance_follows_from_the_flying_height_where_none_is_given():
+    high = [candidate(f"{i}", (0, 0.01, 10)) for i in range(3)]
+    low, lower = candidate("low", (0, 0.01, 0.52)), candidate("lower", (0, 0.01, 0.48))
+    assert list(feasibility.find_infeasible([*high, low, lower], ground())) == ["lower"]
+
+
+def test_without_embree_the_answers_are_the_same(usual, monkeypatch, caplog):
+    monkeypatch.setattr(trimesh.ray, "has_embree", False)
+    assert verdicts() == usual and "embreex is not installed" in caplog.text
+
+
+def test_what_is_kept_and_how_many_are_not_is_said(caplog):
+    with caplog.at_level("INFO"):
+        left = feasibility.filter_feasible([candidate(*place) for place in PLACES.items()], ground(), clearance=0.15)
+    assert [pose.name for pose, _ in left] == ["above", "aside", "over the ridge"]
+    assert "6 of 9 candidate poses are left out: 2 hidden, 2 buried, 2 too near the ground" in caplog.text
+    assert feasibility.filter_feasible([], ground()) == []
+    with pytest.raises(InputError, match="any of the 1 candidate poses: 1 buried"):
+        feasibility.filter_feasible([candidate("low", (0, 0, -1))], ground())

@@ -1,17 +1,31 @@
-"""Directional coverage: what photos show of the ground, what further ones add, and how wrong the field is where."""
+"""Directional coverage: what photos show of the ground, what further ones add, and what makes ground matter.
 
+That is the field's error in the photos so far, the prior's maps, or the truth.
+"""
+
+import json
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 import pytest
 from fixtures import ground as patch
 
+from dav_gswt.errors import InputError
+from dav_gswt.field import write_field
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.scene_frame import Extent
+from dav_gswt.geometry.scene_frame import Extent, write_scene_frame
+from dav_gswt.images import image_files
+from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
+from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.photos.view_split import ViewSplit
+from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import coverage
+from dav_gswt.views import coverage, oracle, policy_inputs
 from dav_gswt.views.greedy import lazy_greedy
+from dav_gswt.views.pose_maps import PoseMaps, write_pose_maps
+from dav_gswt.views.scores import Scores
+from dav_gswt.views.scoring import scoring_camera
+from dav_gswt.views.uncertainty.weighting import Scales
 
 
 @pytest.fixture(scope="module")
@@ -24,76 +38,69 @@ def look(x, y, z, at=(1.6, 1.6, 0.0), size=64):
 
 
 def gain(cells, taken, one, importance=None):
-    return cover(cells, taken, [one], importance).gain(0)
+    return coverage.DirectionalCoverage(cells, cells.view(taken), cells.view([one]), importance).gain(0)
 
 
-def cover(cells, taken, candidates, importance=None):
-    return coverage.DirectionalCoverage(cells, cells.view(taken), cells.view(candidates), importance)
-
-
-def count_pixels(cells, camera):
-    return cells.view([camera]).pixels[0]
-
-
-def test_pixels_of_a_picture_are_shared_among_the_cells_it_shows(cells):
-    inside = count_pixels(cells, look(1.6, 1.7, 3.0))
+def test_pixels_are_shared_among_the_cells_that_a_picture_shows_whose_middles_are_where_their_gaussians_are(cells):
+    inside = cells.view([look(1.6, 1.7, 3.0)]).pixels[0]
     assert inside.sum() == pytest.approx(64 * 64, rel=0.03)
-    corner = count_pixels(cells, look(0.4, 0.5, 1.0, (0.4, 0.4, 0.0))).reshape(coverage.CELLS, -1)
+    corner = cells.view([look(0.4, 0.5, 1.0, (0.4, 0.4, 0.0))]).pixels[0].reshape(coverage.CELLS, -1)
     assert corner[:14, :14].sum() > 0.99 * corner.sum()
-
-
-def test_the_middle_of_a_cell_is_where_its_gaussians_are(cells):
     side = 3.2 / coverage.CELLS
     x, y = cells.middle.reshape(coverage.CELLS, -1, 3)[3, 20, :2]
     assert abs(x - 20.5 * side) < side and abs(y - 3.5 * side) < side
 
 
-def test_half_the_distance_shows_a_cell_in_four_times_the_pixels(cells):
-    at = np.argmax(count_pixels(cells, look(1.6, 1.61, 1.5)))
-    near, far = cells.view([look(1.6, 1.61, 1.5), look(1.6, 1.61, 3.0)]).pixels[:, at]
-    assert near / far == pytest.approx(4, rel=0.1)
+def test_gains_are_what_the_formula_says(cells):
+    """K_gb and the logarithm, cell by cell."""
+    taken, one = look(3.6, 1.6, 2.0), look(1.6, 3.0, 1.0)
+    seen = cells.view([taken, one])
+    importance = 1.0 + np.arange(len(cells)) % 3
+
+    def shown(i, g, b):
+        way = seen.centres[i] - cells.middle[g]
+        cosine = way @ b / np.linalg.norm(way)
+        return seen.pixels[i, g] * np.exp((cosine - 1) / (np.pi / 10) ** 2)
+
+    total = 0.0
+    for g in range(0, len(cells)):
+        for elevation, count in coverage.BELTS:
+            for azimuth in 2 * np.pi * np.arange(count) / count:
+                up, level = np.sin(np.radians(elevation)), np.cos(np.radians(elevation))
+                b = np.array([level * np.cos(azimuth), level * np.sin(azimuth), up])
+                before = 1 + shown(0, g, b)
+                total += importance[g] / importance.mean() * np.log((before + shown(1, g, b)) / before)
+    assert gain(cells, [taken], one, importance) == pytest.approx(total)
 
 
-def test_a_photo_from_another_side_adds_more_than_one_from_the_same(cells):
-    first, again, other = look(3.6, 1.6, 2.0), look(3.6, 1.7, 2.0), look(-0.4, 1.6, 2.0)
-    assert gain(cells, [first], other) > 1.5 * gain(cells, [first], again)
-
-
-def test_gains_only_fall_and_a_photo_that_shows_nothing_gains_nothing(cells):
-    away = cameras.pinhole([0.0, 0.0, 2.0], [0.0, 0.0, 9.0], 64, 64, 40.0)
-    pool = [look(3.6, 1.6, 2.0), look(0.0, 0.0, 2.0), look(1.6, 3.0, 1.0), away]
-    covered = cover(cells, [], pool)
-    before = covered.gains()
-    covered.take(0)
-    after = covered.gains()
-    assert all(a < b for a, b in zip(after[:3], before[:3], strict=True))
-    assert before[3] == after[3] == 0
-
-
-def test_greedy_reaches_its_bound_of_the_best_set(cells):
+def test_lazy_choice_is_plain_greedy_choice_and_gains_of_a_set_add_up_in_any_order(cells):
     pool = [camera.resized(32, 32) for _, camera in patch.pool(8, 0.7)]
+    none, views = cells.view([]), cells.view(pool)
 
-    def value(chosen):
-        covered, total = cover(cells, [], pool), 0.0
+    def sum_gains(chosen):
+        covered, total = coverage.DirectionalCoverage(cells, none, views), 0.0
         for i in chosen:
             total += covered.gain(i)
             covered.take(i)
         return total
 
-    covered = cover(cells, [], pool)
-    greedy = lazy_greedy(covered.gains(), covered.gain, covered.take, 3)
-    best = max(value(chosen) for chosen in combinations(range(8), 3))
-    assert (1 - 1 / np.e) * best <= value(greedy) <= best * (1 + 1e-9)
-    assert value(greedy) == pytest.approx(value(greedy[::-1]))
+    covered, plain = (coverage.DirectionalCoverage(cells, none, views) for _ in range(2))
+    lazy, chosen = lazy_greedy(covered.gains(), covered.gain, covered.take, 4), []
+    for _ in range(4):
+        chosen.append(max((i for i in range(8) if i not in chosen), key=plain.gain))
+        plain.take(chosen[-1])
+    assert lazy == chosen
+    assert sum_gains(lazy) == pytest.approx(sum_gains(lazy[::-1]))
 
 
-def test_cells_that_matter_draw_photos(cells):
-    west, east = look(0.5, 0.6, 1.0, (0.5, 0.5, 0.0)), look(2.7, 0.6, 1.0, (2.7, 0.5, 0.0))
-    matters = np.where(cells.middle[:, 0] > 1.6, 5.0, 1.0)
-    assert gain(cells, [], west) == pytest.approx(gain(cells, [], east), rel=0.1)
-    assert gain(cells, [], east, matters) > 3 * gain(cells, [], west, matters)
-    assert gain(cells, [], east, 1e-20 * matters) == pytest.approx(gain(cells, [], east, matters))
-    assert gain(cells, [], east, 0 * matters) == pytest.approx(gain(cells, [], east))
+def test_importance_has_any_scale_and_none_at_all_is_an_equal_one_and_what_shows_nothing_gains_nothing(cells):
+    one, matters = look(2.7, 0.6, 1.0, (2.7, 0.5, 0.0)), np.where(cells.middle[:, 0] > 1.6, 5.0, 1.0)
+    assert gain(cells, [], one, 1e-20 * matters) == pytest.approx(gain(cells, [], one, matters))
+    assert gain(cells, [], one, 0 * matters) == pytest.approx(gain(cells, [], one))
+    assert gain(cells, [], cameras.pinhole([0.0, 0.0, 2.0], [0.0, 0.0, 9.0], 64, 64, 40.0)) == 0
+    for bad in (-1.0, np.nan):
+        with pytest.raises(ValueError, match="importance"):
+            gain(cells, [], one, np.full(coverage.CELLS**2, bad))
 
 
 def test_where_far_more_ground_is_fitted_than_the_exemplar_all_of_it_counts():
@@ -105,13 +112,7 @@ def test_where_far_more_ground_is_fitted_than_the_exemplar_all_of_it_counts():
     assert (cells.middle[:, 0].min(), cells.middle[:, 0].max()) == pytest.approx((west, east), abs=0.4)
 
 
-@pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
-def test_an_importance_that_is_no_weight_is_refused(cells, bad):
-    with pytest.raises(ValueError, match="importance"):
-        cover(cells, [], [], np.full(coverage.CELLS**2, bad))
-
-
-def test_the_error_of_a_cell_is_that_of_the_pixels_that_show_it(cells):
+def test_the_error_of_a_cell_is_that_of_the_pixels_that_count_and_show_it_or_the_worst_where_none_does(cells):
     """Photos of the field itself, but for a corner that is brighter by .2."""
     wrong = []
     for view in patch.photos(size=96):
@@ -122,12 +123,71 @@ def test_the_error_of_a_cell_is_that_of_the_pixels_that_show_it(cells):
     corner = (cells.middle[:, :2] < 1.0).all(1)
     rest = (cells.middle[:, :2] > 1.4).any(1) & (error < error.max())
     assert np.median(error[corner]) == pytest.approx(0.04, rel=0.2) and np.median(error[rest]) < 1e-4
-
-
-def test_cells_that_no_photo_shows_count_as_the_worst_and_masked_pixels_do_not_count(cells):
-    view = patch.photos(1, size=96)[0]
-    near = replace(view, camera=look(0.5, 0.6, 1.0, (0.5, 0.5, 0.0), 96), image=view.image * 0)
+    near = replace(wrong[0], camera=look(0.5, 0.6, 1.0, (0.5, 0.5, 0.0), 96), image=wrong[0].image * 0)
     error = coverage.measure_cell_errors(cells, [near])
     assert error[-1] == error.max() > 0
     assert (coverage.measure_cell_errors(cells, [replace(near, weight=0 * near.weight)]) == 0).all()
     assert (coverage.measure_cell_errors(cells, []) == 0).all()
+
+
+SPLIT = ViewSplit(("p0.png", "p2.png"), (), ())
+
+
+def pool():
+    return patch.pool(3, turn=2.0)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """A field that is darker than its photos, and more so in the east."""
+    tmp_path = tmp_path_factory.mktemp("files")
+    true = patch.field()
+    east = np.where(true.means[:, 0] > 1.6, 0.6, 0.1).astype(np.float32)[:, None, None]
+    write_field(replace(true, sh=true.sh - east), tmp_path / "field.ply")
+    ground.write_ground(patch.grid(), tmp_path / "ground.exr")
+    write_scene_frame(tmp_path / "ground.json", replace(patch.FRAME, kind="synthetic"))
+    views, names = [], [pose.name for pose, _ in pool()]
+    for pose, camera in pool():
+        picture = np.clip(render(true, camera).colour, 0, 1)
+        image_files.write_png(tmp_path / pose.name, picture)
+        views.append(TrainingView(pose.name, camera, picture, np.ones((96, 96), np.float32)))
+    none = np.zeros(0, int)
+    points = np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
+    (tmp_path / "sparse").mkdir()
+    write_colmap_model(ColmapModel(tuple(names), tuple(c for _, c in pool()), *points), tmp_path / "sparse")
+    oracle.write_truth(tmp_path / "truth", iter(views[1:]))
+    known = np.where(true.means[:, 1] > 1.6, 0.8, 0.2).astype(np.float32)
+    cells = coverage.GroundCells(true, patch.grid()).view([scoring_camera(camera) for _, camera in pool()]).pixels
+    write_pose_maps(tmp_path / "maps.npz", PoseMaps(names, np.zeros((3, 4, 4), np.float32), None, cells), known)
+    given = {name: tmp_path / f"{name}.{end}" for name, end in (("field", "ply"), ("ground", "exr"), ("maps", "npz"))}
+    given |= {"frame": tmp_path / "ground.json", "images": tmp_path, "model": tmp_path / "sparse"}
+    return given | {"truth": tmp_path / "truth", "captures": [], "fits": []}
+
+
+def build(policy, files, agent="render"):
+    scores = Scores([pose for pose, _ in pool()][::-1], {}, Scales({}), np.zeros(3, int))
+    return policy_inputs.build_information_gain(policy, scores, pool(), [], SPLIT, files, agent)
+
+
+def test_gains_are_in_the_order_of_the_scores(cells, files):
+    alone = [gain(cells, [], scoring_camera(camera)) for _, camera in pool()][::-1]
+    assert build("coverage", files).gains() == alone and len(set(alone)) == 3
+    assert (build("coverage", files).importance == 1).all()  # without a weight all cells count alike
+
+
+@pytest.mark.parametrize("policy, agent", [("coverage-error", "render"), ("oracle", "render"), ("oracle", "replay")])
+def test_ground_that_is_shown_wrong_matters_more_but_in_rejected_photos(cells, files, policy, agent, tmp_path):
+    found, east = build(policy, files, agent).importance, cells.middle[:, 0] > 1.6
+    assert found[east].mean() > 5 * found[~east].mean() > 0
+    rejected = {"new_views": {"taken": False, "views": [{"view": name} for name in SPLIT.start]}}
+    (tmp_path / "fit.json").write_text(json.dumps(rejected))
+    assert (build("coverage-error", files | {"fits": [tmp_path / "fit.json"]}).importance == 1).all()
+
+
+def test_a_prior_counts_by_the_gaussians_over_a_cell_and_no_truth_is_refused(cells, files, tmp_path):
+    found, north = build("coverage-w2", files).importance, cells.middle[:, 1] > 1.6
+    assert found[north].mean() / found[~north].mean() == pytest.approx(4, rel=0.05)
+    assert build("farthest", {}) is None
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="shows no candidate that is left"):
+        build("oracle", files | {"truth": tmp_path / "empty"})

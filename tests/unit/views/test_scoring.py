@@ -8,10 +8,11 @@ from fixtures import ground as patch
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.poses import pose_of_camera
+from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.images import image_files
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import DecodedViews
+from dav_gswt.reconstruction.objects import make_blobs
 from dav_gswt.views import collision, coverage, frozen_scales, pose_maps, scores, scoring
 from dav_gswt.views.frozen_scales import FrozenScales
 from dav_gswt.views.prior_sampling import PriorConfig
@@ -54,71 +55,49 @@ def scored(prior=None, **more):
     return scoring.score_poses(patch.field(), patch.grid(), pool(), patch.photos(), patch.FRAME, prior, **more)
 
 
+def sampled_w2(p_drop, model=KnownDisagreement, **more):
+    return scored(PriorConfig(model(), 2, 4, p_drop, **more)).scores.terms["w2_sq"]
+
+
 def test_a_photo_counts_alike_upright_or_across():
-    pose = cameras.look_at((0.0, 0.0, 1.0), (0.3, 0.0, 0.0))
-    across = cameras.Camera(*pose, 400.0, 400.0, 200.0, 150.0, 400, 300)
-    upright = cameras.Camera(*pose, 400.0, 400.0, 150.0, 200.0, 300, 400)
-    small, turned = (scoring.scoring_camera(camera) for camera in (across, upright))
+    pose, sizes = cameras.look_at((0.0, 0.0, 1.0), (0.3, 0.0, 0.0)), ((400, 300), (300, 400))
+    small, turned = (scoring.scoring_camera(cameras.Camera(*pose, 400.0, 400.0, w / 2, h / 2, w, h)) for w, h in sizes)
     assert (small.width, small.height) == (turned.height, turned.width) == (96, 72)
     assert small.fx == turned.fx
 
 
-def test_without_a_prior_only_geometric_terms_are_computed():
-    found = scored()
-    assert set(found.scores.terms) == {"opacity", "coverage"} and found.maps.w2_sq is None
-    assert np.array_equal(found.gaussians, patch.field().uncertainty) and not found.scores.steps.any()
-    assert (found.scores.terms["coverage"] > 0).all() and found.frozen.pixels is None
-
-
-def test_w2_is_the_disagreement_of_the_samples_and_0_without_dropout():
+def test_w2_is_the_disagreement_of_the_samples_and_the_residual_how_far_their_mean_is_from_the_render():
     still, dropped = (scored(PriorConfig(KnownDisagreement(), 2, 4, p)) for p in (0.0, 0.2))
     assert not still.scores.terms["w2_sq"].any() and still.scores.scales.by_term["w2_sq"] == 0
     # two samples at +-d in four channels: 2 var(ddof=1) summed is 4 (2 d)^2, and d is .2 of a blue of about .4
     np.testing.assert_allclose(dropped.scores.terms["w2_sq"][0], 4 * (2 * 0.2 * 0.4) ** 2, rtol=0.2)
     assert dropped.maps.w2_sq.shape == (3, 32, 32) and (dropped.scores.steps == 4).all()
     assert "lpips" not in dropped.scores.terms
+    for found in (still, dropped):  # the mean stays, whatever the samples differ by
+        np.testing.assert_allclose(found.scores.terms["residual"][0], 4 * (0.5 * 0.4) ** 2, rtol=0.2)
+    first = FrozenScales(Scales(dict.fromkeys(scores.TERMS, 7.0)), Quantiles(0.0, 1.0))  # of an earlier round
+    assert scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2), frozen=first).scores.scales == first.scales
 
 
-def test_posterior_adds_the_variances_of_the_latents_to_w2():
-    """Here all are equally wide (0), so it changes nothing; a prior whose samples differ in width disagrees more."""
-
+def test_posterior_adds_the_variances_of_the_latents_to_w2_and_independent_noise_makes_samples_disagree():
     class Uneven(KnownDisagreement):
         def estimate_variances(self, latents):
             return np.arange(latents.shape[1], dtype=np.float32)[None, :, None, None, None] + np.zeros_like(latents)
 
-    point, posterior = (
-        scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2, posterior=p)).scores.terms["w2_sq"] for p in (False, True)
-    )
-    assert np.array_equal(point, posterior)
-    wider = scored(PriorConfig(Uneven(), 2, 4, 0.2, posterior=True)).scores.terms["w2_sq"]
+    point, posterior = (sampled_w2(0.2, posterior=p) for p in (False, True))
+    wider = sampled_w2(0.2, Uneven, posterior=True)
+    assert np.array_equal(point, posterior)  # of samples that are equally wide
     np.testing.assert_allclose(wider - point, 4.0, rtol=1e-5)  # deviations 0 and 1, in four channels
 
-
-def test_residual_is_the_distance_of_the_samples_mean_from_the_render():
-    """Samples to either side of nothing: their mean stays, whatever they differ by."""
-    little, much = (scored(PriorConfig(KnownDisagreement(), 2, 4, p)).scores.terms["residual"] for p in (0.1, 0.4))
-    np.testing.assert_allclose(little, much, rtol=1e-6)
-    np.testing.assert_allclose(little[0], 4 * (0.5 * 0.4) ** 2, rtol=0.2)
-
-
-def test_independent_noise_makes_samples_disagree_without_dropout():
     class Noisy(KnownDisagreement):
         def sample(self, condition, m, p_drop, steps, seed, common=True):
             return super().sample(condition, m, 0.0 if common else 0.3, steps, seed)
 
-    common, own = (
-        scored(PriorConfig(Noisy(), 2, 4, 0.0, independent_noise=n)).scores.terms["w2_sq"] for n in (False, True)
-    )
+    common, own = (sampled_w2(0.0, Noisy, independent_noise=n) for n in (False, True))
     assert not common.any() and (own > 0).all()
 
 
-def test_later_rounds_keep_the_scales_of_the_first():
-    first = FrozenScales(Scales(dict.fromkeys(scores.TERMS, 7.0)), Quantiles(0.0, 1.0))
-    assert scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2), frozen=first).scores.scales == first.scales
-
-
 def test_a_gaussian_gets_the_uncertainty_of_the_pixels_that_it_covers():
-    """With a map that is 1 in the picture's left half only, Gaussians on the left are uncertain, others are not."""
     field, (_, camera) = patch.field(), pool()[0]
     half = np.zeros((16, 16), np.float32)
     half[:, :8] = 1
@@ -128,21 +107,20 @@ def test_a_gaussian_gets_the_uncertainty_of_the_pixels_that_it_covers():
     assert found[drawn & (column < 0.4 * 40)].min() > 0.95 and found[drawn & (column > 0.6 * 40)].max() < 0.05
     one = backproject_maps(field, [camera], np.full((1, 16, 16), 0.25, np.float32))
     np.testing.assert_allclose(one[drawn], 0.25, rtol=1e-5)
-
-
-def test_gaussians_that_no_candidate_sees_keep_their_geometric_uncertainty():
+    # those that no candidate sees keep their geometric uncertainty
     field = replace(patch.field(), uncertainty=np.full(len(patch.field()), 0.3, np.float32))
     tele = cameras.pinhole([0.3, 0.3, 5.0], [0.3, 0.3, 0.0], 40, 40, 4.0)
-    one = [(pose_of_camera("p0", tele, patch.FRAME), tele)]
-    found = scoring.score_poses(
-        field, patch.grid(), one, patch.photos(), patch.FRAME, PriorConfig(KnownDisagreement(), 2, 4, 0.2)
-    )
+    one, prior = [(pose_of_camera("p0", tele, patch.FRAME), tele)], PriorConfig(KnownDisagreement(), 2, 4, 0.2)
+    found = scoring.score_poses(field, patch.grid(), one, patch.photos(), patch.FRAME, prior)
     far = np.linalg.norm(field.means[:, :2] - 0.3, axis=1) > 1
     assert (found.gaussians[far] == np.float32(0.3)).all() and (found.gaussians[~far] != np.float32(0.3)).any()
 
 
-def test_coverage_is_the_gain_over_the_photos_so_far_and_the_maps_keep_what_it_is_made_of():
+def test_without_a_prior_only_geometric_terms_are_computed_of_which_coverage_is_the_gain_over_the_photos_so_far():
     found, cells = scored(), coverage.GroundCells(patch.field(), patch.grid())
+    assert set(found.scores.terms) == {"opacity", "coverage"} and found.maps.w2_sq is None
+    assert np.array_equal(found.gaussians, patch.field().uncertainty) and not found.scores.steps.any()
+    assert (found.scores.terms["coverage"] > 0).all() and found.frozen.pixels is None
     taken, wanted = (
         cells.view([scoring.scoring_camera(camera) for camera in seen])
         for seen in ([view.camera for view in patch.photos()], [camera for _, camera in pool()])
@@ -154,25 +132,24 @@ def test_coverage_is_the_gain_over_the_photos_so_far_and_the_maps_keep_what_it_i
 
 
 def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
-    wide, square = pool([1.6, 1.6, 5.0], width=60)[0][1], pool([1.6, 1.6, 5.0])[0][1]
+    wide = pool([1.6, 1.6, 5.0], width=60)[0][1]
     cut = conditions.crop_camera(wide)
     assert (cut.width, cut.height) == (40, 40) and cut.cx == wide.cx - 10
     np.testing.assert_allclose(cut.rays()[1], wide.rays()[1][:, 10:50])
     picture = np.random.default_rng(0).random((40, 60, 3), np.float32)
     assert np.array_equal(conditions.crop_image(picture), picture[:, 10:50])
     photos = patch.photos()
-    assert conditions.prepare_photos(photos, patch.FRAME, 64).photos.shape == (
-        3,
-        64,
-        64,
-        3,
-    )  # smaller photos are enlarged
+    large = conditions.prepare_photos(photos, patch.FRAME, 64).photos
+    assert large.shape == (3, 64, 64, 3)  # smaller photos are enlarged
     known = conditions.prepare_photos(photos, patch.FRAME, 24)
     near = photos[1].camera.centre + [0, 0, 0.1]
     condition = conditions.build_condition(patch.field(), pool(near), known, 6.0, 24)
     assert np.array_equal(condition.photo[0], known.photos[1])
     assert condition.relative[0] == pytest.approx([0, 0, 1, 0], abs=0.05) and condition.colour.shape == (1, 24, 24, 3)
-    assert square.width == 40
+    turned = conditions.relative_pose(Pose("", 10.0, 20.0, 3.0), Pose("", 40.0, 110.0, 6.0), 6.0)
+    assert turned == pytest.approx([np.pi / 6, 1, 0, 0.5], abs=1e-6)
+    up = conditions.render_view(patch.field(), pool([1.6, 1.61, 3.0])[0][1], 6.0)
+    assert up.inverse_depth[20, 20] == pytest.approx(6 / 3, rel=0.02) and up.alpha[20, 20] > 0.95
 
 
 def test_a_prior_is_not_shown_what_no_photo_shows():
@@ -193,12 +170,7 @@ def test_a_prior_is_not_shown_what_no_photo_shows():
 
 
 def test_poses_below_the_ground_or_inside_an_object_are_left_out(caplog):
-    block = replace(
-        patch.field()[:1],
-        means=np.float32([[1.6, 1.6, 2.0]]),
-        log_scales=np.log(np.float32([[0.3, 0.3, 0.3]])),
-        opacity_logits=np.float32([4.0]),
-    )
+    block = make_blobs(np.array([[1.6, 1.6, 2.0]]), np.full((1, 3), 0.5), np.full(1, 0.3), logit=4.0)
 
     def at(name, *eye):
         camera = cameras.pinhole(eye, [1.6, 1.7, 5.0], 40, 40, 40.0)
@@ -217,6 +189,9 @@ def test_maps_are_read_as_written_and_stand_in_an_exr_with_their_poses(tmp_path)
     found = scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2))
     pose_maps.write_pose_maps(tmp_path / "maps.npz", found.maps, found.gaussians)
     back, gaussians = pose_maps.read_pose_maps(tmp_path / "maps.npz")
+    (tmp_path / "broken.npz").write_bytes(b"PK nothing of the kind")
+    with pytest.raises(InputError, match="broken.npz: not readable as maps"):
+        pose_maps.read_pose_maps(tmp_path / "broken.npz")
     assert back.names == ["p0", "p1", "p2"] and np.array_equal(gaussians, found.gaussians)
     assert np.array_equal(back.w2_sq, found.maps.w2_sq)
     np.testing.assert_allclose(back.opacity, found.maps.opacity, atol=1e-3)
@@ -226,29 +201,18 @@ def test_maps_are_read_as_written_and_stand_in_an_exr_with_their_poses(tmp_path)
     channels, header = read["p1"]
     assert channels["uncertainty"].shape == channels["w2_sq"].shape == (96, 96)
     assert float(header["w2_sq"]) == found.scores.terms["w2_sq"][1] and float(header["radius"]) == pool()[1][0].radius
-
-
-def test_the_prior_map_of_a_wide_picture_is_nan_outside_its_middle_square():
-    found = pose_maps.PoseMaps(
-        ["p0"], np.zeros((1, 64, 96), np.float32), np.ones((1, 16, 16), np.float32), np.ones((1, 9), np.float32)
-    )
+    # of a wide picture the prior's map is NaN outside the middle square
+    opacity, w2, cells = (np.ones(shape, np.float32) for shape in ((1, 64, 96), (1, 16, 16), (1, 9)))
+    found = pose_maps.PoseMaps(["p0"], opacity, w2, cells)
     table = scores.Scores([pool()[0][0]], {"w2_sq": np.ones(1)}, Scales({"w2_sq": 1.0}), np.ones(1, int))
     shown = found.exr_part(table, "p0")[0]["w2_sq"]
     assert (shown[:, 16:80] == 1).all() and np.isnan(shown[:, :16]).all() and np.isnan(shown[:, 80:]).all()
-
-
-def test_a_file_without_maps_is_refused(tmp_path):
-    (tmp_path / "maps.npz").write_bytes(b"PK nothing of the kind")
-    with pytest.raises(InputError, match="maps.npz: not readable as maps"):
-        pose_maps.read_pose_maps(tmp_path / "maps.npz")
 
 
 def test_frozen_scales_are_read_as_written_and_other_files_are_refused(tmp_path):
     first = FrozenScales(Scales({"w2_sq": 1 / 3, "coverage": 0.0}), Quantiles(0.1, 2 / 3))
     frozen_scales.write_frozen_scales(tmp_path / "scores.json", first, {"candidates": 3}, {}, {})
     assert frozen_scales.read_frozen_scales(tmp_path / "scores.json") == first
-    frozen_scales.write_frozen_scales(tmp_path / "scores.json", replace(first, pixels=None), {}, {}, {})
-    assert frozen_scales.read_frozen_scales(tmp_path / "scores.json").pixels is None
     for bad in ("{}", '{"scales": [], "pixels": null}', '{"scales": {"w2_sq": -1}, "pixels": null}'):
         (tmp_path / "scores.json").write_text(bad)
         with pytest.raises(InputError, match="scores.json: does not hold the scales"):

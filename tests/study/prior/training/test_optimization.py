@@ -6,53 +6,41 @@ from dav_gswt.study.prior.training import optimization
 from dav_gswt.study.prior.training.optimization import EncodedExamples, TrainingPlan
 
 
-def pictures(count=24):
-    """Smooth random pictures, as bytes."""
-    rng = torch.Generator().manual_seed(0)
-    small = torch.rand((count, PLANES, 4, 4), generator=rng)
-    return (255 * torch.nn.functional.interpolate(small, (SIZE, SIZE), mode="bilinear")).to(torch.uint8)
-
-
-def codes(count=16):
-    rng = torch.Generator().manual_seed(1)
-    truth = torch.randn((count, *LATENT), generator=rng)
-    return EncodedExamples(
-        truth, truth + 0.1, torch.ones((count, 1, *LATENT[1:])), truth.flip(0), torch.zeros((count, 4))
-    )
-
-
 def network():
     torch.manual_seed(3)
     return Network()
 
 
 def test_the_coder_learns_and_its_codes_get_unit_variance(tmp_path):
+    small = torch.rand((24, PLANES, 4, 4), generator=torch.Generator().manual_seed(0))
+    pictures = (255 * torch.nn.functional.interpolate(small, (SIZE, SIZE), mode="bilinear")).to(torch.uint8)
     made = network()
-    losses = optimization.train_autoencoder(made, pictures(), TrainingPlan(12, 4, 3e-3, 0), tmp_path / "coder")
+    losses = optimization.train_autoencoder(made, pictures, TrainingPlan(12, 4, 3e-3, 0), tmp_path / "coder")
     assert len(losses) == 12 and sum(losses[-3:]) < sum(losses[:3])
     with torch.inference_mode():
-        assert made.encode(pictures().float() / 255).std() == pytest.approx(1, rel=0.05)
+        assert made.encode(pictures.float() / 255).std() == pytest.approx(1, rel=0.05)
 
 
 def test_a_training_that_was_killed_ends_with_the_same_weights(tmp_path, monkeypatch):
     monkeypatch.setattr(optimization, "CHECKPOINT_STEPS", 2)
-    plan, whole = TrainingPlan(5, 4, 1e-3, 7), network()
-    expected = optimization.train_denoiser(whole, codes(), plan, tmp_path / "a")
-    killed, left = network(), 3
+    truth = torch.randn((16, *LATENT), generator=torch.Generator().manual_seed(1))
+    known = torch.ones((16, 1, *LATENT[1:]))
+    codes = EncodedExamples(truth, truth + 0.1, known, truth.flip(0), torch.zeros((16, 4)))
+    plan, whole = TrainingPlan(4, 2, 1e-3, 7), network()
+    expected = optimization.train_denoiser(whole, codes, plan, tmp_path / "a")
+    killed, turns = network(), iter(range(3))
     true = killed.predict_velocity
 
     def denoised(*given):
-        nonlocal left
-        if left == 0:
+        if next(turns, None) is None:
             raise KeyboardInterrupt
-        left -= 1
         return true(*given)
 
     monkeypatch.setattr(killed, "predict_velocity", denoised)
     with pytest.raises(KeyboardInterrupt):
-        optimization.train_denoiser(killed, codes(), plan, tmp_path / "b")
+        optimization.train_denoiser(killed, codes, plan, tmp_path / "b")
     again = network()
-    assert optimization.train_denoiser(again, codes(), plan, tmp_path / "b") == pytest.approx(expected, rel=1e-6)
+    assert optimization.train_denoiser(again, codes, plan, tmp_path / "b") == pytest.approx(expected, rel=1e-6)
     for name, value in whole.state_dict().items():
         torch.testing.assert_close(again.state_dict()[name], value, msg=name)
     assert not list(tmp_path.iterdir())

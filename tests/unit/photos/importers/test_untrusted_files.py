@@ -1,22 +1,16 @@
 """Models from outside that are damaged or ill meant: one message that names the file and what is wrong in it."""
 
 import copy
-import json
 import struct
 
 import numpy as np
 import pycolmap
 import pytest
 from fixtures import imported_models as made
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos import importers
 from dav_gswt.photos.importers import import_model
-from dav_gswt.photos.importers.colmap import import_colmap
-from dav_gswt.photos.importers.photo_matching import PhotoFolder
 
 
 @pytest.fixture(scope="module")
@@ -55,8 +49,6 @@ SHEARED = (np.eye(4) + np.diag([0.01, 0, 0], 1)).tolist()
     [
         (["frames"], 7, "frames is not a list"),
         (["frames", 2], "x", "frame 2: file_path is missing"),
-        (["frames", 2, "file_path"], ..., "frame 2: file_path is missing"),
-        (["frames", 2, "file_path"], 5, "frame 2: file_path is not a text"),
         (["frames", 2, "file_path"], "../../secret.png", "secret.png' leads out"),
         (["frames", 2, "file_path"], "/etc/passwd.png", "leads out of the photos' folder"),
         (["frames", 2, "file_path"], "C:\\photos\\1.png", "leads out of the photos' folder"),
@@ -64,10 +56,8 @@ SHEARED = (np.eye(4) + np.diag([0.01, 0, 0], 1)).tolist()
         (["frames", 2, "file_path"], "a\0b.png", "is no name of a picture"),
         (["frames", 2, "file_path"], "x" * 5000, "is no name of a picture"),
         (["frames", 2, "file_path"], "./001.png", "001.png is there twice"),
-        (["frames", 2, "transform_matrix"], ..., "frame 002.png: transform_matrix is missing"),
         (["frames", 2, "transform_matrix"], [[1, 2], [3, 4]], "frame 002.png: transform_matrix does not hold 3 x 4"),
         (["frames", 2, "transform_matrix"], SHEARED, "frame 002.png: transform_matrix: its rotation is none"),
-        (["frames", 2, "transform_matrix"], np.diag([2.0, 2, 2, 1]).tolist(), "frame 002.png: .*rotation is none"),
         (["frames", 2, "transform_matrix"], np.diag([-1.0, 1, 1, 1]).tolist(), "frame 002.png: .*rotation is none"),
         (["frames", 2, "transform_matrix", 0, 3], float("nan"), "frame 002.png: transform_matrix is 'nan'"),
         (["frames", 2, "transform_matrix", 0, 3], 10**400, "frame 002.png: transform_matrix is '1000"),
@@ -75,20 +65,16 @@ SHEARED = (np.eye(4) + np.diag([0.01, 0, 0], 1)).tolist()
         (["frames", 2, "transform_matrix", 3], [0, 0, 1, 1], "its last row is not 0 0 0 1"),
         (["fl_x"], ..., "frame 000.png: neither fl_x nor camera_angle_x"),
         (["fl_x"], -300, "frame 000.png: focal lengths -300"),
-        (["fl_x"], "wide", "frame 000.png: fl_x is 'wide'"),
-        (["fl_x"], float("inf"), "frame 000.png: fl_x is 'inf'"),
+        (["frames", 2, "camera_angle_x"], 4.0, "camera_angle_x is 4; a field of view"),
         (["w"], 0, "frame 000.png: w is 0"),
         (["h"], 240.5, "frame 000.png: h is 240.5"),
         (["w"], 999999, "pixels; 1 pixel to"),
         (["k4"], 0.1, "frame 000.png: k4 is not read with camera_model OPENCV"),
         (["camera_model"], "EQUIRECTANGULAR", "camera_model EQUIRECTANGULAR is not read"),
-        (["camera_model"], ["OPENCV"], "is not read"),
         (["applied_transform"], [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1, 0]], "applied_transform mirrors"),
         (["applied_transform"], [[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0]], "applied_transform: its rotation is none"),
-        (["applied_transform"], "x", "applied_transform does not hold"),
         (["applied_scale"], 0, "applied_scale is 0"),
         (["ply_file_path"], "../cloud.ply", "ply_file_path: '../cloud.ply' leads out"),
-        (["ply_file_path"], 4, "ply_file_path is not a text"),
     ],
 )
 def test_transforms_that_cannot_be_are_refused_by_key(photos, tmp_path, where, value, match):
@@ -101,26 +87,16 @@ def test_transforms_that_cannot_be_are_refused_by_key(photos, tmp_path, where, v
         ([0, "cameras"], ..., "cameras is missing"),
         ([0, "cameras", "v2 brown"], 3, "camera 'v2 brown' is no object"),
         ([0, "cameras", "v2 brown", "projection_type"], "spherical", "camera 'v2 brown': projection_type spherical"),
-        ([0, "cameras", "v2 brown", "projection_type"], {}, "camera 'v2 brown': projection_type"),
         ([0, "cameras", "v2 brown", "focal_x"], ..., "camera 'v2 brown': focal_x is missing"),
-        ([0, "cameras", "v2 brown", "focal_x"], 0, "camera 'v2 brown': focal lengths 0"),
         ([0, "cameras", "v2 brown", "focal_y"], float("nan"), "camera 'v2 brown': focal_y is 'nan'"),
-        ([0, "cameras", "v2 brown", "width"], -4, "camera 'v2 brown': pictures of -4 x 240"),
-        ([0, "cameras", "v2 brown", "width"], 1e300, "camera 'v2 brown': pictures of"),
         ([0, "shots"], [], "shots is not an object"),
-        ([0, "shots", "002.png"], None, "shot 002.png: camera is missing"),
         ([0, "shots", "002.png", "camera"], "v3", "shot 002.png: there is no camera 'v3'"),
-        ([0, "shots", "002.png", "rotation"], [1, 2], "shot 002.png: rotation does not hold 3"),
         ([0, "shots", "002.png", "rotation"], [1e6, 0, 0], "shot 002.png: rotation .* is no axis"),
-        ([0, "shots", "002.png", "translation"], ..., "shot 002.png: translation is missing"),
-        ([0, "shots", "002.png", "translation", 1], float("-inf"), "shot 002.png: translation is '-inf'"),
         ([0, "shots", "../002.png"], {}, "'../002.png' leads out"),
         ([0, "points", "4", "coordinates"], [1, 2], "points: one has not 3 coordinates"),
         ([0, "points", "4", "coordinates", 0], float("nan"), "points: a number is not finite"),
-        ([0, "points", "4"], 5, "points: one has not 3 coordinates"),
         ([0, "points"], [], "points: not an object"),
         ([0, "reference_lla"], {"latitude": 95, "longitude": 0, "altitude": 0}, "reference_lla: 95, 0, 0 is no place"),
-        ([0, "reference_lla"], {"latitude": 5}, "reference_lla: longitude is 'None'"),
     ],
 )
 def test_reconstructions_that_cannot_be_are_refused_by_key(photos, tmp_path, where, value, match):
@@ -131,14 +107,9 @@ def test_reconstructions_that_cannot_be_are_refused_by_key(photos, tmp_path, whe
 @pytest.mark.parametrize(
     "text, match",
     [
-        ("", "not readable as JSON"),
-        ("{", "not readable as JSON"),
         ("[" * 100_000, "not readable as JSON"),
-        ("\xff\xfe", "not readable as JSON"),
-        ("{}", "neither a transforms.json"),
         ("[]", "neither a transforms.json"),
         ('[{"a": 1}]', "neither a transforms.json"),
-        ("7", "neither a transforms.json"),
         ('{"frames": [], "frames": []}', "the key 'frames' is there twice"),
         ('{"frames": []}', "0 of its 0 images have a photo"),
     ],
@@ -176,9 +147,6 @@ PLY = "ply\nformat {} 1.0\nelement vertex {}\nproperty float x\nproperty float y
         (b"no ply", "not readable as a PLY"),
         (PLY.format("binary_little_endian", 10**12).encode(), "promises more points"),
         (PLY.format("binary_little_endian", 1).encode() + struct.pack("<3f", 1, np.nan, 0), "not finite"),
-        (PLY.format("ascii", 1).encode() + b"1 2\n", "not readable as a PLY"),
-        (PLY.replace("vertex", "face").format("ascii", 1).encode() + b"1 2 3\n", "not readable as a PLY"),
-        (PLY.replace("float z", "float w").format("ascii", 1).encode() + b"1 2 3\n", "not readable as a PLY"),
     ],
 )
 def test_clouds_that_cannot_be_are_refused_by_name(photos, tmp_path, content, match):
@@ -192,21 +160,15 @@ def test_clouds_that_cannot_be_are_refused_by_name(photos, tmp_path, content, ma
     "file, old, new, match",
     [
         ("cameras", "3 OPENCV", "3 BANANA", "camera 3: pictures of a camera BANANA"),
-        ("cameras", "3 OPENCV", "3 EQUIRECTANGULAR", "camera 3: pictures of a camera EQUIRECTANGULAR"),
+        ("cameras", "# Camera list", "3 PINHOLE 320 240 300 300 160 120", "camera 3 is there twice"),
         ("cameras", "3 OPENCV", "x OPENCV", "does not read as CAMERA_ID"),
-        ("cameras", "3 OPENCV", "3 PINHOLE", "camera 3: PINHOLE needs finite numbers for fx, fy, cx, cy"),
-        ("cameras", "300.0", "nan", "camera 3: OPENCV needs finite numbers"),
-        ("cameras", "300.0", "-300.0", "camera 3: focal lengths -300"),
-        ("cameras", "320 240", "1000000000 1000000000", "camera 3: pictures of 1000000000 x"),
         ("images", " 3 000.png", " 4 000.png", "image 000.png: there is no camera 4"),
         ("images", "001.png", "000.png", "000.png is there twice"),
         ("images", "001.png", "../001.png", "'../001.png' leads out"),
-        ("images", "001.png", "/home/x/001.png", "leads out"),
         ("images", "1.5 2.5 -1", "1.5 2.5", "does not read as IMAGE_ID"),
         ("images", "1.5 2.5 -1", "1.5 2.5 7", "has no point 7, which 000.png sees"),
         ("images", "1.5 2.5 -1", "nan 2.5 100", "image 000.png: a number is not finite"),
         ("images", "\n5 ", "\n5 2", "image 000.png: its quaternion has length"),
-        ("images", "\n5 ", "\n5 x", "does not read as IMAGE_ID"),
         ("points3D", "\n100 ", "\n103 ", "a point is there twice"),
         ("points3D", "\n100 ", "\n-100 ", "does not read as POINT3D_ID"),
         ("points3D", "\n100 ", "\n100 nan ", "a number is not finite"),
@@ -231,61 +193,12 @@ def binary(tmp_path_factory):
     return {name: (folder / f"{name}.bin").read_bytes() for name in ("cameras", "images", "points3D")}
 
 
-def write_binary(folder, files):
-    folder.mkdir(exist_ok=True)
-    for name, content in files.items():
-        (folder / f"{name}.bin").write_bytes(content)
-    return folder
-
-
 @pytest.mark.parametrize("file", ["cameras", "images", "points3D"])
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda b: b"",
-        lambda b: b[:-1],
-        lambda b: b[: len(b) // 2],
-        lambda b: b + b"x",
-        lambda b: struct.pack("<Q", 2**63) + b[8:],
-        lambda b: struct.pack("<Q", 10**9) + b[8:],
-    ],
-    ids=["empty", "cut", "half", "longer", "counts without end", "counts beyond the file"],
-)
-def test_damaged_binary_models_are_refused_by_file(photos, tmp_path, binary, file, damage):
-    folder = write_binary(tmp_path / "m", binary | {file: damage(binary[file])})
-    with pytest.raises(InputError, match=rf"{file}.bin: "):
-        import_model(folder, photos, made.OPTIONS)
-
-
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    file=st.sampled_from(["cameras", "images", "points3D"]),
-    at=st.floats(0, 1, exclude_max=True),
-    new=st.binary(min_size=1, max_size=8),
-)
-def test_whatever_bytes_change_there_is_a_model_or_one_message(photos, tmp_path, binary, file, at, new):
-    content = bytearray(binary[file])
-    place = int(at * len(content))
-    content[place : place + len(new)] = new[: len(content) - place]
-    folder = write_binary(tmp_path / "m", binary | {file: bytes(content)})
-    try:
-        found = import_colmap(folder, photos)
-    except InputError as error:
-        assert ".bin: " in str(error)
-    else:
-        assert np.isfinite(found.points).all() and np.isfinite(found.pixels).all()
-
-
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(at=st.floats(0, 1, exclude_max=True), new=st.text(max_size=6), opensfm=st.booleans())
-def test_whatever_text_changes_there_is_a_model_or_one_message(photos, tmp_path, at, new, opensfm):
-    text = json.dumps(made.reconstruction() if opensfm else made.transforms())
-    place = int(at * len(text))
-    path = tmp_path / "some.json"
-    path.write_text(text[:place] + new + text[place + len(new) :], encoding="utf-8", errors="replace")
-    try:
-        found = importers._read_model(path, PhotoFolder(photos))
-    except InputError as error:
-        assert "some.json" in str(error)
-    else:
-        assert all(np.isfinite(s.translation).all() for s in found.shots)
+def test_damaged_binary_models_are_refused_by_file(photos, tmp_path, binary, file):
+    whole = binary[file]
+    for name, content in binary.items():
+        (tmp_path / f"{name}.bin").write_bytes(content)
+    for damaged in (whole[:-1], whole + b"x", struct.pack("<Q", 10**9) + whole[8:]):
+        (tmp_path / f"{file}.bin").write_bytes(damaged)
+        with pytest.raises(InputError, match=rf"{file}.bin: "):
+            import_model(tmp_path, photos, made.OPTIONS)

@@ -1,28 +1,32 @@
-"""Positions along a line, and positions within their own error, against a made-up flight."""
+"""Positions by GPS and the choice of a focal length, against made-up flights."""
+
+from pathlib import Path
 
 import numpy as np
 import pycolmap
 import pytest
 from fixtures import photos as synth
 
-from dav_gswt.photos.sfm import gps
+from dav_gswt.errors import InputError
+from dav_gswt.photos.colmap_model import measure_parallax, triangulate_model, write_colmap_model
+from dav_gswt.photos.sfm import focal_length, gps
 from dav_gswt.photos.sfm.registration import _find_up
 
 HEIGHT = 40.0  # metres: a flying height
 
 
-def reconstruct(model):
-    """A reconstruction of the model's cameras and points, without observations."""
-    out = pycolmap.Reconstruction()
-    for i, camera in enumerate(model.cameras, 1):
-        params = [camera.fx, camera.fy, camera.cx, camera.cy]
-        lens = pycolmap.Camera(camera_id=i, model="PINHOLE", width=camera.width, height=camera.height, params=params)
-        out.add_camera_with_trivial_rig(lens)
-        image = pycolmap.Image(image_id=i, name=model.names[i - 1], camera_id=i)
-        out.add_image_with_trivial_frame(image, pycolmap.Rigid3d(np.c_[camera.rotation, camera.translation]))
-    for point in model.points:
-        out.add_point3D(point, pycolmap.Track())
-    return out
+@pytest.fixture
+def reconstruct(tmp_path):
+    """Makes a reconstruction of a model, whose cameras share one lens of a focal length."""
+
+    def make(model, focal=synth.FOCAL):
+        write_colmap_model(triangulate_model(model, model.names), tmp_path)  # points that two photos see
+        out = pycolmap.Reconstruction(str(tmp_path))
+        out.cameras[1].model = pycolmap.CameraModelId.SIMPLE_RADIAL
+        out.cameras[1].params = [focal, synth.WIDTH / 2, synth.HEIGHT / 2, 0.0]
+        return out
+
+    return make
 
 
 def place(model, rng, noise):
@@ -36,28 +40,43 @@ def test_heights_that_drift_along_a_line_do_not_say_where_up_is():
     along = np.linspace(0, 200, 12)
     drifting = np.c_[along, np.zeros(12), 60 + 12 * np.sin(along / 60)]
     assert not gps.measure_spread(drifting)[1]
-    assert gps.measure_spread(np.c_[along, 30 * np.cos(along), np.full(12, 60.0)])[1]
+    spread, says_up = gps.measure_spread(np.c_[along, 30 * np.cos(along), np.full(12, 60.0)])
+    assert says_up and spread == pytest.approx(np.hypot(along.std(), (30 * np.cos(along)).std()))
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_photos_along_a_line_leave_the_ground_level(seed):
+@pytest.mark.parametrize("seed", range(2))
+def test_photos_along_a_line_leave_the_ground_level(reconstruct, seed):
     """Ten photos on 90 metres, receivers 2 metres off: about the line the positions say nothing."""
     rng = np.random.default_rng(seed)
     model = synth.model(synth.flight(1, 10, step=0.25), synth.plain(500, 1.0, rng))
     best = reconstruct(model)
-    assert gps.align_to_gps(best, place(model, rng, 2.0), _find_up(best, 0))
+    at = place(model, rng, 2.0)
+    assert gps.align_to_gps(best, at, _find_up(best, 0))
     down = np.array([best.images[i].cam_from_world().rotation.matrix()[2] for i in best.reg_image_ids()])
     assert (down[:, 2] < -0.99).all()  # as the model has them, upright
     centres = np.array([best.images[i].projection_center() for i in sorted(best.reg_image_ids())])
     assert np.linalg.norm(centres[-1] - centres[0]) == pytest.approx(90, rel=0.1)
+    assert np.median(np.linalg.norm(centres - [at[name] for name in model.names], axis=1)) < 6
 
 
-def test_positions_within_their_own_error_give_no_scale():
+def test_positions_over_an_area_place_the_photos_and_outliers_have_no_say(reconstruct):
+    rng = np.random.default_rng(2)
+    model = synth.model(synth.flight(3, 4, step=0.4), synth.plain(500, 1.0, rng, relief=0.02))
+    best, at, true = reconstruct(model), place(model, rng, 0.5), place(model, rng, 0.0)
+    at[model.names[5]] += [60.0, -80.0, 0.0]
+    assert gps.align_to_gps(best, at, _find_up(best, 0))
+    off = [best.images[i].projection_center() - true[best.images[i].name] for i in best.reg_image_ids()]
+    assert np.abs(off).max() < 1.5
+    wild = {name: rng.normal(0, 60, 3) for name in model.names}
+    assert not gps.align_to_gps(best, wild, _find_up(best, 0))
+    assert not gps.align_to_gps(best, dict.fromkeys(model.names, np.full(3, np.nan)), _find_up(best, 0))
+
+
+def test_positions_within_their_own_error_give_no_scale(reconstruct):
     """Another group of photos, which found no place, may spread the set's positions."""
     rng = np.random.default_rng(3)
     model = synth.model(synth.flight(2, 4, step=0.2), synth.plain(500, 1.0, rng))
     best = reconstruct(model)
-    assert not gps.align_to_gps(best, dict.fromkeys(model.names, np.array([5.0, 5.0, 30.0])), _find_up(best, 0))
     near = {name: rng.normal(0, 1.0, 3) for name in model.names}
     assert not gps.align_to_gps(best, near, _find_up(best, 0))
     assert best.images[1].projection_center() == pytest.approx(model.cameras[0].centre)
@@ -69,3 +88,72 @@ def test_a_similarity_in_the_plane_has_no_mirror():
     turn = np.array([[0.6, -0.8], [0.8, 0.6]])
     scale, found, shift, off = gps.fit_similarity(a, 2 * a @ turn.T + [3.0, -4.0])
     assert scale == pytest.approx(2) and found == pytest.approx(turn) and shift == pytest.approx([3, -4]) and off < 1e-9
+
+
+def test_positions_count_where_most_photos_have_one_and_they_spread(monkeypatch):
+    """Photos 0.001 degrees of latitude apart, which are 111 metres."""
+    places = {f"{i}": (48.0 + 0.001 * i, 11.0, 500.0) for i in range(5)}
+    monkeypatch.setattr(gps, "read_gps_position", lambda path: places.get(path.name))
+    found = gps.read_gps_positions([Path(str(i)) for i in range(6)])
+    assert (found.about.latitude, found.about.longitude, found.about.altitude) == (48.002, 11.0, 500.0)
+    assert found.at[:5, 1] == pytest.approx(111.2 * np.arange(-2, 3), rel=0.01) and np.isnan(found.at[5]).all()
+    assert gps.read_gps_positions([Path(str(i)) for i in range(7)]) is None  # two of seven have none
+    assert gps.read_gps_positions([Path("none")]) is None
+    monkeypatch.setattr(gps, "read_gps_position", lambda path: (48.0 + 1e-5 * int(path.name), 11.0, 500.0))
+    assert gps.read_gps_positions([Path(str(i)) for i in range(6)]) is None  # within 6 metres
+
+
+def oblique(count=9):
+    """Photos from the side, which fix the focal length, over ground with relief."""
+    cameras = [
+        synth.camera((0.75 * np.cos(a), 0.75 * np.sin(a), 0.8 + 0.1 * (i % 2)), (0.02 * i, 0, 0))
+        for i, a in enumerate(np.linspace(-0.6, 0.6, count))
+    ]
+    return synth.model(cameras, synth.plain(300, 0.6, np.random.default_rng(0), relief=0.03))
+
+
+def settle(best, held, hold=False):
+    return focal_length.settle_focal_length(best, held, np.random.default_rng(0), hold)
+
+
+def test_oblique_views_fix_a_focal_length_that_exif_has_wrong(reconstruct):
+    best = reconstruct(oblique(), 1.08 * synth.FOCAL)
+    found = settle(best, {1: 1.08 * synth.FOCAL})
+    assert "from the side" in found.decision and found.tilt > focal_length.OBLIQUE
+    assert found.used == found.free == best.cameras[1].focal_length == pytest.approx(synth.FOCAL, rel=1e-3)
+    assert found.exif == pytest.approx(1.08 * synth.FOCAL)
+    assert best.compute_mean_reprojection_error() < 0.01  # points and poses went with it
+
+
+def test_a_focal_length_that_shall_be_held_or_that_views_from_above_leave_open_stays(reconstruct):
+    for model, hold, said in (
+        (oblique(), True, "held"),
+        (
+            synth.model(synth.flight(3, 3), synth.plain(300, 0.7, np.random.default_rng(0), relief=0.02)),
+            False,
+            "EXIF's",
+        ),
+    ):
+        best = reconstruct(model, 1.08 * synth.FOCAL)
+        before = best.images[1].cam_from_world().matrix()
+        found = settle(best, {1: 1.08 * synth.FOCAL}, hold)
+        assert said in found.decision and found.used == best.cameras[1].focal_length == 1.08 * synth.FOCAL
+        assert np.array_equal(best.images[1].cam_from_world().matrix(), before)
+    assert "confirm" in settle(reconstruct(model), {1: synth.FOCAL}).decision
+
+
+def test_without_exif_the_photos_alone_say_the_focal_length(reconstruct):
+    found = settle(reconstruct(oblique()), {})
+    assert found.exif is found.free is None and found.used == synth.FOCAL and "straight down" not in found.decision
+    with pytest.raises(InputError, match="0.30 picture widths"):
+        settle(reconstruct(oblique(), 0.3 * synth.WIDTH), {})
+
+
+def test_photos_from_one_spot_are_refused():
+    for step, fits in ((0.2, True), (0.005, False)):
+        spread = measure_parallax(synth.model(synth.flight(2, 2, step), synth.plain(50, 0.3, np.random.default_rng(0))))
+        if fits:
+            focal_length.require_parallax(spread)
+        else:
+            with pytest.raises(InputError, match="one spot"):
+                focal_length.require_parallax(spread)

@@ -8,7 +8,7 @@ import pytest
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import FocalLength, SfmSign, SfmVerdict
 from dav_gswt.photos.sfm import solution
-from dav_gswt.photos.sfm.mapping import Approach
+from dav_gswt.photos.sfm.mapping import Approach, list_alternatives
 
 
 def verdict(grade: str, *names: str) -> SfmVerdict:
@@ -16,7 +16,7 @@ def verdict(grade: str, *names: str) -> SfmVerdict:
 
 
 class Placed(pycolmap.Reconstruction):
-    """A model of which only the number of its images is known."""
+    """A model of which only the number of its images is known; they are the first ones."""
 
     def __init__(self, count: int):
         super().__init__()
@@ -24,6 +24,9 @@ class Placed(pycolmap.Reconstruction):
 
     def num_reg_images(self) -> int:
         return self.count
+
+    def reg_image_ids(self) -> list[int]:
+        return list(range(1, self.count + 1))
 
 
 @pytest.fixture
@@ -58,11 +61,6 @@ def test_a_model_of_few_photos_does_not_win(solutions):
     assert found.verdict.grade == "doubtful"
 
 
-def test_of_equal_models_the_first_stays(solutions):
-    found, _ = solutions(*[verdict("doubtful", "tilt")] * 3)
-    assert found.verdict.tried[0].startswith("incremental mapping: doubtful")
-
-
 def test_photos_left_out_though_they_match_are_tried_with_the_other_mapper(solutions):
     found, asked = solutions(verdict("good"), verdict("good"), placed=(14, 19), unsure=5)
     assert asked == [Approach("incremental"), Approach("global")] and found.best.num_reg_images() == 19
@@ -73,10 +71,6 @@ def test_the_other_mapper_does_not_win_with_a_worse_model(solutions):
     assert found.best.num_reg_images() == 14
 
 
-def test_photos_left_out_alone_ask_for_no_other_way(solutions):
-    assert len(solutions(verdict("doubtful", "placed", "groups"))[1]) == 1
-
-
 def test_where_the_first_way_gives_no_model_others_are_tried(solutions, monkeypatch):
     monkeypatch.setattr(solution, "_read_pairs", lambda _: [(0, 1, 50)])
     found, asked = solutions(None, verdict("doubtful", "tilt"), verdict("good"))
@@ -84,13 +78,33 @@ def test_where_the_first_way_gives_no_model_others_are_tried(solutions, monkeypa
     assert found.verdict.grade == "good" and found.verdict.tried[0] == "incremental mapping: way 1 places nothing"
 
 
-def test_the_first_reason_is_given_where_no_way_gives_a_model(solutions, monkeypatch):
-    monkeypatch.setattr(solution, "_read_pairs", lambda _: [(0, 1, 50)])
-    with pytest.raises(InputError, match="way 1 places nothing"):
-        solutions(None, None, None)
+def test_photos_left_out_alone_ask_for_no_other_way(solutions):
+    assert len(solutions(verdict("doubtful", "placed", "groups"))[1]) == 1
 
 
 def test_photos_none_of_which_match_are_mapped_once(solutions, monkeypatch):
     monkeypatch.setattr(solution, "_read_pairs", lambda _: [(0, 1, 12)])
     with pytest.raises(InputError, match="way 1 places nothing"):
         solutions(None)
+
+
+def test_photos_without_a_place_are_named_with_what_they_share():
+    photos = [solution.SfmPhoto(Path(f"{i}.jpg"), f"{i}.png", (4, 3), 4, 3, None) for i in range(5)]
+    shared = solution._count_shared(Placed(2), [(0, 1, 90), (0, 2, 40), (2, 1, 50), (2, 3, 70), (4, 0, 1)])
+    assert shared == {2: 50, 4: 1}
+    (two, three, four) = solution._left_out(photos, Placed(2), shared)
+    assert two[0] == "2.jpg" and "shares 50 points" in two[1]
+    assert three[0] == "3.jpg" and "matches no photo" in three[1] and "shares 1 points" in four[1]
+
+
+def test_other_ways_hold_the_focal_length_and_use_gps_where_there_is_some():
+    def name(*given):
+        return [str(way) for way in list_alternatives(*given)]
+
+    held = "EXIF's focal length held"
+    assert name(Approach("global"), True, True) == [
+        f"global mapping, {held}",
+        f"incremental mapping, GPS as priors, {held}",
+        f"incremental mapping, {held}",
+    ]
+    assert name(Approach("incremental"), False, False) == [f"global mapping, {held}"]

@@ -54,23 +54,17 @@ def test_a_good_model_is_good_by_every_sign(model):
     verdict = judge(model, focal_ratio=1.1, positions=positions(model, 3.0))
     assert verdict.grade == "good" and not verdict.objections
     assert set(grades(verdict)) == set(THRESHOLDS)
-
-
-def test_a_model_without_exif_is_judged_by_the_other_signs(model):
-    verdict = judge(model)
-    assert verdict.grade == "good" and not {"GPS", "focal length"} & set(grades(verdict))
+    bare = judge(model)
+    assert bare.grade == "good" and not {"GPS", "focal length", "climb"} & set(grades(bare))
 
 
 def test_fog_of_a_wrong_focal_length_is_refused(fog):
-    verdict = judge(fog, error=1.39, focal_ratio=1.7)
+    """Also without EXIF the ground stands upright under a flight that looks down."""
+    verdict = judge(fog, error=1.39, focal_ratio=1 / 1.7)
     assert verdict.grade == "refused"
-    assert grades(verdict)["roughness"] == "refused"
-    assert grades(verdict)["focal length"] == "refused"
+    assert grades(verdict)["roughness"] == grades(verdict)["focal length"] == "refused"
     assert grades(verdict)["reprojection error"] == "doubtful"
-
-
-def test_ground_upright_under_a_flight_that_looks_down_is_seen_without_exif(fog):
-    signs = {sign.name: sign for sign in judge(fog).signs}
+    signs = {sign.name: sign for sign in verdict.signs}
     assert signs["ground"].grade == "refused" and "look straight down" in signs["ground"].reason
 
 
@@ -79,34 +73,12 @@ def test_a_level_flight_that_climbs_over_the_ground_of_the_model_is_seen(model, 
     assert grades(judge(fog, positions=positions(fog, 3.0)))["climb"] == "refused"
 
 
-def test_a_drifting_altitude_is_no_sign_against_a_model(model):
-    drift = positions(model, 1.0) + np.linspace(0, 80, 20)[:, None] * [0, 0, 1]
-    verdict = judge(model, positions=drift)
-    assert grades(verdict)["GPS"] == "good" and grades(verdict)["climb"] == "good"
-
-
-@pytest.mark.parametrize("evidence", [{"error": 1.39}, {"focal_ratio": 1.7}])
-def test_gps_and_another_sign_together_refuse(model, evidence):
-    """28 photos, all registered, whose cameras are 62 m off their positions: neither sign alone would refuse them."""
-    verdict = judge(model, positions=positions(model, 90.0), **evidence)
-    assert grades(verdict)["GPS"] == "refused" and verdict.grade == "refused"
-
-
-def test_28_photos_registered_from_the_side_are_refused_without_a_word_of_exif(fog):
-    """All have a place, at 1.39 pixels; but the cameras are 62 m off their positions, and the ground stands upright."""
-    verdict = judge(fog, error=1.39, positions=positions(fog, 110.0))
-    assert "28 of 28 photos" in verdict.signs[-1].reason
-    with pytest.raises(InputError, match="m from their GPS positions.*1.39 px"):
-        require_trust(verdict)
-
-
 def test_gps_alone_makes_a_model_doubtful(model):
     verdict = judge(model, positions=positions(model, 90.0))
     assert grades(verdict)["GPS"] == "refused" and verdict.grade == "doubtful"
-
-
-def test_gps_as_far_off_as_receivers_are_is_good_over_a_small_flight(model):
     assert grades(judge(model, positions=positions(model, 4.0)))["GPS"] == "good"
+    drift = judge(model, positions=positions(model, 1.0) + np.linspace(0, 80, 20)[:, None] * [0, 0, 1])
+    assert grades(drift)["GPS"] == grades(drift)["climb"] == "good"  # altitudes drift in flights that are right
 
 
 def test_a_slope_is_level_ground_by_gps_and_a_wall_is_not(model):
@@ -131,15 +103,10 @@ def test_most_photos_left_out_make_a_model_doubtful_and_no_more(model):
 def test_two_groups_are_named(model):
     groups = find_groups(list("abcdefgh"), [(0, 1, 90), (1, 2, 90), (3, 4, 90), (4, 5, 90), (5, 6, 90), (2, 3, 12)])
     assert groups == (tuple("defg"), tuple("abc"))
+    assert find_groups(list("abcd"), [(0, 1, 90), (2, 3, 90)], placed=[0, 3]) == (tuple("abcd"),)
     verdict = judge(model, groups=groups)
     assert verdict.grade == "doubtful"
     assert "your photos fall into 2 groups (d ... g | a ... c)" in verdict.objections[0].reason
-
-
-def test_photos_of_one_model_are_one_group():
-    assert find_groups(list("abcdef"), [(0, 1, 90), (1, 2, 90), (3, 4, 90), (4, 5, 90)], placed=[0, 3]) == (
-        tuple("abcdef"),
-    )
 
 
 def signs(*grades: tuple[str, str]) -> list[SfmSign]:
@@ -152,7 +119,6 @@ def signs(*grades: tuple[str, str]) -> list[SfmSign]:
         ([], "good"),
         ([("tilt", "doubtful")], "doubtful"),
         ([("tilt", "refused")], "doubtful"),
-        ([("tilt", "doubtful"), ("GPS", "doubtful")], "doubtful"),
         ([("tilt", "refused"), ("GPS", "doubtful")], "refused"),
         ([("tilt", "doubtful"), ("GPS", "doubtful"), ("relief", "doubtful")], "refused"),
         ([("reprojection error", "refused")], "refused"),
@@ -161,10 +127,6 @@ def signs(*grades: tuple[str, str]) -> list[SfmSign]:
 )
 def test_signs_are_weighed_together(found, grade):
     assert combine_grades(signs(*found)) == grade
-
-
-def test_every_threshold_has_its_reason():
-    assert all(limit.why and limit.doubtful < limit.refused for limit in THRESHOLDS.values())
 
 
 def test_a_refused_model_stops_with_its_reasons_and_what_was_tried():

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import write_json
 from dav_gswt.geometry.scene_frame import Extent, Square
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import labels, meshes
-from dav_gswt.photos.synthetic.labels import GroundLabels, LabelMap, LandObject
+from dav_gswt.photos.synthetic.labels import GroundLabels, LandObject
 
 SQUARE = Square(-2.0, -1.0, 4.0)  # x from -2 to 2, y from -1 to 3
 
@@ -31,34 +30,23 @@ def known():
     return GroundLabels({"sand": 1, "meadow": 2}, material, 8.0, objects, frozenset())
 
 
-def test_the_material_repeats_after_the_period(known):
-    y = np.array([-0.1, 0.1, 3.9, 4.1, 8.1, -7.9])
-    assert known.material_at(np.full(6, 33.0), y).tolist() == [1, 2, 2, 1, 2, 2]
-
-
-def test_rows_of_the_map_run_to_the_north_and_columns_to_the_east(known):
+def test_rows_of_the_map_run_to_the_north_and_the_material_repeats(known):
     found = labels.draw_label_map(known, SQUARE, 80)
     assert (found.material[:20] == 1).all() and (found.material[20:] == 2).all()
     row, column = np.argwhere(found.object == 1).mean(axis=0)
     assert (column, row) == pytest.approx(((1.0 + 2.0) * 20 - 0.5, (2.0 + 1.0) * 20 - 0.5), abs=0.3)
+    y = np.array([-0.1, 0.1, 3.9, 4.1, 8.1, -7.9])
+    assert known.material_at(np.full(6, 33.0), y).tolist() == [1, 2, 2, 1, 2, 2]
 
 
-def test_the_footprint_of_an_object_is_its_outline_from_above(known):
+def test_the_footprint_of_an_object_is_its_outline_from_above_cut_at_the_border(known):
     found = labels.draw_label_map(known, SQUARE, 200)
+    assert [(thing.id, thing.kind) for thing in found.objects] == [(1, "shrub"), (2, "boulder")]  # not the far one
     cell = SQUARE.side / 200
     for thing, radius in zip(found.objects, (0.5, 0.25), strict=True):
         area = (found.object == thing.id).sum() * cell**2
         assert area == pytest.approx(np.pi * radius**2, rel=0.12)  # half a cell around
         assert thing.radius == pytest.approx(radius, rel=0.01)
-
-
-def test_objects_outside_of_the_map_are_not_named(known):
-    found = labels.draw_label_map(known, SQUARE, 80)
-    assert [(thing.id, thing.kind) for thing in found.objects] == [(1, "shrub"), (2, "boulder")]
-    assert set(np.unique(found.object)) == {0, 1, 2}
-
-
-def test_an_object_at_the_border_is_cut_there():
     known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 8.0, (ball("shrub", 2.0, 0.0, 0.5),), frozenset())
     found = labels.draw_label_map(known, SQUARE, 200)
     assert (found.object == 1).sum() * 0.02**2 == pytest.approx(np.pi * 0.5**2 / 2, rel=0.12)
@@ -84,29 +72,16 @@ def test_a_place_belongs_to_the_nearest_object_of_the_kind_that_holds_it(known):
     assert labels.label_places(known, x, y, "boulder").tolist() == [0, 0, 0, 2]
 
 
-def test_files_keep_a_map(known, tmp_path):
+def test_files_keep_a_map_whose_first_row_is_the_northern_one(known, tmp_path):
     made = labels.draw_label_map(known, SQUARE, 40)
     labels.write_label_map(tmp_path, made)
     found = labels.read_label_map(tmp_path)
-    assert isinstance(found, LabelMap)
     assert (found.material == made.material).all() and (found.object == made.object).all()
     assert (found.extent, found.materials, found.objects) == (made.extent, made.materials, made.objects)
-
-
-def test_on_disk_the_first_row_is_the_northern_one_and_the_header_has_the_extent(known, tmp_path):
-    labels.write_label_map(tmp_path, labels.draw_label_map(known, SQUARE, 40))
     channels, header = image_files.read_exr(tmp_path / labels.MAP)
     assert set(channels) == {"material", "object"}
     assert channels["material"][0, 0] == 2 and channels["material"][-1, 0] == 1
     assert Extent(**json.loads(header["extent"])) == Extent(-2.0, -1.0, 2.0, 3.0)
-
-
-@pytest.mark.parametrize("missing", [labels.MAP, labels.NAMES])
-def test_a_folder_without_a_map_is_refused_by_name(known, tmp_path, missing):
-    labels.write_label_map(tmp_path, labels.draw_label_map(known, SQUARE, 40))
-    (tmp_path / missing).unlink()
-    with pytest.raises(InputError, match=missing):
-        labels.read_label_map(tmp_path)
 
 
 def test_labels_without_a_name_and_a_missing_channel_are_refused(known, tmp_path):
@@ -117,11 +92,4 @@ def test_labels_without_a_name_and_a_missing_channel_are_refused(known, tmp_path
         labels.read_label_map(tmp_path)
     image_files.write_exr(tmp_path / labels.MAP, {"material": ones})
     with pytest.raises(InputError, match="object"):
-        labels.read_label_map(tmp_path)
-
-
-def test_names_of_another_kind_are_refused(known, tmp_path):
-    labels.write_label_map(tmp_path, labels.draw_label_map(known, SQUARE, 40))
-    write_json(tmp_path / labels.NAMES, {"materials": {"sand": "one"}})
-    with pytest.raises(InputError, match=labels.NAMES):
         labels.read_label_map(tmp_path)

@@ -1,42 +1,68 @@
-"""Stones, shrubs and tufts as meshes."""
+"""Stones, rocks, plants and their parts as meshes."""
+
+from functools import partial
 
 import numpy as np
 import pytest
 import trimesh
 
-from dav_gswt.photos.synthetic import meshes
+from dav_gswt.photos.synthetic import flower_plants, grass_plants, meadow_plants, meshes, planet, rocks
+
+PLANTS = {
+    "shrub": meshes.make_shrub,
+    "dry tuft": meshes.make_tuft,
+    "tuft": meadow_plants.make_tuft,
+    "seed grass": meadow_plants.make_seed_grass,
+    "clover": meadow_plants.make_clover,
+    "spire": partial(flower_plants.make_spire, colour=flower_plants.LARKSPUR),
+    "umbel": flower_plants.make_umbel,
+    "tussock": partial(grass_plants.make_tussock, tint=grass_plants.TINTS[0]),
+    "dock": grass_plants.make_dock,
+}
+PLANTS |= {f"flower {k}": partial(meadow_plants.make_flower, kind=f) for k, f in enumerate(meadow_plants.FLOWERS)}
+PLANTS |= {f"bush {k}": partial(flower_plants.make_bush, kind=kind) for k, kind in enumerate(flower_plants.DISCS)}
+PLANTS |= {ear.__name__: ear for ear in grass_plants.EARS}
+STONES = {
+    "stone": partial(meshes.make_stone, subdivisions=2),
+    "rock": partial(rocks.make_rock, subdivisions=2, palette=planet.ROCKS),
+}
+MATS = {
+    "mat": partial(meadow_plants.make_mat, count=40, length=0.12, dry=0.2),
+    "stand": partial(grass_plants.make_stand, count=40, length=0.9, width=0.01, tint=grass_plants.TINTS[1]),
+    "flat": partial(grass_plants.make_flat_grass, count=40, length=0.9, width=0.01, tint=grass_plants.TINTS[1]),
+    "swathe": lambda rng: flower_plants.make_swathe(
+        rng, [flower_plants.make_bush(rng, flower_plants.POPPY) for _ in range(2)], 4, (0.3, 0.4)
+    ),
+}
+EVERY = PLANTS | STONES | MATS
 
 
-def volume(vertices, faces):
-    """Enclosed volume, positive where faces are counter-clockwise from outside (divergence theorem)."""
-    a, b, c = (vertices[faces[:, i]].astype(float) for i in range(3))
-    return (np.cross(a, b) * c).sum() / 6
+@pytest.mark.parametrize("name", EVERY)
+def test_a_mesh_is_that_of_its_seed(name, golden):
+    golden(name, *(EVERY[name](np.random.default_rng(seed)) for seed in (1, 2)))
 
 
-def test_a_stone_is_closed_outside_out_and_about_1_across():
-    for seed in range(10):
-        stone = meshes.make_stone(np.random.default_rng(seed), 3)
-        spans = np.ptp(stone.vertices, axis=0)
-        assert 0.6 < spans[0] <= 1.07 and spans[2] < spans[0]
-        assert 0 < volume(stone.vertices, stone.faces) < np.prod(spans)
-        assert stone.colours.min() > 0 and stone.colours.max() < 1
-
-
-@pytest.mark.parametrize("grow", [meshes.make_shrub, meshes.make_tuft])
-def test_a_plant_stands_on_its_root_about_1_high_in_reflectances(grow):
-    for seed in range(4):
-        plant = grow(np.random.default_rng(seed))
-        assert 0.6 < plant.vertices[:, 2].max() < 1.6
-        assert plant.vertices[:, 2].min() > -0.4  # blades and twigs may droop below the root on a slope
-        assert np.isfinite(plant.vertices).all()
-        assert plant.colours.min() > 0 and plant.colours.max() < 1
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_plant_stands_on_its_root_about_1_high_in_faces_of_one_colour(name):
+    for seed in range(2):
+        plant = PLANTS[name](np.random.default_rng(seed))
+        assert 0.5 < plant.vertices[:, 2].max() < 1.6
+        assert -0.6 < plant.vertices[:, 2].min() < 0  # leaves may droop below the root, on a slope
+        assert np.isfinite(plant.vertices).all() and plant.colours.min() > 0 and plant.colours.max() < 1
+        assert np.ptp(plant.colours[plant.faces], axis=1).max() == 0
         assert plant.faces.min() == 0 and plant.faces.max() == len(plant.vertices) - 1
 
 
-@pytest.mark.parametrize("grow", [meshes.make_shrub, meshes.make_tuft])
-def test_every_face_of_a_plant_has_one_colour(grow):
-    plant = grow(np.random.default_rng(1))
-    assert np.ptp(plant.colours[plant.faces], axis=1).max() == 0
+@pytest.mark.parametrize("name", STONES)
+def test_a_stone_is_closed_outside_out_and_about_1_across(name):
+    for seed in range(3):
+        stone = STONES[name](np.random.default_rng(seed))
+        a, b, c = (stone.vertices[stone.faces[:, i]].astype(float) for i in range(3))
+        spans = np.ptp(stone.vertices, axis=0)
+        assert 0.5 < spans[0] < 1.4 and spans[2] < spans[0]
+        assert 0 < (np.cross(a, b) * c).sum() / 6 < np.prod(spans)  # its volume, if closed and outside out
+        assert np.cross(b - a, c - a).sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-5)  # closed
+        assert stone.colours.min() > 0 and stone.colours.max() < 1
 
 
 def test_a_mesh_is_scaled_turned_and_moved():
@@ -49,4 +75,23 @@ def test_merged_meshes_keep_their_faces():
     sphere, faces = np.array(icosphere.vertices), np.array(icosphere.faces)
     one = meshes.Mesh(sphere.astype(np.float32), faces, np.ones((12, 3), np.float32))
     two = meshes.merge_meshes([one, meshes.transform_mesh(one, (5, 0, 0), 1.0, 0.0)])
-    assert volume(two.vertices, two.faces) == pytest.approx(2 * volume(sphere, faces), rel=1e-5)  # float32 positions
+    assert two.vertices[two.faces[20:]] == pytest.approx(two.vertices[two.faces[:20]] + [5, 0, 0], abs=1e-6)
+
+
+def test_a_fresh_crater_has_its_depth_its_rim_and_an_end():
+    one, round_ = np.array([[0.5, -0.2, 2.0, 1.0]]), np.zeros((1, 6))
+    r = np.array([0.0, 0.5, 1.0, 1.2, 2.0, 3.5, 4.0])
+    z = rocks.crater_relief(0.5 + r, np.full(r.shape, -0.2), one, round_)
+    assert z[0] == pytest.approx(-2.0 * rocks.DEPTH, rel=1e-6)
+    assert z[2:4].max() == pytest.approx(2.0 * rocks.RIM, rel=0.5) and z[2] > z[1]
+    assert z[3] > z[4] > 0 and z[5] == z[6] == 0
+
+
+def test_craters_and_rocks_keep_to_their_sizes():
+    rng = np.random.default_rng(0)
+    found = rocks.draw_craters(rng, 4000, 20.0, 0.25, 2.5)
+    assert found[:, 2].min() >= 0.25 and found[:, 2].max() <= 2.5
+    # as many above d as d^-2: a quarter of them above twice the least, but for those beyond the greatest (1 %)
+    assert (found[:, 2] > 0.5).mean() == pytest.approx(0.2424, abs=0.025)
+    sizes = rocks.draw_sizes(rng, 4000, 0.1, 0.3, 2.2)
+    assert sizes.min() >= 0.1 and sizes.max() <= 0.3 and np.median(sizes) < 0.17

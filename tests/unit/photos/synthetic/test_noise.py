@@ -13,13 +13,10 @@ def spectrum(field, period):
     return np.hypot(*np.meshgrid(k, k)), np.abs(np.fft.fft2(field)) ** 2
 
 
-def test_band_noise_has_mean_0_and_deviation_1():
+def test_band_noise_keeps_to_its_band_with_mean_0_and_deviation_1():
     field = noise.make_noise(np.random.default_rng(0), 128, 4.0, 1.0, 0.2, 1.0)
     assert field.mean() == pytest.approx(0, abs=1e-9)
     assert field.std() == pytest.approx(1, abs=1e-9)
-
-
-def test_band_noise_keeps_to_its_band():
     k, energy = spectrum(noise.make_noise(np.random.default_rng(1), 256, 8.0, 1.0, 0.25, 0.0), 8.0)
     # an octave outside either limit the amplitude is exp(-4): 3e-4 of the energy a wave
     outside = energy[(k > 0) & ((k < 0.5) | (k > 8.0))].sum()
@@ -27,17 +24,12 @@ def test_band_noise_keeps_to_its_band():
     assert energy[(k > 1.0) & (k < 4.0)].sum() > 0.2 * energy.sum()
 
 
-def test_band_noise_follows_the_seed():
-    one, same, other = (noise.make_noise(np.random.default_rng(s), 32, 1.0, 0.5, 0.1, 1.0) for s in (5, 5, 6))
-    assert (one == same).all() and (one != other).any()
-
-
 def test_a_raster_without_any_wave_is_refused():
     with pytest.raises(ValueError, match="no wavelength"):
         noise.make_noise(np.random.default_rng(0), 1, 1.0, 1.0, 0.1, 1.0)
 
 
-@pytest.mark.parametrize("wind", [0.0, 0.5, 2.0])
+@pytest.mark.parametrize("wind", [0.5, 2.0])
 def test_ripples_have_their_length_along_the_wind_and_grow_in_phase_with_it(wind):
     n, period, length = 256, 8.0, 0.4
     phase, strength = noise.make_ripples(np.random.default_rng(2), n, period, length, wind)
@@ -51,12 +43,13 @@ def test_ripples_have_their_length_along_the_wind_and_grow_in_phase_with_it(wind
     assert strength.min() >= 0 and strength.max() <= 1
 
 
-def test_a_ripple_rises_slowly_and_falls_fast():
+def test_a_ripple_rises_slowly_and_falls_fast(golden):
     phase = np.linspace(-np.pi, np.pi, 2001)
     profile = noise.ripple_profile(phase)
     rise = np.diff(profile) > 0
     assert rise.mean() > 0.52
     assert profile.max() <= 1 and profile.min() >= -1
+    golden("ripple profile", profile)
 
 
 def test_a_raster_is_sampled_at_texel_centres_between_them_and_across_its_edge():
@@ -79,8 +72,3 @@ def test_a_raster_is_the_same_on_any_number_of_threads(monkeypatch, draw):
         monkeypatch.setenv("DAV_GSWT_THREADS", threads)
         found.append(draw(np.random.default_rng(3)))
     assert np.array_equal(*found)
-
-
-def test_rows_are_mapped_in_their_order():
-    one, other = np.arange(600.0).reshape(300, 2), np.ones((300, 2))
-    assert np.array_equal(noise.map_rows(np.add, one, other), one + other)

@@ -1,15 +1,17 @@
-"""Points of synthetic scenes: which pairs of views are matched, and that points lie on the ground."""
+"""Photo sets of synthetic scenes: the pairs of views, points on the ground, and what the photos/ folder holds."""
 
 import numpy as np
 import pytest
+from fixtures import photos as synth
 
 from dav_gswt.geometry import camera_layouts
-from dav_gswt.geometry.cameras import look_at
-from dav_gswt.images import image_files
-from dav_gswt.photos.synthetic import desert, photo_set
+from dav_gswt.geometry.scene_frame import Extent, read_scene_frame
+from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
+from dav_gswt.photos.synthetic import photo_set, truth
 from dav_gswt.photos.synthetic import scene as synthetic
+from dav_gswt.photos.synthetic.labels import GroundLabels, read_label_map
 
-ENTRY = {"family": "desert", "seed": 0, "photos": 100, "test": 0, "size": 64, "candidates": 0, "layout": "paper"}
+ENTRY = {"family": "desert", "seed": 0, "photos": 3, "test": 2, "size": 64, "candidates": 0}
 
 
 def angle(one, other):
@@ -19,17 +21,13 @@ def angle(one, other):
 
 
 def test_of_many_views_each_is_matched_with_some_that_see_the_same_ground_alike():
-    cameras = synthetic.start_views(ENTRY)
+    cameras = synthetic.start_views(ENTRY | {"photos": 100, "layout": "paper"})
     pairs = photo_set.find_overlapping_pairs(cameras)
     assert all(0 <= i < j < 100 for i, j in pairs) and len(set(pairs)) == len(pairs)
     assert 100 * photo_set.NEIGHBOURS / 2 <= len(pairs) <= 100 * photo_set.NEIGHBOURS  # of 4950
     assert max(angle(cameras[i], cameras[j]) for i, j in pairs) <= 60
     partners = [{i + j - k for i, j in pairs if k in (i, j)} for k in range(100)]
     assert min(map(len, partners)) >= photo_set.NEIGHBOURS
-    reached = {0}
-    while more := set().union(*(partners[k] for k in reached)) - reached:
-        reached |= more
-    assert reached == set(range(100))
     # points need some angle: half of each view's partners are more than 10 degrees away
     assert min(np.median([angle(cameras[k], cameras[j]) for j in partners[k]]) for k in range(100)) > 10
 
@@ -39,25 +37,76 @@ def test_views_of_other_ground_or_from_opposite_sides_are_no_pair():
     opposite = camera_layouts.orbit(20, 190, 7.0, (0, 0, 0), 64, 64, 55.0)
     away = camera_layouts.orbit(60, 0, 7.0, (30.0, 0, 0), 64, 64, 55.0)
     assert photo_set.find_overlapping_pairs([*here, opposite, away]) == [(0, 1)]
-    assert look_at(away.centre, (30.0, 0, 0))[0] == pytest.approx(away.rotation)
 
 
 def test_few_and_many_views_yield_points_on_the_ground(tmp_path, monkeypatch):
-    pytest.importorskip("mitsuba")
-    monkeypatch.setattr(desert, "TEXELS", 1024)
-    scene = synthetic.make_scene("desert", 0)
-    cameras = synthetic.start_views(ENTRY | {"photos": 7, "size": 256, "layout": "ring"})
-    shots = [(f"view_{i:02d}.png", camera) for i, camera in enumerate(cameras)]
-    for name, camera in shots:
-        image_files.write_png(tmp_path / name, synthetic.render(scene, camera, 9))
-    synthetic._load_scene.cache_clear()
+    """Photos of flat ground from a height of 6 metres."""
+    monkeypatch.setattr(photo_set, "FEATURES", 300)
+    cameras = synth.flight(2, 3, step=0.9, height=6.0)
+    synth.shoot(tmp_path, cameras, synth.texture(np.random.default_rng(4)), 6.0)
+    shots = [(f"{i:03d}.png", camera) for i, camera in enumerate(cameras)]
     every = photo_set.triangulate_points(tmp_path, shots, 0)
     monkeypatch.setattr(photo_set, "EXHAUSTIVE", 4)
-    monkeypatch.setattr(photo_set, "NEIGHBOURS", 3)
+    monkeypatch.setattr(photo_set, "NEIGHBOURS", 1)
     some = photo_set.triangulate_points(tmp_path, shots, 0)
     for found in (every, some):
         assert found.names == tuple(name for name, _ in shots)
-        assert len(found.points) > 100
-        # undulation of 0.1 m and stones of 0.3; few points are wrong matches
-        assert np.quantile(np.abs(found.points[:, 2]), 0.9) < 0.4
+        assert len(found.points) > 100 and np.quantile(np.abs(found.points[:, 2]), 0.9) < 0.05
     assert len(some.pixels) < len(every.pixels)
+    more = photo_set.add_cameras(every, [("000_test.png", cameras[0]), ("zero.png", cameras[1])])
+    assert more.names == ("000.png", "000_test.png", *every.names[1:], "zero.png")
+    assert more.cameras[1] == cameras[0] and more.cameras[2] == every.cameras[1]
+    assert np.array_equal(np.array(more.names)[more.image_of], np.array(every.names)[every.image_of])
+    assert np.array_equal(more.pixels, every.pixels) and np.array_equal(more.point_of, every.point_of)
+
+
+@pytest.fixture
+def dark(monkeypatch):
+    """Black photos, in which no point is found: only the record is looked at here."""
+
+    def nothing(folder, shots, seed):
+        names, cameras = (tuple(column) for column in zip(*shots, strict=True))
+        none = np.zeros(0, int)
+        return ColmapModel(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
+
+    known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 16.0, (), frozenset())
+    monkeypatch.setattr(synthetic, "render", lambda scene, camera: np.zeros((64, 64, 3), np.float32))
+    monkeypatch.setattr(truth, "write_truth", lambda path, scene, camera: path.write_text(str(camera.centre.tolist())))
+    monkeypatch.setattr(synthetic, "load_labels", lambda scene: known)
+    monkeypatch.setattr(photo_set, "triangulate_points", nothing)
+
+
+@pytest.mark.parametrize(
+    "given, groups",
+    [
+        pytest.param(
+            {"layout": "cap", "min_elevation": 60, "oblique": 3},
+            {"high": ["test_00.png", "test_01.png"], "oblique": ["test_02.png", "test_03.png", "test_04.png"]},
+            id="cap",
+        ),
+        pytest.param(
+            {"layout": "paper", "walkers": 2},
+            {"hemisphere": ["test_00.png", "test_01.png"], "walker": ["test_02.png", "test_03.png"]},
+            id="paper",
+        ),
+    ],
+)
+def test_test_views_are_written_by_group_and_every_picture_with_its_truth(dark, tmp_path, given, groups):
+    photo_set.render_set(ENTRY | given, tmp_path)
+    frame = read_scene_frame(tmp_path / "ground.json")
+    assert frame.test_groups == {group: tuple(names) for group, names in groups.items()}
+    assert frame.test == tuple(name for group in groups.values() for name in group)
+    assert set(frame.renderer) == {"mitsuba", "variant", "llvm"} and frame.images == frame.registered == 3
+    stored = read_colmap_model(tmp_path / "sparse")
+    for name, camera in zip(frame.test, synthetic.test_views(ENTRY | given), strict=True):
+        assert stored.camera(name).centre == pytest.approx(camera.centre)
+        assert (tmp_path / "truth" / name).with_suffix(".exr").read_text() == str(camera.centre.tolist())
+    pictures = sorted(p.name for p in (tmp_path / "images").iterdir())
+    assert pictures == [*frame.test, "view_00.png", "view_01.png", "view_02.png"]
+    found = read_label_map(tmp_path / "truth")
+    assert (found.material == 1).all() and found.extent == Extent(-3.0, -3.0, 3.0, 3.0)
+
+
+def test_names_of_more_than_a_hundred_views_sort_by_number():
+    names = [name for name, _ in photo_set._name_views("view", synthetic.start_views(ENTRY | {"photos": 120}))]
+    assert names == sorted(names) and names[0] == "view_000.png" and names[-1] == "view_119.png"

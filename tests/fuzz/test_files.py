@@ -1,0 +1,484 @@
+"""Files from outside and between stages, mutated: splats, bundles, models, photos, weights, records, the config."""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+import pycolmap
+import pytest
+import torch
+import yaml
+from fixtures import bundles, imported_models
+from fixtures.bundles import Ground
+from fixtures.frames import scene_frame
+from fixtures.fuzzing import (
+    VALUES,
+    all_finite,
+    empty_folder,
+    fuzz,
+    mutate_bytes,
+    mutate_json,
+    mutate_zip,
+    randoms,
+    read_guarded,
+    write_bytes,
+)
+from fixtures.random_field import random_field
+from hypothesis import given
+from plyfile import PlyData, PlyElement
+from safetensors.numpy import save
+from torch import nn
+
+from dav_gswt.bundle import gswt
+from dav_gswt.bundle.manifest import Manifest
+from dav_gswt.bundle.store import Bundle, read_bundle
+from dav_gswt.capture.store import PhotoStore
+from dav_gswt.config.load import add_scene_files, check_config, read_config
+from dav_gswt.field import GaussianField, read_field, write_field
+from dav_gswt.files import write_json
+from dav_gswt.geometry.camera_layouts import orbit
+from dav_gswt.geometry.poses import Pose
+from dav_gswt.geometry.scene_frame import read_scene_frame, write_scene_frame
+from dav_gswt.images import image_files, lpips_weights
+from dav_gswt.photos import exif, importers
+from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
+from dav_gswt.photos.importers.colmap import import_colmap
+from dav_gswt.photos.importers.photo_matching import PhotoFolder
+from dav_gswt.photos.importers.point_ply import read_point_ply
+from dav_gswt.photos.lenses import Lens, read_lenses, write_lenses
+from dav_gswt.photos.training_views import read_captured_views
+from dav_gswt.photos.view_split import ViewSplit, read_view_split, write_view_split
+from dav_gswt.prior import weights
+from dav_gswt.views.frozen_scales import FrozenScales, read_frozen_scales, write_frozen_scales
+from dav_gswt.views.scores import Scores, read_scores, write_scores
+from dav_gswt.views.selection import PoseSelection, read_pose_selection, write_pose_selection
+from dav_gswt.views.uncertainty.weighting import Quantiles, Scales
+
+pytestmark = pytest.mark.slow
+ROOT = Path(__file__).parents[2]
+SCHEMA = ROOT / "workflow/schemas/davgswt.schema.json"
+PHOTO = ROOT / "resources/photos/brighton_beach/images/DJI_0018.jpg"
+NETWORK = nn.Sequential(nn.Linear(3, 4), nn.Linear(4, 2))
+KERNELS = ((2, 3, 1, 1), (3, 2, 1, 1), (2, 3, 1, 1), (2, 2, 1, 1), (1, 2, 1, 1))  # of LPIPS, made small
+POSE = Pose("pose_0001", 60.0, 10.0, 4.0)
+CAMERA = orbit(60.0, 10.0, 4.0, (0.0, 0.0, 0.0), 8, 6, 60.0)
+LENS = Lens(pycolmap.Camera(model="OPENCV", width=8, height=6, params=[9.0] * 4 + [0.0] * 4), (9.0,) * 6)
+FROZEN = FrozenScales(Scales({"opacity": 1.0}), Quantiles(0.1, 0.9))
+SPLIT = ViewSplit(("a.png",), ("b.png",), ("c.png",))
+SHOTS = [CapturedPhoto("pose_0001.png", POSE, CAMERA, CAMERA, 0.0)]
+SELECTION = PoseSelection("farthest", 2, [POSE])
+TERMS = {"opacity": np.array([0.1]), "gradient": np.array([1.0])}
+SCORES = Scores([POSE], TERMS, Scales({"opacity": 1.0, "gradient": 2.0}), np.array([0]))
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A kind of file. write: valid ones to a folder; header: bytes in which half of the changes are; 0: it is JSON."""
+
+    name: str
+    write: Callable[[Path], object]
+    read: Callable[[Path], Any]
+    is_right: Callable[[Any], bool]
+    header: int = 0
+
+
+def is_sound(field: GaussianField) -> bool:
+    """Whether a field is finite and in range."""
+    parts = field.means, field.log_scales, field.quats, field.opacity_logits, field.sh, field.uncertainty
+    return all_finite(*parts) and bool((np.abs(field.quats).max(1, initial=0) > 0).all() if len(field) else True)
+
+
+def write_fields(folder: Path) -> None:
+    """Binary of two degrees, text, of another byte order, with a list and another element."""
+    for degree in (0, 1):
+        write_field(random_field(9, degree), folder / f"{degree}.ply")
+    rows = PlyData.read(str(folder / "0.ply"))["vertex"].data
+    PlyData([PlyElement.describe(rows, "vertex")], text=True).write(str(folder / "text.ply"))
+    faces = np.array([([0, 1, 2],)], [("vertex_indices", "i4", (3,))])
+    parts = [PlyElement.describe(faces, "face"), PlyElement.describe(rows, "vertex")]
+    PlyData(parts, byte_order=">").write(str(folder / "big.ply"))
+
+
+def write_clouds(folder: Path) -> None:
+    kinds = [*((axis, "f8") for axis in "xyz"), *((colour, "u1") for colour in ("red", "green", "blue"))]
+    rows = np.zeros(20, kinds)
+    for k, axis in enumerate("xyz"):
+        rows[axis] = np.arange(20) * 0.1 + k
+    for text in (False, True):
+        PlyData([PlyElement.describe(rows, "vertex")], text=text).write(str(folder / f"{text}.ply"))
+
+
+def is_cloud(read) -> bool:
+    places, colours = read
+    return all_finite(places, colours) and colours.min(initial=0) >= 0 and colours.max(initial=1) <= 1
+
+
+def write_pictures(folder: Path) -> None:
+    """A small picture in every format that photos may have here."""
+    pixels = np.arange(24 * 16 * 3, dtype=np.uint8).reshape(16, 24, 3)
+    for kind in ("jpg", "png", "tif", "webp", "bmp", "tga", "ppm", "jp2"):
+        file = oiio.ImageOutput.create(str(folder / f"a.{kind}"))
+        if file and file.open(str(folder / f"a.{kind}"), oiio.ImageSpec(24, 16, 3, oiio.UINT8)):
+            file.write_image(pixels)
+            file.close()
+
+
+def read_header(path: Path):
+    times = exif.read_capture_time(path)
+    return exif.read_focal_length(path), exif.read_gps_position(path), times, image_files.read_size(path)
+
+
+def is_header(found) -> bool:
+    """A finite number, or nothing."""
+    focal, place, _, (width, height) = found
+    right = place is None or all_finite(place) and abs(place[0]) <= 90 and abs(place[1]) <= 180
+    return right and (focal is None or 0 < focal < 100 * max(width, height))
+
+
+def write_lpips(folder: Path) -> None:
+    arrays = {f"kernel{i}": np.ones(shape, np.float32) for i, shape in enumerate(KERNELS)}
+    arrays |= {f"{k}{i}": np.ones(s[:1], np.float32) for k in ("bias", "head") for i, s in enumerate(KERNELS)}
+    write_bytes(folder / "a.safetensors", save(arrays))
+
+
+def write_photos(folder: Path) -> None:
+    for name in imported_models.SCENE.names:
+        image_files.write_png(folder / name, np.zeros((imported_models.HEIGHT, imported_models.WIDTH, 3)))
+
+
+def read_model(path: Path):
+    """A camera model of another program, beside its photos."""
+    write_photos(path.parent)
+    return importers._read_model(path, PhotoFolder(path.parent))
+
+
+def is_model(model) -> bool:
+    for shot in model.shots:
+        right = ".." not in shot.name.split("/") and np.abs(shot.rotation @ shot.rotation.T - np.eye(3)).max() < 1e-6
+        if not right or not (shot.lens is None or shot.lens.width * shot.lens.height <= 2e8):
+            return False
+    return True
+
+
+def is_finite(value) -> bool:
+    """Whether all numbers in nested values are finite."""
+    if is_dataclass(value):
+        value = vars(value)
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list | tuple):
+        return all(map(is_finite, value))
+    return all_finite(value) if isinstance(value, float | int | np.ndarray) else True
+
+
+def is_camera(camera) -> bool:
+    numbers = camera.fx, camera.fy, camera.cx, camera.cy
+    shapes = camera.rotation.shape == (3, 3) and camera.translation.shape == (3,)
+    whole = all(type(n) is int and n > 0 for n in (camera.width, camera.height))
+    return shapes and whole and all_finite(camera.rotation, camera.translation, numbers)
+
+
+def is_pose(pose) -> bool:
+    return isinstance(pose.name, str) and all_finite(pose.elevation, pose.azimuth, pose.radius)
+
+
+def is_record(shots) -> bool:
+    names = all(Path(shot.name).name == shot.name for shot in shots)
+    return names and all(is_camera(shot.camera) and is_camera(shot.requested) and is_pose(shot.pose) for shot in shots)
+
+
+def is_split(split) -> bool:
+    return all(isinstance(name, str) for name in (*split.start, *split.pool, *split.test))
+
+
+def is_selection(selection) -> bool:
+    return all(map(is_pose, selection.poses)) and isinstance(selection.k, int)
+
+
+def are_lenses(lenses) -> bool:
+    return all(all_finite(lens.camera.params) and len(lens.pinhole) == 6 for lens in lenses)
+
+
+def is_network(facts) -> bool:
+    return isinstance(facts, dict) and all(torch.isfinite(v).all() for v in NETWORK.state_dict().values())
+
+
+READERS = [
+    Reader("fields (PLY)", write_fields, read_field, is_sound, 900),
+    Reader("point clouds (PLY)", write_clouds, read_point_ply, is_cloud, 300),
+    Reader("EXIF", lambda folder: shutil.copy(PHOTO, folder / "a.jpg"), read_header, is_header, 3000),
+    Reader(
+        "photos",
+        write_pictures,
+        image_files.read_photo,
+        lambda photo: photo.min() >= 0 and photo.max() <= 1,
+        100,
+    ),
+    Reader(
+        "weights of the prior",
+        lambda folder: weights.save_weights(NETWORK, folder / "a.safetensors", {"what": "a test"}),
+        lambda path: weights.load_weights(NETWORK, path),
+        is_network,
+        350,
+    ),
+    Reader(
+        "weights of LPIPS",
+        write_lpips,
+        lambda path: lpips_weights.read(path, published=False),
+        lambda read: all_finite(*read.kernels[0], *read.biases),
+        1200,
+    ),
+    Reader("scores.csv", lambda folder: write_scores(folder / "scores.csv", SCORES), read_scores, bool, 400),
+    Reader(
+        "nerfstudio",
+        lambda folder: write_json(folder / "model.json", imported_models.transforms()),
+        read_model,
+        is_model,
+    ),
+    Reader(
+        "OpenSfM",
+        lambda folder: write_json(folder / "model.json", imported_models.reconstruction()),
+        read_model,
+        is_model,
+    ),
+    Reader(
+        "ground.json",
+        lambda folder: write_scene_frame(folder / "ground.json", scene_frame()),
+        read_scene_frame,
+        bool,
+    ),
+    Reader("views.json", lambda folder: write_view_split(folder / "views.json", SPLIT), read_view_split, is_split),
+    Reader(
+        "poses.json",
+        lambda folder: write_pose_selection(folder / "poses.json", SELECTION),
+        read_pose_selection,
+        is_selection,
+    ),
+    Reader(
+        "capture.json",
+        lambda folder: write_capture_record(folder, "render", SHOTS),
+        lambda path: read_capture_record(path.parent),
+        is_record,
+    ),
+    Reader(
+        "lenses.json",
+        lambda folder: write_lenses(folder, [LENS]),
+        lambda path: read_lenses(path.parent),
+        are_lenses,
+    ),
+    Reader(
+        "scores.json",
+        lambda folder: write_frozen_scales(folder / "scores.json", FROZEN, {}, {}, {}),
+        read_frozen_scales,
+        bool,
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def valid(tmp_path_factory):
+    """Valid files by the name of their kind."""
+    found = {}
+    for reader in READERS:
+        reader.write(folder := tmp_path_factory.mktemp("valid"))
+        found[reader.name] = [(path.name, path.read_bytes()) for path in sorted(folder.iterdir())]
+    return found
+
+
+@pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
+@fuzz
+@given(random=randoms)
+def test_a_changed_file_is_read_or_refused(valid, monkeypatch, tmp_path, reader, random):
+    monkeypatch.setattr(lpips_weights, "KERNELS", KERNELS)
+    name, data = random.choice(valid[reader.name])
+    folder = empty_folder(tmp_path)
+    changed = mutate_bytes(random, data, reader.header) if reader.header else mutate_json(random, json.loads(data))
+    path = write_bytes(folder / name, changed)
+
+    def check(read):
+        assert is_finite(read) and reader.is_right(read)
+
+    read_guarded(reader.name, lambda: reader.read(path), check, path.stat().st_size, name, folder=folder)
+
+
+@fuzz
+@given(random=randoms)
+def test_sets_of_the_public_renderer(set_of_tiles, tmp_path, random):
+    folder = empty_folder(tmp_path)
+    path = write_bytes(folder / "gswt.zip", mutate_zip(random, set_of_tiles))
+
+    def check(read):
+        assert all(is_sound(field) for level in read for field in level) and len(read[0]) % 16 == 0
+        gswt.write_gswt(read, 3.0, folder / "again.zip")
+
+    size = path.stat().st_size
+    read_guarded("gswt.zip", lambda: gswt.read_gswt(path, 3.0), check, size, "gswt.zip", folder=folder)
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bundle") / "bundle"
+    bundles.write_bundle(folder, Ground(discs=4))
+    return folder
+
+
+@fuzz
+@given(random=randoms)
+def test_chunks_of_bundles(bundle, tmp_path, random):
+    """A chunk is changed, and mostly its entry in the manifest with it."""
+    manifest = json.loads((bundle / "davgswt.json").read_text())
+    folder = empty_folder(tmp_path)
+    (folder / "chunks").mkdir()
+    entry = manifest["tiles"][0]["chunks"][0]
+    data = mutate_bytes(random, (bundle / entry["file"]).read_bytes(), 300)
+    if random.random() < 0.8:
+        entry["sha256"] = hashlib.sha256(data).hexdigest()
+    if random.random() < 0.3:
+        entry["bytes"] = len(data)
+    if random.random() < 0.3:
+        entry["count"] = random.choice((0, 1, 15, 17, 2**40))
+    write_bytes(folder / entry["file"], data)
+    read = Bundle(folder, Manifest.from_dict(manifest))
+
+    def check(chunk):
+        field, order = chunk
+        assert is_sound(field) and (np.sort(order, 1) == np.arange(len(field))).all()
+
+    read_guarded("chunks", lambda: read.chunk(0, 0), check, len(data), "lod0_tile_00.bin", folder=folder)
+
+
+@fuzz
+@given(random=randoms)
+def test_manifests_of_bundles(bundle, tmp_path, random):
+    """Whatever a manifest says, a bundle that opens has finite Gaussians in all of its chunks that are read."""
+    folder = empty_folder(tmp_path)
+    shutil.copytree(bundle / "chunks", folder / "chunks")
+    manifest = json.loads((bundle / "davgswt.json").read_text())
+    path = write_bytes(folder / "davgswt.json", mutate_json(random, manifest))
+
+    def check_chunk(found):
+        assert is_sound(found[0])
+
+    def check(opened):
+        assert all_finite(opened.manifest.tile_side, opened.manifest.eye_floor, opened.manifest.encoding.origin)
+        for tile in opened.manifest.tiles:
+            for level, chunk in enumerate(tile.chunks):
+                read = lambda t=tile.tile, lv=level: opened.chunk(t, lv)  # noqa: E731
+                read_guarded("chunks by a manifest", read, check_chunk, 10_000, Path(chunk.file).name)
+
+    read_guarded("davgswt.json", lambda: read_bundle(folder, SCHEMA), check, path.stat().st_size, "davgswt.json")
+
+
+@pytest.fixture(scope="module")
+def colmap(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("colmap")
+    imported_models.write_colmap(folder / "text", sees=True)
+    pycolmap.Reconstruction(str(folder / "text")).write_binary(str(folder))
+    return {
+        kind: {name: (where / f"{name}.{kind}").read_bytes() for name in ("cameras", "images", "points3D")}
+        for kind, where in (("bin", folder), ("txt", folder / "text"))
+    }
+
+
+@pytest.mark.parametrize("kind", ["bin", "txt"])
+@fuzz
+@given(random=randoms)
+def test_models_of_colmap(colmap, tmp_path, kind, random):
+    folder = empty_folder(tmp_path)
+    changed = random.choice(("cameras", "images", "points3D"))
+    for name, data in colmap[kind].items():
+        write_bytes(folder / f"{name}.{kind}", mutate_bytes(random, data, 300) if name == changed else data)
+    if random.random() < 0.1:
+        (folder / f"points3D.{kind}").unlink()
+
+    def check(model):
+        assert all_finite(model.points, model.colours, model.pixels)
+        for shot in model.shots:
+            assert all_finite(shot.rotation, shot.translation) and ".." not in shot.name.split("/")
+            assert np.abs(shot.rotation @ shot.rotation.T - np.eye(3)).max() < 1e-6
+        assert len(model.point_of) == len(model.image_of) == len(model.pixels)
+        assert model.point_of.max(initial=-1) < len(model.points)
+
+    size = sum(path.stat().st_size for path in folder.iterdir())
+    read_guarded(f"COLMAP ({kind})", lambda: import_colmap(folder, folder), check, size, f".{kind}", folder=folder)
+
+
+@fuzz
+@given(random=randoms)
+def test_photos_of_a_round(valid, tmp_path, random):
+    """The pictures that capture.json names are read from its own folder alone."""
+    folder = empty_folder(tmp_path)
+    image_files.write_png(folder / "pose_0001.png", np.full((6, 8, 3), 0.5))
+    path = write_bytes(folder / "capture.json", mutate_json(random, json.loads(valid["capture.json"][0][1])))
+
+    def check(views):
+        assert all(np.isfinite(view.image).all() for view in views)
+
+    read_guarded("photos of a round", lambda: read_captured_views(folder, 8), check, path.stat().st_size, folder=folder)
+
+
+@fuzz
+@given(random=randoms)
+def test_photos_of_the_store(tmp_path, random):
+    folder = empty_folder(tmp_path)
+    image_files.write_png(folder / "a.png", np.full((6, 8, 3), 0.5))
+    store = PhotoStore(folder / "store")
+    (folder / "store").mkdir()
+    stored = store.add(folder / "a.png", "shots", (POSE, CAMERA), CAMERA, "2026-01-01T00:00:00")
+    record = stored.photo.with_name("shot.json")
+    write_bytes(record, mutate_json(random, json.loads(record.read_text(encoding="utf-8"))))
+
+    def check(found):
+        assert all(is_camera(photo.camera) and photo.photo.parent == record.parent for photo in found)
+
+    size = record.stat().st_size
+    read_guarded("shot.json", lambda: store.photos_of(CAMERA), check, size, str(record.parent.name), folder=folder)
+
+
+FRAGMENTS = [
+    *("scene: &a [*a]", "stop: &a {b: *a}", "scene: !!python/object/apply:os.system [x]", "seeds: 2001-99-99"),
+    *("k: !!int x", "k: !!float y", "tau: .nan", "tau: .inf", "k: !!bool z", "? [a]\n: b", "<<: 3", "k: 1e999"),
+    *("k: 99999999999999999999", "k: 1:99", "k: 0x", "\t- a", "%YAML 9", "\0", "--- 1\n--- 2", "k: !!timestamp x"),
+    *("k: !!binary '*'", "k: !!set 3", "1: 2", "null: 1", "scenes: {3: {}}", "[" * 3000, "scenes: []", "k: 0b_"),
+    *("presets: {draft: 7}", "k: " + "9" * 5000, "scenes:\n  x: null", "? {a: b}\n: c"),
+]
+
+
+def mutate_config(random, values: dict, text: str) -> bytes:
+    what = random.randrange(4)
+    if what == 0:
+        return mutate_bytes(random, text.encode(), len(text))
+    if what == 1:
+        place = text.find("\n", random.randrange(len(text))) + 1
+        return (text[:place] + random.choice(FRAGMENTS) + "\n" + text[place:]).encode()
+    if what == 2:
+        inner = random.choice([values, *(v for v in values.values() if isinstance(v, dict) and v)])
+        inner = dict(inner) | {random.choice([*map(str, inner), "x"]): random.choice(VALUES)}
+        return json.dumps(inner if random.random() < 0.5 else values | {random.choice(list(values)): inner}).encode()
+    return mutate_json(random, values)
+
+
+@pytest.fixture(scope="module")
+def config_text(root):
+    return (root / "config/config.yaml").read_text(encoding="utf-8")
+
+
+@fuzz
+@given(random=randoms)
+def test_configs(root, config_text, tmp_path, random):
+    path = write_bytes(
+        empty_folder(tmp_path) / "config.yaml", mutate_config(random, yaml.safe_load(config_text), config_text)
+    )
+
+    def check(config):
+        json.dumps(config, allow_nan=False)
+        assert check_config(config) == config
+
+    read = lambda: check_config(add_scene_files(read_config([path]), root / "config/scenes"))  # noqa: E731
+    read_guarded("config", read, check, path.stat().st_size, "config")

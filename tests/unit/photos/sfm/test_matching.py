@@ -1,0 +1,142 @@
+"""Features of photos, the pairs that are matched, and the places of further photos of a known scene."""
+
+import logging
+import sys
+from contextlib import closing
+
+import numpy as np
+import pycolmap
+import pytest
+from fixtures import photos as synth
+
+from dav_gswt.files import write_json
+from dav_gswt.images import image_files
+from dav_gswt.photos.colmap_model import write_colmap_model
+from dav_gswt.photos.sfm import features, localization, pairs
+from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
+from dav_gswt.photos.sfm.localization import localize_photos
+from dav_gswt.photos.sfm.pairs import compare_descriptions, describe_photos, select_pairs
+
+OPENERS = ("sqlite3.connect", "subprocess.Popen")
+
+
+class Watch:
+    """Notes what opens a database or starts a process while `active`; a hook can't be taken away again."""
+
+    def __init__(self):
+        self.active, self.seen = False, []
+        sys.addaudithook(self)
+
+    def __call__(self, event, arguments):
+        if self.active and event in OPENERS:
+            self.seen.append((event, arguments))
+
+
+@pytest.fixture
+def photos(tmp_path):
+    """Four photos and a database that knows them."""
+    synth.shoot(tmp_path, synth.flight(2, 2, step=0.2), synth.texture(np.random.default_rng(4)), 1.0)
+    with closing(pycolmap.Database.open(tmp_path / "database.db")) as store:
+        params = [synth.FOCAL, synth.WIDTH / 2, synth.HEIGHT / 2, 0.0]
+        lens = pycolmap.Camera(model="SIMPLE_RADIAL", width=synth.WIDTH, height=synth.HEIGHT, params=params)
+        numbers = enter_camera(store, lens)
+        for i in range(4):
+            enter_image(store, f"{i:03d}.png", *numbers)
+    return tmp_path
+
+
+def find_and_match(photos, name):
+    """The database of features and matches, as rows by image and by pair."""
+    (photos / name).mkdir()
+    database = photos / name / "database.db"
+    database.write_bytes((photos / "database.db").read_bytes())
+    extract_features(photos, database, 320, 300, 1)
+    match_photos(4, database, 0, 1, 0)
+    with closing(pycolmap.Database.open(database)) as store:
+        found = [store.read_keypoints(i) for i in range(1, 5)]
+        return found + [store.read_two_view_geometry(i, j).inlier_matches for i in range(1, 5) for j in range(i + 1, 5)]
+
+
+def test_batches_change_nothing_and_nothing_else_opens_the_database_while_colmap_writes(photos, monkeypatch):
+    """A second reader can lock it, and then COLMAP aborts the process."""
+    watch = Watch()
+    watch.active = True
+    try:
+        whole = find_and_match(photos, "whole")
+    finally:
+        watch.active = False
+    assert not watch.seen
+    assert all(300 < len(points) < 600 for points in whole[:4]) and all(len(pairs) > 30 for pairs in whole[4:])
+    monkeypatch.setattr(features, "PHOTOS", 3)
+    monkeypatch.setattr(features, "PAIRS", 4)
+    few = find_and_match(photos, "few")
+    assert all(np.array_equal(one, two) for one, two in zip(whole, few, strict=True))
+
+
+def walk(photos, rng, overlap=0.7, each=100):
+    """Features of photos along a walk: neighbours share most of theirs."""
+    pool = rng.integers(0, 120, (each * photos, 128)).astype(np.uint8)
+    step = int(each * (1 - overlap))
+    shots = [pool[i * step : i * step + each].astype(int) for i in range(photos)]
+    return [np.clip(s + rng.integers(-4, 5, s.shape), 0, 255).astype(np.uint8) for s in shots]
+
+
+def test_photos_that_overlap_are_matched_whatever_their_names():
+    rng = np.random.default_rng(0)
+    shots, order = walk(30, rng), rng.permutation(30)
+    found = set(select_pairs([shots[i] for i in order], 6, 0))
+    assert all(i < j for i, j in found) and len(found) < 30 * 29 / 2 * 0.6
+    place = np.argsort(order)
+    neighbours = {tuple(sorted((int(place[i]), int(place[i + 1])))) for i in range(29)}
+    assert len(neighbours & found) >= 28
+
+
+def test_all_photos_hang_together(monkeypatch):
+    rng = np.random.default_rng(1)
+    apart = [rng.integers(0, 255, (60, 128)).astype(np.uint8) for _ in range(25)]
+    monkeypatch.setattr(pairs, "NEXT", 0)  # whatever their names
+    found = select_pairs(apart, 1, 0)
+    group = {0}
+    for _ in range(25):
+        group |= {k for pair in found if set(pair) & group for k in pair}
+    assert group == set(range(25))
+    assert len(select_pairs([np.zeros((0, 128), np.uint8)] * 8, 12, 0)) == 28
+
+
+def test_the_choice_repeats_and_photos_without_features_do_no_harm():
+    shots = [*walk(24, np.random.default_rng(2)), np.zeros((0, 128), np.uint8)]
+    one, two = select_pairs(shots, 5, 3), select_pairs(shots, 5, 3)
+    assert one == two
+    assert np.isfinite(describe_photos(shots, 3)).all()
+    assert np.isfinite(describe_photos([np.zeros((0, 128), np.uint8)] * 3, 0)).all()
+    alike = compare_descriptions(describe_photos(walk(5, np.random.default_rng(3)), 0))
+    np.testing.assert_allclose(np.diag(alike), 1, atol=1e-5)
+    assert alike[0, 1] > alike[0, 4]
+
+
+@pytest.fixture
+def known_photos(tmp_path, monkeypatch):
+    """A photos/ folder: pictures of a plane from known places, and points on it."""
+    monkeypatch.setattr(localization, "FEATURES", 1024)
+    out = tmp_path / "photos"
+    cameras = synth.flight(2, 2, step=0.2)
+    known = synth.model(cameras, synth.plain(4000, 0.8, np.random.default_rng(1)))
+    synth.shoot(out / "images", cameras, synth.texture(np.random.default_rng(4)), 1.0)
+    (out / "sparse").mkdir()
+    write_colmap_model(known, out / "sparse")
+    write_json(out / "ground.json", {})
+    return out
+
+
+def test_further_photos_find_their_places_and_others_do_not(known_photos, tmp_path, caplog):
+    asked = synth.camera((0.1, 0.05, 0.9), (0.12, 0.1, 0))
+    synth.shoot(tmp_path / "new", [asked], synth.texture(np.random.default_rng(4)), 1.0)
+    other = synth.photograph(synth.camera((0, 0, 1)), synth.texture(np.random.default_rng(99)), 1.0)
+    image_files.write_png(tmp_path / "new" / "other.png", other)
+    image_files.write_png(tmp_path / "new" / "square.png", np.full((200, 200, 3), 0.5))
+    with caplog.at_level(logging.WARNING):
+        found, *none = localize_photos(known_photos, sorted((tmp_path / "new").iterdir()))
+    assert none == [None, None] and "square.png" in caplog.text and "same camera" in caplog.text
+    assert np.linalg.norm(found.centre - asked.centre) < 0.01
+    assert np.degrees(np.arccos(found.forward @ asked.forward)) < 0.5
+    assert localize_photos(known_photos, []) == []

@@ -1,0 +1,159 @@
+"""Terrains of several materials with objects on them: whole ground, counts, order, and objects on the surface."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures.land_covers import GRASS, SAND, SIDE, TILES, cover_content
+from fixtures.terrains import HILLS, SKY, walking
+from scipy.spatial.transform import Rotation
+
+from dav_gswt.bundle.build import BundleOptions, describe_tiles
+from dav_gswt.bundle.orders import DirectionRings
+from dav_gswt.lod.merge import compute_covariances
+from dav_gswt.materials import placing
+from dav_gswt.terrain import endless, object_placement, placement, stills, visibility
+from dav_gswt.terrain.scatter import concatenate_instances
+
+MAGENTA = [1.0, 0.0, 1.0]
+
+
+@pytest.fixture(scope="module")
+def cover():
+    content = cover_content()
+    info = describe_tiles(content, BundleOptions(tau=0.5, salt=7), DirectionRings((20.0,), 8))
+    fields = [content.tile_fields(level) for level in range(content.levels)]
+    objects = [each.fields for each in content.objects]
+    return replace(endless.terrain_from_fields(fields, info, {"kind": "flat"}, objects), reach=10)
+
+
+@pytest.fixture(scope="module")
+def bare(cover):
+    """The same terrain without objects."""
+    return replace(cover, scatter=None)
+
+
+@pytest.fixture(scope="module")
+def seen(cover):
+    """Visible cells of a walker, and the objects by the cell that they are drawn with."""
+    camera = walking(cover)
+    cells = visibility.visible_cells(cover, camera)
+    return camera.centre, cells, object_placement.group_by_cell(cover, cells, camera.centre)
+
+
+def test_a_picture_shows_both_materials_without_a_gap_and_the_objects(cover, bare):
+    camera = stills.shot_camera(stills.Shot("down", (0.3, 0.2), 14.0, 90.0, 90.0), cover, 1.0, 64, 64)
+    terrains = replace(bare, classes=None), bare, cover  # the first: its first material's tiles
+    alone, image, full = (stills.render_view(terrain, camera, SKY, MAGENTA) for terrain in terrains)
+    # magenta would raise blue above green
+    assert (image[..., 2] - image[..., 1]).max() <= (alone[..., 2] - alone[..., 1]).max() + 0.02
+    redder = image[..., 0] > image[..., 1]
+    assert 0.2 < redder.mean() < 0.8
+    assert image[redder].mean(0) == pytest.approx(SAND, abs=0.08)
+    assert image[~redder].mean(0) == pytest.approx(GRASS, abs=0.08)
+    changed = np.abs(image - full).max(-1) > 0.05
+    assert 0.001 < changed.mean() < 0.3
+    assert full[changed].mean(0) == pytest.approx([0.2, 0.35, 0.15], abs=0.1)
+
+
+def test_a_cell_of_one_material_is_placed_as_without_the_others(bare, seen):
+    eye, cells, _ = seen
+    sand = replace(bare, tiles={key: field for key, field in bare.tiles.items() if key[1] < TILES}, classes=None)
+    pure, alone = np.flatnonzero(cells.materials == 1), replace(cells, materials=np.ones(len(cells), int))
+    for k in pure[:5]:
+        field, slope = placement.place_cell(bare, cells[k : k + 1], eye)
+        same, own = placement.place_cell(sand, alone[k : k + 1], eye)
+        np.testing.assert_array_equal(field.means, same.means)
+        np.testing.assert_array_equal(field.opacity_logits, same.opacity_logits)
+        np.testing.assert_array_equal(slope, own)
+
+
+def test_a_budget_counts_the_tiles_of_all_materials_in_a_cell(bare, seen):
+    cells = seen[1]
+    pure = replace(cells, materials=np.ones(len(cells), int), tile=cells.tile % TILES)
+    both = replace(pure, materials=np.full(len(cells), 3))
+    grass = replace(pure, materials=np.full(len(cells), 2), tile=cells.tile % TILES + TILES)
+    counts = [visibility.count_gaussians(bare, each) for each in (pure, grass, both)]
+    np.testing.assert_array_equal(counts[0] + counts[1], counts[2])
+
+
+def test_a_cell_is_placed_the_same_whatever_is_remembered(bare, seen, monkeypatch):
+    eye, cells, _ = seen
+    k = int(np.flatnonzero(cells.materials == 3)[0])
+    fresh = placement.place_cell(replace(bare), cells[k : k + 1], eye)[0].means
+    first, again = (placement.place_cell(bare, cells[k : k + 1], eye)[0].means for _ in range(2))
+    del bare.kept[next(place for place in bare.kept if place[:2] == (cells.i[k], cells.j[k]))]
+    monkeypatch.setattr(placement, "KEPT", 0)
+    forgotten = placement.place_cell(bare, cells[k : k + 1], eye)[0].means
+    for means in (first, again, forgotten):
+        np.testing.assert_array_equal(means, fresh)
+
+
+def test_an_object_is_turned_and_scaled_about_its_foot(cover):
+    source = cover.objects[0][0]
+    n, foot = len(source), np.array([3.0, 4.0, 0.5])
+    way = placing.turn_rows(np.full(n, 0.3))
+    made = placing.turn_and_scale(source, way, np.full(n, 1.1), np.tile(foot, (n, 1)))
+    turn = Rotation.from_euler("z", 0.3).as_matrix()
+    assert made.means == pytest.approx(1.1 * source.means @ turn.T + foot, abs=1e-5)
+    expected = 1.1**2 * turn @ compute_covariances(source) @ turn.T
+    assert compute_covariances(made) == pytest.approx(expected, rel=1e-4, abs=1e-9)
+
+
+def test_every_visible_foot_is_drawn_once(cover, seen):
+    _, cells, things = seen
+    drawn = concatenate_instances(list(things.values()))
+    every = cover.scatter.instances_in(cells.i, cells.j)
+    assert len(drawn) == len(every) > 20
+    assert sorted(drawn.u.tolist()) == sorted(every.u.tolist())
+
+
+def test_an_object_is_drawn_with_the_last_of_the_cells_that_it_touches(cover, seen):
+    eye, cells, things = seen
+    moved = 0
+    for k, some in things.items():
+        radius = cover.scatter.objects[0].radius * some.size / SIDE
+        for n in range(len(some)):
+            x, y = some.i[n] + some.u[n], some.j[n] + some.v[n]
+            touched = (np.abs(cells.i + 0.5 - x) < 0.5 + radius[n]) & (np.abs(cells.j + 0.5 - y) < 0.5 + radius[n])
+            last = int(np.flatnonzero(touched)[-1])  # cells come back to front
+            steps = np.abs(cells.i - np.floor(eye[0] / SIDE)) + np.abs(cells.j - np.floor(eye[1] / SIDE))
+            assert steps[k] == steps[last]
+            moved += (cells.i[k], cells.j[k]) != (some.i[n], some.j[n])
+    assert moved > 0
+
+
+def test_objects_come_after_the_tiles_of_their_cell_the_farthest_first(cover, seen):
+    eye, cells, things = seen
+    k, some = next((k, some) for k, some in things.items() if len(some) > 1)
+    alone, _ = placement.place_cell(cover, cells[k : k + 1], eye)
+    field, slope = placement.place_cell(cover, cells[k : k + 1], eye, some)
+    np.testing.assert_array_equal(field.means[: len(alone)], alone.means)
+    assert len(slope) == len(field) > len(alone)
+    feet = np.stack([(some.i + some.u) * SIDE, (some.j + some.v) * SIDE], 1) - eye[:2]
+    first = field.means[len(alone), :2]
+    farthest = feet[np.argmax(np.linalg.norm(feet, axis=1))]
+    assert np.linalg.norm(first - farthest) < 1.0
+
+
+def test_an_object_stands_on_the_surface(cover, seen):
+    hilly = replace(cover, heights=HILLS)
+    eye, cells, things = seen
+    k, some = next(iter(things.items()))
+    cell = cells[k : k + 1]
+    flat, raised = (placement.place_cell(terrain, cell, eye, some)[0] for terrain in (cover, hilly))
+    tall = flat.means[:, 2] + eye[2] > 0.3
+    assert tall.any()
+    height, _ = HILLS.at(flat.means[tall, 0].astype(float) + eye[0], flat.means[tall, 1].astype(float) + eye[1])
+    assert raised.means[tall, 2] - flat.means[tall, 2] == pytest.approx(height, abs=1e-3)
+
+
+def test_a_budget_counts_objects(cover, bare, seen):
+    cells = seen[1]
+    without, counts = (visibility.count_gaussians(terrain, cells) for terrain in (bare, cover))
+    levels = visibility.active_levels(cover, cells)
+    more = np.zeros(len(cells), int)
+    for n, cell in enumerate(zip(cells.i, cells.j, strict=True)):
+        found = cover.scatter.instances_in(*(np.array([v]) for v in cell))
+        more[n] = sum(len(cover.objects[k][lv]) for k in found.number for lv in np.flatnonzero(levels[:, n]))
+    np.testing.assert_array_equal(counts - without, more)
