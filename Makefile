@@ -13,7 +13,7 @@ export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
 .PHONY: setup reference run view gallery test test-all test-study lint lint-code lint-types lint-viewer lint-docs mutants \
-  compare bench docs prior compiler sanitize faults fuzz
+  compare bench docs prior compiler sanitize fuzz
 .DELETE_ON_ERROR:
 
 # .venv alone
@@ -74,11 +74,6 @@ mutants: .venv/installed-test
 # minutes: the rasterizer's tests on a core built with AddressSanitizer and UBSan, then on one with ThreadSanitizer
 sanitize: .venv/installed-test
 	@tests/sanitizers/run.sh
-
-# an hour: runs that are killed, run out of disk or memory, ...; the table is in results/faults/table.md. It goes on where
-# it was ended. Some faults need root: file systems are mounted below the folder for temporary files, and taken away.
-faults: .venv/installed-test
-	@PYTHONPATH=tests $(BIN)/python -m faults.harness --cores $(CORES) --seed $(SEED)
 
 # minutes: inputs that are damaged or ill meant, EXAMPLES of each kind by SEED; the table is in results/fuzz.md
 fuzz: .venv/installed-test

@@ -9,18 +9,12 @@ Object.assign(window, {
     get state() {
       return viewer.state();
     },
-    get stats() {
-      return viewer.stats.summary();
-    },
     get flyPath() {
       return viewer.flyPath;
     },
     /** Is the tour under way? */
     get tour() {
       return viewer.tour.on;
-    },
-    get pacing() {
-      return viewer.pacing;
     },
     get walker() {
       return viewer.scene?.walker;

@@ -1,4 +1,4 @@
-"""Bundles, sets for the public renderer and fly paths that are dropped onto the page; files nobody should trust."""
+"""Bundles and sets for the public renderer that are dropped onto the page; files nobody should trust."""
 
 import hashlib
 import json
@@ -413,29 +413,3 @@ def test_a_gswt_zip_of_the_public_renderer_is_shown(target, other, tmp_path):
     # the set's own eye floor keeps the eye so high that hundreds of tiles are in the picture: it has their mean colour
     assert np.abs(picture.mean((0, 1)) - np.mean([bundles.colour_of(t) for t in range(16)], 0)).max() < 4
     assert picture.std() > 5
-
-
-def test_classes_by_a_picture_are_shown(target, grown):
-    """West of the picture's middle lies the first material, east of it the second."""
-    files = files_of(grown) | {PICTURE["file"]: bytes([0, 0, 1, 0, 0, 1])}
-    manifest = json.loads(files["davgswt.json"])
-    manifest["classes"]["rule"] = [PICTURE]
-    files["davgswt.json"] = json.dumps(manifest).encode()
-    open_dropped(target, zipped(files))
-    west, east = (target.at(x=x, y=2.0, eye=1.5, yaw=90, pitch=-90).mean((0, 1)) for x in (-20.0, 20.0))
-    assert west[0] > west[1] + 10 and east[1] > east[0] + 10, "sand is reddish, grass green"
-
-
-@pytest.mark.slow
-def test_a_dropped_fly_path_is_played_and_a_broken_one_refused(visit, plain):
-    seen = visit(320, 200).open(plain)
-    place = dict(eye=2.0, yaw=20.0, pitch=-30.0)
-    path = [dict(seconds=0.0, x=0.0, y=0.0, **place), dict(seconds=0.3, x=8.0, y=4.0, **place)]
-    drop(seen, "flight.json", json.dumps({"format": "davgswt-flight", "path": path}).encode())
-    seen.until("davgswt.flyPath.path.length === 2")
-    seen.page.evaluate("davgswt.flyPath.play()")
-    seen.until("davgswt.state.x === 8 && davgswt.state.y === 4 && davgswt.flyPath.mode === 'rest'")
-    drop(seen, "flight.json", b'{"path": 3}')
-    alert = seen.page.get_by_role("alert")
-    alert.wait_for(state="visible")
-    assert "not a fly path" in alert.inner_text()

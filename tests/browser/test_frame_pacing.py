@@ -99,13 +99,3 @@ def test_the_next_visit_begins_with_the_pace_of_the_last(chromium, plain):
         second.add_init_script(f"localStorage.setItem('davgswt.pace', {json.dumps(json.dumps(kept))})")
         seen = Visit(second).open(plain)
         assert seen.state["budget"] == 234_567
-
-
-@pytest.mark.slow
-def test_a_browser_without_storage_has_the_page_all_the_same(visit, plain):
-    seen = visit(160, 100)
-    seen.page.add_init_script(
-        "Object.defineProperty(window, 'localStorage', { get() { throw new DOMException('no') } })"
-    )
-    seen.open(plain)
-    assert seen.state["budget"] == 100_000 and seen.state["error"] is None

@@ -42,12 +42,6 @@ LOOK_AROUND = """async () => {
   return { first: sums(first), again: [sums(again), sums(hurried)], uploads: [uploads(again), uploads(hurried)],
     incomplete: hurried.filter(({ frame }) => frame.incomplete).length };
 }"""
-WALK = """async () => {
-  let most = 0; // if each chunk is sorted once for each direction
-  for (const { entry: { count } } of chunks) most += count * manifest.directions.length;
-  for (let k = 0; k < 60; k++) view({ ...place, x: 3 + 0.7 * k, yaw: 60 + 9 * k });
-  return { most, ...builder.work };
-}"""
 AHEAD = """async () => {
   const first = view(place, false).frame.incomplete;
   while (builder.workAhead(1000));
@@ -151,11 +145,6 @@ def test_where_the_eye_has_looked_around_nothing_is_made_again(page):
     assert all(count > 0 for count in found["first"].values())
     assert all(set(again.values()) == {0} for again in found["again"])
     assert found["uploads"] == [0, 0] and found["incomplete"] == 0
-
-
-def test_each_chunk_is_sorted_once_for_a_direction_wherever_its_cells_are(page):
-    found = run(page, WALK)
-    assert 0 < found["sorted"] <= found["most"] < found["tested"]
 
 
 def test_what_is_late_is_made_between_views(page):

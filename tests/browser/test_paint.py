@@ -11,7 +11,7 @@ from fixtures.paint_pages import ABOVE, BLANK, PIXEL, SPREAD, THINGS, WALKER, is
 
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import read_json
 from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.heights import Hills
@@ -262,30 +262,6 @@ def test_keys_choose_a_brush_and_paint_under_it_and_sliders_set_densities_and_sh
 
 
 @slow
-def test_one_finger_paints_and_a_second_one_takes_it_back_and_walks(visit, address):
-    seen = visit(240, 240, has_touch=True).open(f"{address}?still")
-    seen.at(**ABOVE)
-    seen.page.evaluate("davgswt.paint.brush.material = 1")
-    session = seen.page.context.new_cdp_session(seen.page)
-
-    def touch(kind, *points):
-        touches = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
-        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
-
-    touch("touchStart", (120, 120))
-    touch("touchMove", (140, 120))
-    assert (first := seen.page.evaluate("davgswt.painting.painted.count")) > 0
-    touch("touchStart", (140, 120), (60, 60))
-    assert seen.page.evaluate("davgswt.painting.painted.count") == 0
-    touch("touchMove", (160, 140), (80, 80))
-    touch("touchEnd")
-    assert seen.state["x"] != ABOVE["x"] and seen.page.evaluate("davgswt.painting.painted.count") == 0
-    touch("touchStart", (120, 120))
-    touch("touchEnd")
-    assert 0 < seen.page.evaluate("davgswt.painting.painted.count") <= first
-
-
-@slow
 def test_the_overlay_shows_the_material_of_every_place_and_names_its_colours(seen):
     plain = seen.at(**ABOVE)
     seen.page.select_option("#overlay", "material")
@@ -299,25 +275,6 @@ def test_the_overlay_shows_the_material_of_every_place_and_names_its_colours(see
     grass = is_grass(plain)
     clear = (np.abs(plain[..., 0] - plain[..., 1]) > 25) & ~shrub & (nearest < 2)
     assert clear.mean() > 0.4 and (nearest[clear] == grass[clear]).mean() > 0.95
-
-
-@slow
-def test_the_overlay_is_right_for_tiles_beyond_255(cover, tmp_path, visit):
-    """Each material has 256 tiles, by the same files sixteen times; numbers of grass have nine bits."""
-    write_page(cover / "bundle", VIEWER, tmp_path / "page")
-    manifest = read_json(tmp_path / "page/davgswt.json")
-    tiles = [tile for first in (0, 16) for _ in range(16) for tile in manifest["tiles"][first : first + 16]]
-    manifest["tiles"] = [tile | {"tile": number} for number, tile in enumerate(tiles)]
-    manifest["materials"][1]["first_tile"] = 256
-    write_json(tmp_path / "page/davgswt.json", manifest)
-    with served(tmp_path / "page") as address:
-        seen = visit(120, 120).open(f"{address}?still")
-        plain = seen.at(**ABOVE)
-        seen.page.select_option("#overlay", "material")
-        shown = seen.picture()
-    orange = shown[..., 0] > shown[..., 2] + 60
-    clear = np.abs(plain[..., 0] - plain[..., 1]) > 25
-    assert (orange != is_grass(plain))[clear].mean() > 0.95
 
 
 @slow

@@ -9,7 +9,6 @@ import pytest
 from fixtures.bundles import SKY, Ground
 from fixtures.page_visit import camera_at
 from fixtures.terrains import two_level_terrain
-from playwright.sync_api import Error
 
 from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.bundle.store import Bundle
@@ -27,14 +26,6 @@ PLACES = {
     "pole": dict(x=0.0, y=90.0, eye=3.0, yaw=10.0, pitch=-60.0),
     "orbit": dict(x=41.3, y=23.7, eye=50.0, yaw=30.0, pitch=-89.0),
 }
-STALE = """async place => { // the picture of a place, of the frame of the one before
-  const { viewer } = await import("./main.js"), { gl } = viewer;
-  viewer.setPlace(place);
-  viewer.drawFrame();
-  const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight], bytes = new Uint8Array(4 * width * height);
-  gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-  return [width, height, btoa(Array.from(bytes, (v) => String.fromCharCode(v)).join(""))];
-}"""
 MEAN, MOST = 1.0, 40  # of 255; where levels fade blobs differ by up to 38, on purpose, see test_against_library.py
 EXACT = 12  # of 255: largest difference where nothing fades; the page rounds at each of some twenty splats of a pixel
 
@@ -104,18 +95,6 @@ def test_the_ground_has_no_holes(still, small, name):
 
 
 @pytest.mark.slow
-def test_while_the_worker_is_behind_its_last_frame_is_drawn_from_where_the_eye_is(still, unfading):
-    address, terrain, _ = unfading
-    seen, place = still(address, 160, 100), PLACES["turned edge"]
-    old = seen.at(**place)
-    there = place | {"y": place["y"] + float(np.degrees(0.2 / terrain.heights.radius))}
-    stale = seen.decode(*seen.page.evaluate(STALE, there))
-    new = seen.at(**there)
-    assert np.abs(old - new).mean() > 1
-    assert np.abs(stale - new).mean() < 0.2
-
-
-@pytest.mark.slow
 def test_one_begins_where_the_still_of_the_walker_was_taken_and_an_address_leads_back(visit, small):
     first, ground = visit(160, 100).open(f"{small}?still"), make_sphere(SMALL, GROUND.side)
     terrain = replace(two_level_terrain(), heights=ground)
@@ -127,11 +106,3 @@ def test_one_begins_where_the_still_of_the_walker_was_taken_and_an_address_leads
     address = first.page.evaluate("import('./main.js').then(({ viewer }) => viewer.address(''))")
     other = visit(160, 100).open(f"{small}?still{address}")
     assert (other.picture() == expected).all()
-
-
-@pytest.mark.slow
-def test_other_pages_are_told_that_it_is_a_planet(still, small):
-    with pytest.raises(Error, match="is a planet"):
-        still(small, 160, 100).page.evaluate(
-            "address => import('./terrain_api.js').then(({ load }) => load(address))", small
-        )

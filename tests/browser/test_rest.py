@@ -85,25 +85,3 @@ def test_a_picture_at_rest_is_the_one_that_is_drawn_at_once_after_progress_and_a
         seen.page.evaluate("place => davgswt.set(place)", OBLIQUE)
         grabbed = seen.page.evaluate("davgswt.grab()")
         assert (seen.decode(*grabbed) == seen.at(**OBLIQUE)).all()
-
-
-@pytest.mark.slow
-def test_another_overlay_is_refined_however_late_the_worker_answers(visit, page_of):
-    """The frame at hand, drawn in full before, is not the picture that is due: a coarser one comes first."""
-    with served(page_of(Ground(discs=16))) as address:
-        seen = visit(320, 200)
-        seen.page.add_init_script(
-            """const post = Worker.prototype.postMessage;
-            window.late = 0;
-            Worker.prototype.postMessage = function (...given) {
-              setTimeout(() => post.apply(this, given), window.late);
-            };"""
-        )
-        seen.open(address)
-        seen.page.evaluate("place => davgswt.set(place)", OBLIQUE | {"pitch": -8})
-        seen.until("davgswt.state.whole", seconds=90)
-        seen.page.evaluate("(window.late = 400, davgswt.overlay('tiles'))")
-        seen.until("!davgswt.state.whole && davgswt.state.shrink < 1")
-        seen.until("davgswt.state.whole", seconds=90)
-        shown = seen.decode(*seen.page.evaluate("davgswt.grab()"))
-        assert (shown == seen.picture()).all()

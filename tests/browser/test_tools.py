@@ -49,32 +49,21 @@ def test_uncertain_tiles_are_warm_and_sure_ones_cool(still, uncertain):
 
 
 @pytest.mark.slow
-def test_the_divider_has_the_terrain_on_its_left_is_dragged_and_moved_by_keys_and_nobody_turns(visit, plain):
+def test_the_divider_has_the_terrain_on_its_left_and_is_dragged(visit, plain):
     seen = visit(480, 320).open(f"{plain}?still")
-    assert not seen.page.locator("#compare").is_visible(), "without an overlay there is nothing to compare"
     terrain = seen.at(**OBLIQUE)
     seen.page.select_option("#overlay", "level")
     painted = seen.picture()
     seen.page.keyboard.press("b")
     both = seen.picture()
     assert (both[:, :240] == terrain[:, :240]).all() and (both[:, 240:] == painted[:, 240:]).all()
-    assert seen.page.locator("#divider").inner_text().split("\n")[0] == "Terrain"
     seen.page.mouse.move(240, 100)
     seen.page.mouse.down()
     seen.page.mouse.move(120, 110, steps=3)
     seen.page.mouse.up()
     both = seen.picture()
     assert (both[:, :120] == terrain[:, :120]).all() and (both[:, 120:] == painted[:, 120:]).all()
-    divider = seen.page.get_by_role("slider", name="Divider")
-    assert divider.get_attribute("aria-valuenow") == "25" and divider.bounding_box()["width"] == 44
-    divider.focus()
-    for key, now in [("ArrowRight", "30"), ("ArrowLeft", "25"), ("End", "98"), ("Home", "2"), ("ArrowLeft", "2")]:
-        seen.page.keyboard.press(key)
-        assert divider.get_attribute("aria-valuenow") == now
     assert {k: seen.state[k] for k in OBLIQUE} == OBLIQUE
-    seen.page.select_option("#overlay", "picture")
-    seen.until("divider.hidden && compare.hidden")
-    assert (seen.picture() == terrain).all()
 
 
 @pytest.mark.slow

@@ -50,7 +50,6 @@ def test_any_input_ends_the_tour(visit, plain):
     seen = visit(480, 300).open(plain)
     inputs = {
         "key": lambda page: page.keyboard.press("ArrowRight"),
-        "own key": lambda page: page.keyboard.press("t"),
         "mouse": lambda page: page.mouse.click(240, 60),
         "wheel": lambda page: page.mouse.wheel(0, 50),
         "gamepad": lambda page: page.evaluate("dispatchEvent(new Event('gamepadinput'))"),
@@ -64,13 +63,3 @@ def test_any_input_ends_the_tour(visit, plain):
         place = seen.state
         seen.page.wait_for_timeout(100)
         assert seen.state["x"] == place["x"], name
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("motion", ["no-preference", "reduce"])
-def test_an_address_begins_a_tour_but_not_for_people_who_ask_for_less_motion(visit, plain, motion):
-    seen = visit(160, 100, reduced_motion=motion).open(f"{plain}?tour")
-    seen.until("!hint.hidden || davgswt.state.x !== 2")
-    assert seen.page.evaluate("davgswt.tour") == (motion != "reduce")
-    seen.page.keyboard.press("t")
-    assert seen.page.evaluate("davgswt.tour") == (motion == "reduce"), "who asks for it has it"

@@ -133,17 +133,6 @@ def test_dragging_turns_the_view_as_if_the_picture_were_held(still, plain):
     assert (seen.state["yaw"], seen.state["pitch"]) == (pytest.approx(27.5), pytest.approx(-26.25))
 
 
-@pytest.mark.slow
-def test_a_phone_has_a_pad_to_walk_with(visit, plain):
-    seen = visit(390, 844, has_touch=True, is_mobile=True).open(plain)
-    pad = seen.page.get_by_role("button", name="Hold to walk forward")
-    assert pad.is_visible()
-    before = seen.state["y"]
-    pad.dispatch_event("pointerdown", {"pointerId": 1, "bubbles": True})
-    seen.until(f"davgswt.state.y > {before} + 0.02")
-    assert seen.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-
-
 def test_the_address_follows_the_walk_and_a_pasted_one_is_followed(moving):
     moving.page.evaluate("place => davgswt.set(place)", OBLIQUE)
     moving.until("location.hash.startsWith('#3.0000,5.0000,2.0000,20.000,-30.000')")
@@ -153,21 +142,6 @@ def test_the_address_follows_the_walk_and_a_pasted_one_is_followed(moving):
     moving.until("davgswt.state.x === -7 && davgswt.state.yaw === 90 && davgswt.state.overlay === 'level'")
     moving.page.evaluate("location.hash = '#3,5,2,20,-30'")
     moving.until("davgswt.state.x === 3 && davgswt.state.overlay === 'picture'")
-
-
-@pytest.mark.slow
-def test_an_address_that_is_entered_as_the_page_writes_its_own_is_followed(visit, plain):
-    seen = visit(160, 100)
-    seen.page.add_init_script("""window.ticks = [];
-        const start = window.setInterval;
-        window.setInterval = (tick, ...rest) => { ticks.push(tick); return start(tick, ...rest); };""")
-    seen.open(plain)
-    seen.page.evaluate("""() => {
-        davgswt.set({ x: 3, y: 5 });
-        location.hash = "#-7,1.5,1,90,-10";
-        for (const tick of ticks) tick();
-    }""")
-    seen.until("davgswt.state.x === -7", 5.0)
 
 
 @pytest.mark.slow

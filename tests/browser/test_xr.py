@@ -1,14 +1,11 @@
-"""Virtual reality on a mock device: two eyes as the page itself would draw them, walking, turning, teleports."""
+"""Virtual reality on a mock device: two eyes as the page itself would draw them, walking and turning."""
 
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-from fixtures.bundles import Ground
 from fixtures.page_visit import Visit
-
-from dav_gswt.study.terrain.browser import served
 
 MOCK = Path(__file__).with_name("xr_mock.js")
 START = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=0.0)
@@ -83,55 +80,6 @@ def test_the_left_stick_walks_where_one_looks_and_the_right_one_turns_in_steps_a
         for _ in range(5):
             seen.page.evaluate("xrMock.frame()")
         assert place(seen) == pytest.approx((*walked[:2], 110 - 30 * steps), abs=1e-3)
-
-
-@pytest.mark.slow
-def test_the_trigger_takes_one_where_it_points_and_shows_where(worn):
-    seen = worn()
-    plain = frame(seen)
-    # a controller a metre high that points 20 degrees down, straight ahead
-    seen.page.evaluate(
-        """() => {
-          const c = Math.cos(Math.PI / 9), s = Math.sin(Math.PI / 9);
-          const matrix = Float32Array.of(1, 0, 0, 0, 0, c, -s, 0, 0, s, c, 0, 0, 1, 0, 1);
-          const transform = { position: { x: 0, y: 1, z: 0 }, matrix };
-          const source = { handedness: "right", targetRaySpace: { transform } };
-          xrMock.session.dispatchEvent(Object.assign(new Event("selectstart"), { inputSource: source }));
-        }"""
-    )
-    aimed = frame(seen)
-    assert 40 < (np.abs(aimed - plain).max(-1) > 20).sum() < 8000, "a ring"
-    before = place(seen)
-    seen.page.evaluate("xrMock.session.dispatchEvent(new Event('selectend'))")
-    away = np.subtract(place(seen)[:2], before[:2])
-    far, yaw = 1 / math.tan(math.radians(20)), math.radians(20)
-    assert away == pytest.approx([far * math.cos(yaw), far * math.sin(yaw)], abs=0.05)
-
-
-@pytest.mark.slow
-def test_a_session_ends_where_one_was_and_the_page_goes_on_until_a_refusal(worn):
-    seen = worn(noFloor=True, head=[0.0, 0.0, -2.0, 0.0])
-    frame(seen, 2)
-    assert seen.state["eye"] == pytest.approx(HIGH), "where there is no floor one stands all the same"
-    seen.page.evaluate("xrMock.lost = true; xrMock.frame()")  # tracking may be lost meanwhile
-    seen.page.evaluate("xrMock.session.end()")
-    state = seen.state
-    assert state["x"] == pytest.approx(3 + 2 * math.cos(math.radians(20)))
-    seen.until("davgswt.state.whole")
-    assert seen.page.locator("#xr").inner_text() == "Enter VR" and state["error"] is None
-    refuse = "navigator.xr.requestSession = async () => { throw new Error('the headset is in use') }"
-    seen.page.evaluate(f"() => {{ {refuse}; document.getElementById('xr').click(); }}")
-    seen.until("!error.hidden")
-    assert "the headset is in use" in seen.page.locator("#error").inner_text()
-
-
-@pytest.mark.slow
-def test_terrain_without_metres_is_as_large_as_makes_one_stand_as_high_as_one_was(worn, page_of):
-    with served(page_of(Ground(), edit=lambda manifest: manifest.update(unit="unit"))) as address:
-        seen = worn(address, head=[0.0, 1.6, -1.0, 0.0])
-        place(seen)
-        assert seen.state["eye"] == pytest.approx(2.0)
-        assert seen.state["x"] == pytest.approx(3 + 2 / 1.6 * math.cos(math.radians(20)))
 
 
 def test_an_eye_that_looks_to_one_side_has_a_camera_that_reaches_beyond(modules):

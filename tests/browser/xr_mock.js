@@ -21,7 +21,6 @@
       Object.assign(this.renderState, state);
     }
     async requestReferenceSpace(kind) {
-      if (kind === "local-floor" && mock.noFloor) throw new DOMException("no floor", "NotSupportedError");
       return { kind };
     }
     requestAnimationFrame(draw) {
@@ -34,7 +33,7 @@
     }
   }
   const mock = window.xrMock = {
-    time: 0, noFloor: false, rigid,
+    time: 0,
     head: [0, 1.6, 0, 0], // x, y, z, yaw
     apart: 0.064, // eyes
     fields: [{ left: 1.2, right: 0.7, down: 1, up: 0.8 }, { left: 0.7, right: 1.2, down: 1, up: 0.8 }],
@@ -44,10 +43,9 @@
       const eyes = [-apart / 2, apart / 2].map((dx) => rigid(x + dx * Math.cos(yaw), y, z - dx * Math.sin(yaw), yaw));
       mock.time += milliseconds;
       draw(1000 + mock.time, {
-        getViewerPose: () => mock.lost ? null : { transform: rigid(x, y, z, yaw), views: eyes.map((transform, eye) => ({
+        getViewerPose: () => ({ transform: rigid(x, y, z, yaw), views: eyes.map((transform, eye) => ({
           eye: ["left", "right"][eye], transform, projectionMatrix: projection(fields[eye]),
-        })) },
-        getPose: (space) => ({ transform: space.transform }),
+        })) }),
       });
       const gl = canvas().getContext("webgl2"), { drawingBufferWidth: w, drawingBufferHeight: h } = gl;
       const bytes = new Uint8Array(4 * w * h);

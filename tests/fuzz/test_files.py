@@ -1,4 +1,4 @@
-"""Files from outside and between stages, mutated: splats, bundles, models, photos, weights, records, the config."""
+"""Files from outside and between stages, mutated: splats, bundles, models, photos, weights, the config."""
 
 import hashlib
 import json
@@ -16,7 +16,6 @@ import torch
 import yaml
 from fixtures import bundles, imported_models
 from fixtures.bundles import Ground
-from fixtures.frames import scene_frame
 from fixtures.fuzzing import (
     VALUES,
     all_finite,
@@ -38,27 +37,18 @@ from torch import nn
 from dav_gswt.bundle import gswt
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle, read_bundle
-from dav_gswt.capture.store import PhotoStore
 from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.field import GaussianField, read_field, write_field
 from dav_gswt.files import write_json
 from dav_gswt.geometry.camera_layouts import orbit
 from dav_gswt.geometry.poses import Pose
-from dav_gswt.geometry.scene_frame import read_scene_frame, write_scene_frame
 from dav_gswt.images import image_files, lpips_weights
 from dav_gswt.photos import exif, importers
 from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
 from dav_gswt.photos.importers.colmap import import_colmap
 from dav_gswt.photos.importers.photo_matching import PhotoFolder
 from dav_gswt.photos.importers.point_ply import read_point_ply
-from dav_gswt.photos.lenses import Lens, read_lenses, write_lenses
-from dav_gswt.photos.training_views import read_captured_views
-from dav_gswt.photos.view_split import ViewSplit, read_view_split, write_view_split
 from dav_gswt.prior import weights
-from dav_gswt.views.frozen_scales import FrozenScales, read_frozen_scales, write_frozen_scales
-from dav_gswt.views.scores import Scores, read_scores, write_scores
-from dav_gswt.views.selection import PoseSelection, read_pose_selection, write_pose_selection
-from dav_gswt.views.uncertainty.weighting import Quantiles, Scales
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
@@ -68,13 +58,7 @@ NETWORK = nn.Sequential(nn.Linear(3, 4), nn.Linear(4, 2))
 KERNELS = ((2, 3, 1, 1), (3, 2, 1, 1), (2, 3, 1, 1), (2, 2, 1, 1), (1, 2, 1, 1))  # of LPIPS, made small
 POSE = Pose("pose_0001", 60.0, 10.0, 4.0)
 CAMERA = orbit(60.0, 10.0, 4.0, (0.0, 0.0, 0.0), 8, 6, 60.0)
-LENS = Lens(pycolmap.Camera(model="OPENCV", width=8, height=6, params=[9.0] * 4 + [0.0] * 4), (9.0,) * 6)
-FROZEN = FrozenScales(Scales({"opacity": 1.0}), Quantiles(0.1, 0.9))
-SPLIT = ViewSplit(("a.png",), ("b.png",), ("c.png",))
 SHOTS = [CapturedPhoto("pose_0001.png", POSE, CAMERA, CAMERA, 0.0)]
-SELECTION = PoseSelection("farthest", 2, [POSE])
-TERMS = {"opacity": np.array([0.1]), "gradient": np.array([1.0])}
-SCORES = Scores([POSE], TERMS, Scales({"opacity": 1.0, "gradient": 2.0}), np.array([0]))
 
 
 @dataclass(frozen=True)
@@ -184,25 +168,9 @@ def is_camera(camera) -> bool:
     return shapes and whole and all_finite(camera.rotation, camera.translation, numbers)
 
 
-def is_pose(pose) -> bool:
-    return isinstance(pose.name, str) and all_finite(pose.elevation, pose.azimuth, pose.radius)
-
-
 def is_record(shots) -> bool:
     names = all(Path(shot.name).name == shot.name for shot in shots)
-    return names and all(is_camera(shot.camera) and is_camera(shot.requested) and is_pose(shot.pose) for shot in shots)
-
-
-def is_split(split) -> bool:
-    return all(isinstance(name, str) for name in (*split.start, *split.pool, *split.test))
-
-
-def is_selection(selection) -> bool:
-    return all(map(is_pose, selection.poses)) and isinstance(selection.k, int)
-
-
-def are_lenses(lenses) -> bool:
-    return all(all_finite(lens.camera.params) and len(lens.pinhole) == 6 for lens in lenses)
+    return names and all(is_camera(shot.camera) and is_camera(shot.requested) for shot in shots)
 
 
 def is_network(facts) -> bool:
@@ -234,7 +202,6 @@ READERS = [
         lambda read: all_finite(*read.kernels[0], *read.biases),
         1200,
     ),
-    Reader("scores.csv", lambda folder: write_scores(folder / "scores.csv", SCORES), read_scores, bool, 400),
     Reader(
         "nerfstudio",
         lambda folder: write_json(folder / "model.json", imported_models.transforms()),
@@ -248,35 +215,10 @@ READERS = [
         is_model,
     ),
     Reader(
-        "ground.json",
-        lambda folder: write_scene_frame(folder / "ground.json", scene_frame()),
-        read_scene_frame,
-        bool,
-    ),
-    Reader("views.json", lambda folder: write_view_split(folder / "views.json", SPLIT), read_view_split, is_split),
-    Reader(
-        "poses.json",
-        lambda folder: write_pose_selection(folder / "poses.json", SELECTION),
-        read_pose_selection,
-        is_selection,
-    ),
-    Reader(
         "capture.json",
         lambda folder: write_capture_record(folder, "render", SHOTS),
         lambda path: read_capture_record(path.parent),
         is_record,
-    ),
-    Reader(
-        "lenses.json",
-        lambda folder: write_lenses(folder, [LENS]),
-        lambda path: read_lenses(path.parent),
-        are_lenses,
-    ),
-    Reader(
-        "scores.json",
-        lambda folder: write_frozen_scales(folder / "scores.json", FROZEN, {}, {}, {}),
-        read_frozen_scales,
-        bool,
     ),
 ]
 
@@ -304,7 +246,7 @@ def test_a_changed_file_is_read_or_refused(valid, monkeypatch, tmp_path, reader,
     def check(read):
         assert is_finite(read) and reader.is_right(read)
 
-    read_guarded(reader.name, lambda: reader.read(path), check, path.stat().st_size, name, folder=folder)
+    read_guarded(reader.name, lambda: reader.read(path), check, path.stat().st_size, name)
 
 
 @fuzz
@@ -318,7 +260,7 @@ def test_sets_of_the_public_renderer(set_of_tiles, tmp_path, random):
         gswt.write_gswt(read, 3.0, folder / "again.zip")
 
     size = path.stat().st_size
-    read_guarded("gswt.zip", lambda: gswt.read_gswt(path, 3.0), check, size, "gswt.zip", folder=folder)
+    read_guarded("gswt.zip", lambda: gswt.read_gswt(path, 3.0), check, size, "gswt.zip")
 
 
 @pytest.fixture(scope="module")
@@ -350,7 +292,7 @@ def test_chunks_of_bundles(bundle, tmp_path, random):
         field, order = chunk
         assert is_sound(field) and (np.sort(order, 1) == np.arange(len(field))).all()
 
-    read_guarded("chunks", lambda: read.chunk(0, 0), check, len(data), "lod0_tile_00.bin", folder=folder)
+    read_guarded("chunks", lambda: read.chunk(0, 0), check, len(data), "lod0_tile_00.bin")
 
 
 @fuzz
@@ -406,39 +348,7 @@ def test_models_of_colmap(colmap, tmp_path, kind, random):
         assert model.point_of.max(initial=-1) < len(model.points)
 
     size = sum(path.stat().st_size for path in folder.iterdir())
-    read_guarded(f"COLMAP ({kind})", lambda: import_colmap(folder, folder), check, size, f".{kind}", folder=folder)
-
-
-@fuzz
-@given(random=randoms)
-def test_photos_of_a_round(valid, tmp_path, random):
-    """The pictures that capture.json names are read from its own folder alone."""
-    folder = empty_folder(tmp_path)
-    image_files.write_png(folder / "pose_0001.png", np.full((6, 8, 3), 0.5))
-    path = write_bytes(folder / "capture.json", mutate_json(random, json.loads(valid["capture.json"][0][1])))
-
-    def check(views):
-        assert all(np.isfinite(view.image).all() for view in views)
-
-    read_guarded("photos of a round", lambda: read_captured_views(folder, 8), check, path.stat().st_size, folder=folder)
-
-
-@fuzz
-@given(random=randoms)
-def test_photos_of_the_store(tmp_path, random):
-    folder = empty_folder(tmp_path)
-    image_files.write_png(folder / "a.png", np.full((6, 8, 3), 0.5))
-    store = PhotoStore(folder / "store")
-    (folder / "store").mkdir()
-    stored = store.add(folder / "a.png", "shots", (POSE, CAMERA), CAMERA, "2026-01-01T00:00:00")
-    record = stored.photo.with_name("shot.json")
-    write_bytes(record, mutate_json(random, json.loads(record.read_text(encoding="utf-8"))))
-
-    def check(found):
-        assert all(is_camera(photo.camera) and photo.photo.parent == record.parent for photo in found)
-
-    size = record.stat().st_size
-    read_guarded("shot.json", lambda: store.photos_of(CAMERA), check, size, str(record.parent.name), folder=folder)
+    read_guarded(f"COLMAP ({kind})", lambda: import_colmap(folder, folder), check, size, f".{kind}")
 
 
 FRAGMENTS = [

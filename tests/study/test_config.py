@@ -18,11 +18,6 @@ def test_the_studies_that_come_with_the_project_are_valid(root, more):
     assert expand_study(check_config(add_scene_files(read_config(files), root / "config/scenes")))["study"]["tables"]
 
 
-def test_settings_of_knobs_become_presets(config):
-    made = expand_study(config)["presets"]
-    assert made["draft-max_gaussians-70000"] == made["draft"] | {"max_gaussians": 70000}
-
-
 def pool(scene="desert_pool", photos=20, **more):
     return {"sets": [{"title": "a", "scenes": [scene], "k": [4], "photos": photos} | more]}
 
@@ -31,13 +26,11 @@ def pool(scene="desert_pool", photos=20, **more):
     "table, change, message",
     [
         ("view_benchmark", {"baseline": "w2"}, "baseline: w2 is not among"),
-        ("view_benchmark", {"policies": ["farthest", {"policy": "w2", "prior": "x"}]}, "no 'x'"),
         ("view_benchmark", pool("desert"), "desert is no scene with"),
         ("view_benchmark", pool(photos=11), "leave no round of 4"),
         ("view_benchmark", pool(preset="x"), "sets.0.preset: there is no 'x'"),
         ("seams", {"scenes": ["moon"]}, "study.seams.scenes: there is no 'moon'"),
         ("seams", {"baseline": "none", "tilings": ["colour"]}, "none is not among"),
-        ("seams", {"draws": 3}, "'draws' is called 'replicates' now"),
         ("refine", {"prior": "moon"}, "study.refine.prior: moon"),
         ("forced_choice", {"pairs": [["floor", "colour"]]}, "name it second"),
     ],

@@ -1,16 +1,14 @@
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
-from fixtures import tile_sets
 from fixtures.seams import cost
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dav_gswt.study import expansion
 from dav_gswt.study.expansion import Patches
-from dav_gswt.tiles import build, energy, layout, semantics
+from dav_gswt.tiles import energy, layout, semantics
 from dav_gswt.tiles.layout import NE, NW, SE, SW, E, Layout, N, S, W
 
 HALF = 0.5 * 2.0**-26  # what an edge's cost loses as a whole number
@@ -57,42 +55,6 @@ def test_of_two_patches_it_is_as_cheap_as_the_best_of_all_labellings():
         best = min(best, cost(terms, labels, patches.rows, patches.columns))
     found = expansion.expand_labels(start, patches, terms)
     assert found.energies[-1] == pytest.approx(best, abs=31 * HALF) and found.broken == 0
-
-
-class Apart:
-    """A layer of one cell a patch, without gradients: from 0 to 1 costs 10, over 2 it costs 1 + 1."""
-
-    slope, unit = np.zeros((1, 3, 2)), energy.LayerScales(2.0, 1.0)
-
-    def distances(self, first, second):
-        return np.array([[0, 10, 1], [10, 0, 1], [1, 1, 0]], float)[first[1], second[1]]
-
-
-def test_edges_that_break_the_triangle_are_counted_and_do_no_harm():
-    columns = np.broadcast_to(np.arange(3)[:, None, None], (3, 1, 4))  # each patch shows its own cell everywhere
-    patches = Patches(np.zeros_like(columns), columns, np.array([[0] * 4, [0] * 4, [0, 1, 1, 0]], bool)[:, None])
-    found = expansion.expand_labels(np.array([[0, 0, 1, 1]], np.uint8), patches, [(1.0, Apart())])
-    np.testing.assert_array_equal(found.labels, [[0, 2, 2, 1]])
-    assert found.energies == [10.0, 2.0] and (found.broken, found.tested) == (1, 1)
-
-
-def test_expansion_starts_at_the_exact_cuts_and_never_costs_more():
-    made, options = tile_sets.exemplar(), build.TilingOptions(share=0.5, strip=0.17, candidates=20, tries=1)
-    records = []
-
-    def cut(options):
-        maps = made.colour, np.zeros((96, 96))
-        return build.cut_tiles(made.levels, made.exemplar, *maps, options, np.random.default_rng(2))
-
-    expanded = cut(replace(options, relabel=expansion.make_relabel(records)))
-    exact, moved = cut(options), expansion.add_records(expanded, records)
-    assert exact.report.places == moved.report.places
-    assert exact.report.tile_energy == moved.report.tile_energy
-    for record in moved.report.more["expansion"]:
-        assert record["after"] <= record["before"] and 0 <= record["triangles_broken"] <= record["triangles_tested"]
-        assert (record["moves"] > 0) == (record["after"] < record["before"])
-    assert any(record["moves"] for record in moved.report.more["expansion"])
-    np.testing.assert_array_equal(exact.labels[:, :4], moved.labels[:, :4])  # a block
 
 
 def test_every_cell_may_show_some_patch_but_for_the_rim_and_only_where_it_reaches():

@@ -100,15 +100,3 @@ def test_the_plain_binomial_is_the_exact_one():
     assert binomtest(8, 10, low, "greater").pvalue == pytest.approx(0.025)
     assert binomtest(8, 10, high, "less").pvalue == pytest.approx(0.025)
     assert statistics.compute_binomial_test(0, 10)[0] == 0 and statistics.compute_binomial_test(10, 10)[1] == 1
-
-
-def test_the_clustered_interval_holds_the_truth_as_often_as_it_says_and_the_binomial_does_not():
-    """The paper's size, 18 people, whose own shares differ: two answers of one correlate by 0.1."""
-    people, answers, mean, spread = 18, 36, 0.85, 1 / 0.1 - 1
-    rng, hits = np.random.default_rng(11), np.zeros(2)
-    for _ in range(300):
-        chosen = rng.binomial(answers, rng.beta(mean * spread, (1 - mean) * spread, people))
-        found = statistics.compute_clustered_share(chosen.astype(float), np.full(people, float(answers)))
-        low, high, _ = statistics.compute_binomial_test(int(chosen.sum()), people * answers)
-        hits += [found.low <= mean <= found.high, low <= mean <= high]
-    assert 0.92 < hits[0] / 300 < 0.98 and hits[1] / 300 < 0.75

@@ -61,16 +61,6 @@ def test_a_score_that_knows_where_the_field_is_wrong_ranks_well(replayed):
     assert all(row["error"] > 0.02 for row in table)
 
 
-def test_with_a_prior_its_terms_and_its_controls_are_judged_too(replayed, model):
-    found, table = judge(replayed, PriorConfig(model, 2, 2, 0.2), count=9)
-    others = {"spread", "residual"}
-    assert set(found["scores"]) == {"opacity", "coverage", "w2_sq", "gradient", "u", "low", "far"} | others
-    assert set(table[0]) == {"pose", "error"} | set(found["scores"]) and len(table) == found["poses"] == 9
-    assert all(found["scores"][name]["pixel_spearman"] is not None for name in others)
-    u, w2 = ([row[name] for row in table] for name in ("u", "w2_sq"))
-    assert np.array_equal(np.argsort(u), np.argsort(w2))  # without LPIPS
-
-
 def test_geometry_alone_is_what_a_score_has_to_beat():
     up, side = poses.Pose("", 90.0, 0.0, 2.0), poses.Pose("", 30.0, 0.0, 2.0)
     found = judging.geometric_baselines([up, side], [up])

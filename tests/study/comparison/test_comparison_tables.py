@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from dav_gswt.study.comparison import curves, stats, tables
-from dav_gswt.views import marginal_gain
 
 CELL = dict(scene="flowers", seed=0, preset="draft", policy="farthest", prior="none", p_drop="0", lam="0", k=4)
 
@@ -61,14 +60,6 @@ def test_a_row_a_round_with_what_it_cost(tmp_path):
     apart = cell(tmp_path) | {"metrics": [metrics(tmp_path, 0, high=group, walker={"psnr": 10.0})]}
     row = curves.read_cell(apart)[0]  # views away from where photos may be taken count apart
     assert (row["psnr"], row["worst_psnr"], row["walker_psnr"]) == (30, 29, 10)
-
-
-def test_what_a_round_was_expected_to_gain_rests_on_the_rounds_before_it_alone(tmp_path):
-    start, first, second = curves.read_cell(cell(tmp_path, rounds=3))
-    assert start["expected"] is first["expected"] is None
-    assert second["closes"] == pytest.approx(8 * 5.0 * (1 / 12 - 1 / 16))
-    assert second["expected"] == pytest.approx(marginal_gain.SHARE * second["closes"])
-    assert second["expected_low"] < second["expected"] < second["expected_high"]
 
 
 def test_gains_are_checked_against_what_was_expected_of_them():
@@ -139,10 +130,3 @@ def test_the_area_is_the_mean_height_of_the_curve():
     for photos, psnr in ((8,), (20,)), ((8, 8), (20, 21)), ((8, 9), (20, np.nan)):
         with pytest.raises(ValueError, match="a curve"):
             stats.nauc(curve(*photos), curve(*psnr))
-
-
-def test_photos_to_reach_lie_between_rounds():
-    photos, psnr = curve(8, 12, 16), curve(20, 24, 28)
-    assert stats.photos_to_reach(photos, psnr, best=30.0, way=0.6) == pytest.approx(14)  # 26 dB
-    assert stats.photos_to_reach(photos, psnr, best=40.0, way=0.95) is None
-    assert stats.photos_to_reach(photos, psnr, best=20.0) == 8

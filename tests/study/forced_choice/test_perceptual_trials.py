@@ -5,7 +5,6 @@ from collections import Counter
 import pytest
 from fixtures import answer_files
 
-from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
 from dav_gswt.study.forced_choice import kit, trials
 
@@ -59,10 +58,3 @@ def test_the_page_tells_nothing_of_what_is_shown(tmp_path, drawn):
     for item in key["items"].values():
         assert {files[name] for name in item["pictures"]} <= {data for pair in drawn for data in pair.pictures}
     assert all(not re.search(rb"tEXt|iTXt|zTXt|tIME", data[:200]) for data in files.values())
-
-
-def test_a_kit_without_pairs_is_refused_and_leaves_nothing(tmp_path):
-    checks = [pair for pair in answer_files.drawn(crops=1) if pair.check]
-    with pytest.raises(InputError, match="no pair to show"):
-        answer_files.written(tmp_path, checks)
-    assert not list(tmp_path.iterdir())

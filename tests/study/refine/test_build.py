@@ -1,6 +1,5 @@
 from dataclasses import fields as members
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +7,6 @@ import torch
 from fixtures.tile_sets import report_of
 
 from dav_gswt.field import SH0, GaussianField
-from dav_gswt.prior.interface import Condition, DecodedViews
 from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.study.refine import build, limits, repair
@@ -127,30 +125,3 @@ def test_a_prior_without_strength_changes_nothing_and_with_it_the_seed_decides_a
         assert torch.get_num_threads() == 3
     finally:
         torch.set_num_threads(threads)
-
-
-def test_the_prior_is_told_not_to_believe_the_render_beside_the_cut():
-    asked = []
-
-    def encode(condition):
-        return condition.colour.transpose(0, 3, 1, 2)
-
-    def decode(latents):
-        colour = np.ascontiguousarray(latents.transpose(0, 2, 3, 1))
-        return DecodedViews(np.concatenate([colour, np.ones_like(colour[..., :1])], -1), None)
-
-    def record(condition, strength, steps, seed, known=None):
-        asked.append((strength, steps, seed, known))
-        return encode(condition)
-
-    model = SimpleNamespace(name="recording", size=32, repair=record, encode_render=encode, decode=decode)
-    model.sample = model.estimate_variances = print  # a repair asks for neither
-    grey, one = np.full((1, 32, 32, 3), 0.5, np.float32), np.ones((1, 32, 32), np.float32)
-    condition = Condition(grey, one, one, grey, np.float32([[0, 0, 1, 0]]))
-    near = np.zeros((1, 32, 32), np.float32)
-    near[0, 9, 14] = 0.9
-    for more in ({"prior": "x", "steps": 3}, {"condition": True}):
-        by = repair.PriorRepair.from_config(model, {"strength": 0.2} | more, 7)
-        assert not by(condition, near).any()
-    assert asked[0][:3] == (0.2, 3, 7) and asked[1][3] is None
-    np.testing.assert_array_equal(np.argwhere(~asked[0][3][0]), [[2, 3]])

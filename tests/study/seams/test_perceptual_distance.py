@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from fixtures import lpips_arrays, seams
+from fixtures import lpips_arrays
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import lpips
@@ -21,17 +21,6 @@ def test_distances_of_vectors_are_lpips(embedded):
         first = np.repeat(PICTURES[a : a + 1], 5, 0)
         expected = lpips.distance(2 * first - 1, 2 * PICTURES - 1, WEIGHTS)
         np.testing.assert_allclose(found[a], expected, rtol=1e-4, atol=1e-6)  # float32 features
-
-
-def test_of_equal_patches_the_floor_is_the_cut(embedded):
-    """Two patches that show the same, whatever of each is seen: nobody can tell that there is a cut."""
-    vectors, shapes = embedded
-    far = perceptual_distance.pairwise_distances(vectors[:1], vectors[1:])
-    bank = vectors[1:][perceptual_distance.find_nearest(far, np.ones(4, bool))[0]]
-    cut = float(perceptual_distance.pairwise_distances(vectors[:1], bank).mean())
-    _, _, patch = seams.halves()
-    masks = perceptual_distance.pool_masks(np.stack([patch == 0, patch == 1]).astype(np.float32), shapes)
-    assert perceptual_distance.compute_floor(vectors[[0, 0]], [bank, bank], masks) == pytest.approx(cut, rel=1e-5)
 
 
 def test_the_bank_leaves_out_the_own_source_and_nearest_takes_only_what_is_allowed():

@@ -76,14 +76,3 @@ def test_the_own_tiling_of_every_scene_has_an_entry_for_each_replicate():
     taken["tilings"]["small-replicate-1"] = {"tile": 0.4}
     with pytest.raises(InputError, match="tilings.small-replicate-1"):
         replicates.add_replicates(taken)
-
-
-def test_compared_tilings_have_as_many_replicates_as_the_study_says():
-    for own, counts in ((1, [2, 2]), (3, [3, 2])):
-        study = {"tilings": ["semantic", "small"], "compared_replicates": 2, "replicates": own}
-        assert [len(replicates.list_replicates(name, "semantic", study)) for name in study["tilings"]] == counts
-    assert replicates.list_replicates("other", "semantic", study) == []
-    names = replicates.list_replicates("semantic-refined", "semantic-refined", ONCE | {"replicates": 2})
-    assert names == ["semantic-refined", "semantic-replicate-1-refined"]
-    entries = replicates.add_replicates(config(tilings=["small"], compared_replicates=2))["tilings"]
-    assert list(entries) == [*TILINGS, "small-replicate-1"]

@@ -44,15 +44,6 @@ def test_a_run_ends_well_only_without_any_fault_and_fails_well_only_with_its_own
         assert not tables.has_failed_as_expected(one, right | fault)
 
 
-def test_the_message_is_what_a_user_reads_last():
-    output = """[1 of 1] import_field
-  finished.ply: there is nothing in it
-import_field is not finished; its log: results/logs/finished/photos/import_field.log
-"""
-    assert running.extract_message(output) == "finished.ply: there is nothing in it"
-    assert running.extract_message("config: k: 0 is too few\n") == "config: k: 0 is too few"
-
-
 def test_a_number_that_is_not_finite_is_found_in_a_table_in_a_field_and_in_a_chunk(tmp_path):
     path = tmp_path / "a.csv"
     for word, finite in (("infinite", True), ("nan", False), ("-inf", False)):

@@ -1,14 +1,11 @@
 import numpy as np
 import pytest
 
-from dav_gswt.study import csv_tables
-from dav_gswt.study.tables import spread
 from dav_gswt.study.terrain import frames
 
 ASKED = frames.FrameSettings(
     {"kind": "hills", "height": 1, "wavelength": 10}, {"frames": 3, "length": 1, "height": 1}, 48, 32, [900, 300]
 )
-CELL = {"scene": "desert", "seed": 0, "preset": "draft", "tiling": "semantic", "tau": "0.6"}
 
 
 def row_of(renderer: str, budget: int, **times) -> dict:
@@ -24,13 +21,3 @@ def test_a_row_holds_means_deviations_and_shares_worked_by_hand():
     assert row["sort_share"] == row["update_share"] == pytest.approx(2 / 3)
     never = row_of(frames.PAGE, 900, sort=[])
     assert never["sort_ms"] is never["sort_ms_sd"] is None
-
-
-def test_the_pages_first_budget_is_what_the_studys_tables_join(tmp_path):
-    for name in (frames.LIBRARY, frames.PAGE):
-        csv_tables.write_table(tmp_path / f"{name}.csv", [row_of(name, budget) for budget in ASKED.budgets])
-    rows = frames.gather_frames([CELL], *([str(tmp_path / f"{name}.csv")] for name in (frames.LIBRARY, frames.PAGE)))
-    assert len(rows) == 4
-    csv_tables.write_table(tmp_path / "viewer.csv", frames.select_viewer_rows(rows))
-    (joined,) = spread.join_viewer([CELL], spread.read_viewer(tmp_path / "viewer.csv"))
-    assert (joined["render_ms"], joined["sort_ms"]) == (4, 1.5) and joined["update_share"] == 0.66667  # five digits

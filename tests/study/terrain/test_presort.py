@@ -1,8 +1,5 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from fixtures.land_covers import cover_content
 from fixtures.splats import rough_ground
 from fixtures.terrains import MAGENTA, manifest_of, stony_terrain
 from fixtures.tile_sets import report_of
@@ -53,33 +50,7 @@ def test_every_shortcut_has_a_price_of_its_own(bundled):
         assert found < 3 + min(v for s in presort.APPROXIMATIONS[:-1] if (v := of(rows, s).get(view)) is not None)
 
 
-def test_objects_and_all_materials_are_in_both_pictures(bundled):
-    content = cover_content()
-    rows = presort.measure_approximations(content, bundled(content))
-    assert min(v for v in of(rows, "rounding").values() if v is not None) > 40, "one lacks what the other has"
-    assert of(rows, "objects") != of(rows, "presorting"), "the ground alone"
-
-
-def test_orders_of_another_direction_cost_more_and_one_level_costs_nothing(bundled, monkeypatch):
-    monkeypatch.setattr(presort, "VIEWS", presort.VIEWS[1:])
-    content = content_of(1)
-    good = bundled(content)
-    away = [[0.0, 0.0, -1.0]] * len(good.manifest.directions)  # from above only
-    bad = replace(good, manifest=replace(good.manifest, directions=away))
-    rows = [presort.measure_approximations(content, bundle) for bundle in (good, bad)]
-    found = [of(each, "presorting")["walker"] for each in rows]
-    assert found[0] is None or found[0] > found[1]
-    assert set(of(rows[0], "levels").values()) == {None}
-
-
 MANIFEST = manifest_of(eye_floor=1.0, ground_colour=MAGENTA)
-
-
-def test_every_second_pair_of_frames_lies_across_a_border():
-    found = flicker.make_frame_pairs(8, 3.0, 0.01)
-    for k, (before, after) in enumerate(found):
-        np.testing.assert_allclose(np.hypot(*np.subtract(after.at, before.at)), 0.01)
-        assert (np.floor(before.at) != np.floor(after.at)).any() == bool(k % 2)
 
 
 def test_a_slow_walk_in_pre_sorted_orders_jumps_no_more_than_twice_as_far_and_a_jump_is_found(monkeypatch):

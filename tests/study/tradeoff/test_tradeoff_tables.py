@@ -6,7 +6,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dav_gswt.images import image_files
-from dav_gswt.study.tradeoff import page, tables
+from dav_gswt.study.tradeoff import tables
 from dav_gswt.study.tradeoff.front import find_pareto_front, find_rivals
 
 SECONDS = dict(coarse=40.0, score=0.0, select=1.0, update=19.0, levels=5.0, cut=3.0, bundle=2.0)  # 70 in all
@@ -79,18 +79,6 @@ def test_a_setting_behind_in_psnr_can_be_the_sharpest(table):
     assert found == {"reference": (1, 0), "draft": (0, 1), "70000": (1, 0), "100": (0, 0)}
     draft["lpips"] = None
     assert {row["sharp"] for row in tables.tabulate_front(table)} == {None}
-
-
-def test_advice_is_time_and_loss_in_words():
-    best = {"setting": "8", "own_seconds": 100.0, "bundle_mb": 1.0}
-    row = {"knob": "cap", "setting": "4", "measure": "views", "bundle_mb": 1.0}
-    for own, loss, said in (
-        (50.0, -0.2, "is 2.00 times as fast and is better by 0.20 dB"),
-        (200.0, -0.2, "takes 2.00 times as long but is better by 0.20 dB"),
-        (101.0, 0.001, "is as fast and costs nothing"),
-    ):
-        found = page.describe_change(row | {"own_seconds": own, "loss": loss}, best)
-        assert found == f"`cap` 4 instead of 8: {said}."
 
 
 few = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12)  # ties are common

@@ -8,14 +8,11 @@ from fixtures.configs import ROOT, checked_config
 
 from dav_gswt.cli import estimate
 from dav_gswt.cli.estimate import COSTS, PER_JOB, describe_estimate, describe_work, estimate_seconds, format_duration
-from dav_gswt.cli.machine_speed import MachineSpeed, measure_speed, share_cores
+from dav_gswt.cli.machine_speed import MachineSpeed, share_cores
 from dav_gswt.config.base import LARGEST_SIDE
 from dav_gswt.images.image_files import write_png
 
 SAME = MachineSpeed()
-JOBS = {"render_photos": 1, "fit_coarse": 1, "update_field": 2, "score_coarse": 1, "score_round": 2, "capture_views": 2}
-JOBS |= {"select_poses": 2, "make_levels": 1, "cut_tiles": 1, "bundle_tiles": 1, "render_terrain": 1}
-
 PRESETS = ("draft", "standard", "reference")
 
 
@@ -41,15 +38,6 @@ def test_every_rule_costs_what_was_fitted(config):
     costs = [cost(work) for cost in COSTS.values()]
     assert sum(cost.general for cost in costs) == pytest.approx(519.4057808)
     assert sum(cost.raster for cost in costs) == pytest.approx(33.1135370)
-
-
-@pytest.mark.parametrize("key", ["steps", "steps_per_photo", "max_gaussians", "size", "level_steps", "sh_degree"])
-def test_more_work_takes_longer(config, key):
-    draft = config["presets"]["draft"]
-    more = {"size": 320, "sh_degree": 1}.get(key, draft[key] * 2)
-    config["presets"] |= {"less": draft | {"size": 256}, "more": draft | {"size": 256} | {key: more}}
-    less, more = (estimate_seconds(JOBS, describe_work(config, name), SAME) for name in ("less", "more"))
-    assert more > less
 
 
 def test_no_more_photos_count_than_there_are(config, tmp_path):
@@ -91,30 +79,6 @@ def test_a_long_run_is_told_the_best_preset_that_is_short_enough(config):
     assert f"with preset: {name} {format_duration(times[name])}" in told
 
 
-def test_a_run_that_is_long_with_every_preset_is_told_the_fastest_which_is_none_of_the_study(config):
-    config["scenes"]["desert"] |= {"preset": "reference"}
-    config["presets"]["tiny"] = config["presets"]["draft"] | {"size": 64, "steps": 1, "steps_per_photo": 1}
-    jobs = estimate.count_jobs(config)
-    assert "with preset: draft" in describe_estimate(config, jobs, MachineSpeed(500.0, 1.0), PRESETS)
-
-
-def test_a_short_run_and_one_beyond_its_fits_are_told_no_preset(config):
-    short = describe_estimate(config, {"fit_coarse": 1}, SAME, PRESETS)
-    assert short == "It will take about 10 seconds on this machine"
-    assert "preset" not in describe_estimate(config, {"make_levels": 1}, MachineSpeed(1e4, 1e4), PRESETS)
-
-
-def test_a_duration_has_no_more_digits_than_are_known():
-    known = {3: "10 seconds", 44: "40 seconds", 70: "a minute", 170: "3 minutes", 1300: "20 minutes", 7000: "1.9 hours"}
-    assert {seconds: format_duration(float(seconds)).removeprefix("about ") for seconds in known} == known
-
-
-def test_the_speed_of_this_machine_is_two_positive_numbers(monkeypatch):
-    monkeypatch.setattr("dav_gswt.cli.machine_speed.DURATION", 0.0)
-    speed = measure_speed(1)
-    assert speed.raster > 0 and speed.general > 0
-
-
 def test_work_is_that_of_the_config(config):
     work = describe_work(config)
     assert (work.total, work.tests, work.start, work.new, work.rounds) == (8, 6, 8, 4, 2)
@@ -129,7 +93,6 @@ def test_jobs_share_the_cores_with_others():
 
 
 def test_photos_are_chosen_with_the_fits_of_another_preset(config):
-    """Then only the fit to all photos is the preset's own."""
     assert "register_photos" in estimate.count_jobs(config | {"scene": "copr_dunes"})
     jobs = estimate.count_jobs(config, "standard")
     assert jobs["update_field"] == jobs["copy_chosen_photos"] == config["rounds"] and jobs["fit_chosen_photos"] == 1

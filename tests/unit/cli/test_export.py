@@ -57,11 +57,6 @@ def test_it_writes_what_the_rule_writes(result, tmp_path):
     assert set(files) == {"terrain.glb", "terrain.ply", "terrain.json"}
 
 
-@pytest.mark.parametrize("below", ["", "tiles_auto/bundle_tau0.6", "tiles_auto/bundle_tau0.6/terrain/page"])
-def test_a_folder_of_results_stands_for_its_newest_page(result, below):
-    assert export.find_terrain(result / below) == result / "tiles_auto/bundle_tau0.6/terrain/page"
-
-
 def test_a_radius_takes_the_cells_that_it_touches(result, tmp_path):
     # a tile is 4 m wide
     assert run(result, "--radius", "8m", "--at", "2m", 0.5, "--format", "ply", "--axes", "z-up", "-o", tmp_path) == 0
@@ -79,12 +74,10 @@ def test_a_radius_takes_the_cells_that_it_touches(result, tmp_path):
     "arguments, said",
     [
         (["--level", "9"], "--level: there is no level 9; the last one is 1"),
-        (["--radius", "2", "--rows", "3"], "--radius excludes --columns and --rows"),
         (["--radius", "2", "--corner", "0", "0"], "radius and corner exclude one another"),
         (["--radius", "900000m"], "--radius: 225000 tile sides; more than 0 and at most 500"),
         (["--max-gb", "0.001", "--columns", "90"], "fit: set --columns and --rows, a coarser --level, or max_gb"),
         (["--axes", "y-down", "--format", "usd"], "a USD stage has y or z up"),
-        (["--threads", "0"], "--threads 0"),
         (
             ["--columns", "400", "--rows", "400", "--max-gb", "60", "--format", "ground", "--format", "ply"],
             "have a height field of",
@@ -105,14 +98,6 @@ def test_a_planet_is_refused_and_not_written_as_level_ground(root, tmp_path, cap
     assert run(bundle, "--format", "glb", "-o", tmp_path / "out") == 1
     assert "choose another surface than `sphere`" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-def test_a_terrain_that_lacks_its_tiles_or_is_not_there_is_refused(result, tmp_path, capsys):
-    page = shutil.copytree(result / "tiles_auto/bundle_tau0.6/terrain/page", tmp_path / "page")
-    assert run(page, "--format", "ground", "-o", tmp_path / "out") == 1
-    assert "needs the tiles" in capsys.readouterr().err
-    assert run(tmp_path / "nowhere", "-o", tmp_path / "out") == 1
-    assert "nowhere: no terrain here" in capsys.readouterr().err
 
 
 def test_nothing_of_others_is_replaced(result, tmp_path, capsys):

@@ -33,16 +33,6 @@ def test_where_the_core_is_missing_a_smaller_size_is_printed_and_used(without_co
     assert all(small[name]["max_gaussians"] < usual[name]["max_gaussians"] for name in run.list_presets([]))
 
 
-def test_torch_by_choice_is_given_as_the_reason(monkeypatch, capsys):
-    if backends.explain_unavailable("cpu"):
-        pytest.skip(f"cpu: {backends.explain_unavailable('cpu')}")
-    monkeypatch.setenv(backends.VARIABLE, "torch")
-    assert run.select_overlays(quietly=False) == [run.SMALLER]
-    assert "DAV_GSWT_BACKEND asks for it" in capsys.readouterr().out
-    monkeypatch.setenv(backends.VARIABLE, "cpu")
-    assert run.select_overlays(quietly=False) == []
-
-
 def test_an_entry_with_a_name_of_the_study_is_refused(root, tmp_path, monkeypatch):
     """The study's would go before it, and nothing would say so."""
     (tmp_path / "config").symlink_to(root / "config")

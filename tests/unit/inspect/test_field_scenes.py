@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from fixtures import tile_sets
 from matplotlib import colormaps
 from scipy.spatial.transform import Rotation
 
@@ -10,7 +9,7 @@ from dav_gswt import field as fields
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.inspect import field_scenes as seen
-from dav_gswt.inspect import map_scenes, scene
+from dav_gswt.inspect import scene
 from dav_gswt.inspect.options import ViewOptions
 
 LEVEL = Rotation.identity()
@@ -84,19 +83,3 @@ def test_colours_run_from_one_end_of_a_bar_to_the_other_and_what_is_no_number_is
     np.testing.assert_array_equal(found[5:], [scene.UNKNOWN] * 2)
     assert scene.make_bar("a", np.full(3, 7.0)) == scene.ColourBar("a", 7.0, 8.0)
     assert scene.make_bar("a", np.array([np.nan])) == scene.ColourBar("a", 0.0, 1.0)
-
-
-def test_levels_stand_side_by_side_one_can_be_picked_and_maps_of_poses_colour_a_field(tree):
-    both = seen.build_levels_scene(tree.round / "levels", ViewOptions(colour="level"))
-    assert list(both.legend[0].named) == ["level 0", "level 1"]
-    finest, coarse = both.layers[0], both.layers[2]
-    assert finest.points[:, 0].max() < coarse.points[:, 0].min()
-    assert len(coarse.cells) == (tile_sets.CELLS // 2) ** 2
-    single = seen.build_levels_scene(tree.round / "levels", ViewOptions(level=1))
-    assert sum(len(layer.cells) for layer in single.layers) < sum(len(layer.cells) for layer in both.layers)
-    with pytest.raises(InputError, match="levels 0 to 1"):
-        seen.build_levels_scene(tree.round / "levels", ViewOptions(level=2))
-    shown = map_scenes.build_pose_maps(tree.round / "maps.npz", ViewOptions())
-    cool, warm = shown.layers[0].colours[[0, -1]].astype(int)  # uncertainty grows along the file
-    assert cool[2] > cool[0] and warm[0] > cool[0]
-    assert shown.legend == [scene.ColourBar("uncertainty", 0.0, 1.0)]

@@ -35,10 +35,6 @@ def test_the_part_above_lies_over_the_ground_with_its_first_row_in_the_north_and
     assert above.picture[0, 0, 0] > above.picture[-1, 0, 0]  # the northern row is warm, and on top
     np.testing.assert_allclose(above.points[0][:2], [0, 0])
     assert shown.flat and above.points[3][1] < above.points[0][1] and above.points[1][0] > above.points[0][0]
-    only = seen.build_map(tree.round / "uncertainty.exr", ViewOptions(channel="opacity"))
-    assert len(only.layers) == 1 and [bar.title for bar in only.legend] == ["opacity"]
-    shown = seen.build_pose_maps(tree.round / "maps.npz", ViewOptions(part="pose_0002"))
-    assert [word.text for word in shown.labels] == ["pose_0002 opacity"] and shown.layers[0].picture.shape == (8, 12, 3)
 
 
 def test_parts_channels_grounds_and_headers_that_do_not_fit_are_refused(tree, tmp_path):

@@ -48,17 +48,6 @@ def test_gaussians_have_the_patch_of_their_cell(cut):
         assert found[i] == cut.labels[3][y, x]
 
 
-def test_sixteen_tiles_are_laid_with_their_numbers_and_all_levels_if_levels_are_asked(tree, cut):
-    plain = seen.build_tiles(tree.tiles, ViewOptions())
-    assert sorted(int(word.text) for word in plain.labels) == list(range(16))
-    assert sum(layer.colours == seen.CUT_COLOUR for layer in plain.layers if isinstance(layer.colours, tuple)) == 16
-    all_ = seen.build_tiles(tree.tiles, ViewOptions(colour="level"))
-    assert list(all_.legend[0].named) == [f"level {n}" for n in range(len(cut.fields))]
-    assert all_.high[0] > 2 * plain.high[0]
-    patches = seen.build_tiles(tree.tiles, ViewOptions(colour="patch", level=1))
-    assert "NE" in patches.legend[0].named and patches.notes[-1] == "level 1"
-
-
 def test_tiles_that_are_not_what_seams_json_says_are_refused(tree, tmp_path):
     told = read_json(tree.tiles / "seams.json")
     (tmp_path / "tiles").symlink_to(tree.tiles / "tiles")

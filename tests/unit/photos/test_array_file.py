@@ -31,12 +31,6 @@ def test_an_array_of_any_kind_comes_back_as_it_was(arrays, array):
     assert not stored.size or not stored.flags.writeable
 
 
-def test_files_have_no_name(arrays):
-    assert not arrays.folder.exists()  # it is made when it is needed
-    arrays.store(np.zeros(3))
-    assert list(arrays.folder.iterdir()) == []
-
-
 def test_arrays_larger_than_a_segment_have_files_of_their_own(tmp_path, monkeypatch):
     monkeypatch.setattr(array_file, "SEGMENT", 1 << 16)
     arrays = ArrayFile(tmp_path)

@@ -76,11 +76,6 @@ def test_a_number_that_is_none_is_passed_over(tmp_path):
     assert read_focal_length(with_block(tmp_path / "a.jpg", entries)) == pytest.approx(1000)
 
 
-def test_a_real_photo_has_the_focal_length_that_its_notes_give(photo_sets):
-    first = min((photo_sets / "copr_dunes" / "images").iterdir())
-    assert read_focal_length(first) == pytest.approx(1377, abs=1)
-
-
 def located(path, latitude=(12.0, 30.0, 36.0), longitude=(151.0, 15.0, 0.0), altitude=70.0, refs="SW", below=0):
     """A JPEG with a position and a time."""
     spec = oiio.ImageSpec(4, 3, 3, oiio.UINT8)

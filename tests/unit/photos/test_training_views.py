@@ -8,9 +8,8 @@ from fixtures import ground as made
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos import training_views
 from dav_gswt.photos.array_file import ArrayFile
-from dav_gswt.photos.training_views import mask_outside_ground, one_by_one, open_array_file, read_training_view
+from dav_gswt.photos.training_views import mask_outside_ground, read_training_view
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.fit_settings import CoarseSettings
 
@@ -23,32 +22,6 @@ def filed(tmp_path):
     arrays = ArrayFile(tmp_path)
     views = [replace(view, arrays=arrays) for view in made.photos(5)]
     return [view.with_pixels(image=view.image, weight=view.weight) for view in views]
-
-
-def test_changed_pixels_lie_where_those_of_the_view_did(filed):
-    changed = filed[0].with_pixels(weight=filed[0].weight * 0.5)
-    assert not changed.weight.flags.writeable and changed.weight.max() == 0.5
-    assert changed.image is filed[0].image
-    view, weight = made.photos(1)[0], np.zeros((48, 48), np.float32)
-    assert view.with_pixels(weight=weight).weight is weight
-
-
-def test_views_one_by_one_are_released_after_each_turn(filed, monkeypatch):
-    released = []
-    monkeypatch.setattr(training_views, "release_pages", released.append)
-    turns = one_by_one(filed)
-    next(turns)
-    assert released == []
-    next(turns)
-    assert [array is filed[0].image for array in released] == [True, False]
-    assert list(one_by_one(filed)) == filed
-
-
-def test_few_photos_lie_in_memory_and_many_in_files(tmp_path):
-    camera = made.photos(1)[0].camera.resized(4000, 3000)
-    assert open_array_file([camera] * 40, 768, tmp_path) is None
-    assert open_array_file([camera] * 80, 768, tmp_path) is not None
-    assert open_array_file([camera] * 40, 2000, tmp_path) is not None
 
 
 def test_a_photo_is_shrunk_with_its_camera_and_mask_and_never_enlarged(tmp_path):

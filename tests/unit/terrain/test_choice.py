@@ -1,11 +1,10 @@
-"""Tile choice: hand-worked values, the integers shared with the page, repetition, and the hash as chance."""
+"""Tile choice: a hand-worked hash, the integers shared with the page, repetition, and no mirror image."""
 
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from dav_gswt.terrain.choice import CENTRE, SOUTH, WEST, hash_cell, tile_at, tiles_in
 
@@ -17,13 +16,6 @@ def test_the_hash_of_salt_one_is_the_value_worked_by_hand():
     # which the low word stays; ^ 0000514e (>> 16) = 514e28b7. Round 2: ^ 0000514e = 514e79f9; * 85ebca6b = 2a88a8b2
     # 3c9e7513; ^ 0001e4f3 = 3c9f91e0; * c2b2ae35 = 2e1b3cc0 2fef7360; ^ 00002fef = 2fef5c8f
     assert hash_cell(0, 0, WEST, 1) == 0x2FEF5C8F
-
-
-def test_tile_number_is_read_off_the_edges_around_the_cell():
-    west, east = hash_cell(5, 3, WEST, 7) & 1, hash_cell(6, 3, WEST, 7) & 1
-    south, north = hash_cell(5, 3, SOUTH, 7) & 1, hash_cell(5, 4, SOUTH, 7) & 1
-    centre = (hash_cell(5, 3, CENTRE, 7) >> 1) % 3
-    assert tile_at(5, 3, 7, 3) == 16 * centre + 8 * west + 4 * north + 2 * east + south
 
 
 @pytest.mark.parametrize("cell", GOLDEN, ids=lambda c: f"{c['i']},{c['j']}")
@@ -55,30 +47,9 @@ def test_a_window_names_the_same_tiles_as_its_cells_and_uses_them_all():
     assert np.abs(counts - 128).max() < 67
 
 
-def cells(side, west=1, south=1):
-    return np.meshgrid(west + np.arange(side, dtype=np.int64), south + np.arange(side, dtype=np.int64))
-
-
-def within(share, chance, count):
-    """Within six standard deviations of the binomial distribution."""
-    return abs(share - chance) < 6 * np.sqrt(chance * (1 - chance) / count)
-
-
-@pytest.mark.parametrize("far", [0, 10**6, -(2**30)])
-def test_the_hash_is_uniform_and_does_not_follow_its_neighbours(far):
-    i, j = cells(256, far, -far)
-    for axis in range(4):
-        bits = hash_cell(i, j, axis, 7)
-        for shift in (0, 8, 16, 24):
-            assert stats.chisquare(np.bincount((bits >> shift & 255).ravel(), minlength=256)).pvalue > 1e-6
-        for di, dj in ((1, 0), (0, 1), (1, 1), (-1, 1), (2, 0), (0, 2), (8, 0), (0, 8)):
-            same = bits & 1 == hash_cell(i + di, j + dj, axis, 7) & 1
-            assert within(same.mean(), 0.5, same.size), (axis, di, dj)
-
-
 @pytest.mark.parametrize("salt", [0, 7])
 def test_the_world_has_no_mirror_image(salt):
-    i, j = cells(200)
+    i, j = np.meshgrid(np.arange(1, 201), np.arange(1, 201))
     here = hash_cell(i, j, CENTRE, salt)
     for mirrored in ((-i, -j), (-i, j), (i, -j)):
         assert (here == hash_cell(*mirrored, CENTRE, salt)).mean() < 1e-4

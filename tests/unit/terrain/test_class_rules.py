@@ -13,7 +13,6 @@ from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.terrain import class_rules
 from dav_gswt.terrain.class_rules import apply_rule
-from dav_gswt.terrain.classes import Classes
 from dav_gswt.terrain.paint_file import read_paint
 
 NAMES = ["sand", "grass"]
@@ -85,20 +84,6 @@ def test_a_bad_term_is_refused_by_name(manifest, picture, write, monkeypatch):
     monkeypatch.setattr(class_rules, "MAX_SIDE", 2)
     with pytest.raises(InputError, match="3 x 2 pixels; at most 2"):
         apply_rule(manifest, [picture])
-
-
-def test_a_material_without_any_place_is_named_in_a_warning(manifest, caplog):
-    class_rules.warn_of_missing(Classes(manifest.classes, 2, SIDE), NAMES)
-    assert not caplog.records
-    changed, _ = apply_rule(manifest, [{"kind": "slope"} | RANGE | {"soft": 0.1, "weight": 9}])
-    class_rules.warn_of_missing(Classes(changed.classes, 2, SIDE), NAMES)
-    assert "leaves grass without any place (the ground is sand 100%)" in caplog.text
-
-
-def test_a_rule_for_a_terrain_of_one_material_is_ignored_with_a_warning(manifest, caplog):
-    one = replace(manifest, materials=manifest.materials[:1], classes=None)
-    assert apply_rule(one, class_rules.NOISE)[0] is one and not caplog.records
-    assert apply_rule(one, [{"kind": "slope"} | RANGE])[0] is one and "has one material" in caplog.text
 
 
 def test_painted_materials_are_found_by_their_names(manifest, write):

@@ -67,14 +67,6 @@ def test_borders_bend_as_photographed_ones_do(monkeypatch):
     assert found[0][0] == 1 < found[1][0] and found[0][1] < found[1][1]
 
 
-def test_biases_of_two_materials_are_half_of_the_quantile_of_their_difference():
-    scores = np.random.default_rng(0).normal(size=(20_000, 2))
-    biases = fit_classes.fit_biases(scores, np.array([0.9, 0.1]))
-    quantile = np.quantile(scores[:, 1] - scores[:, 0], 0.9)
-    assert biases[0] - biases[1] == pytest.approx(quantile, abs=0.03)
-    assert biases.sum() == pytest.approx(0, abs=1e-12)
-
-
 def test_the_relief_of_the_ground_itself_does_not_count_as_height():
     content = content_of((0.5, 10.0), (0.5, 10.0))
     rng = np.random.default_rng(1)
@@ -104,13 +96,6 @@ def test_objects_may_stand_on_the_only_material():
     one = replace(content, tiles=content.tiles[:1], materials=[replace(content.materials[0], share=1.0)])
     made = fit_cover(replace(one, objects=[shrub(0.3, 0.2, 0)]), 7)
     assert made.classes is None and made.scatter is not None and 0 < made.probabilities[0] <= 1
-
-
-def test_a_density_without_room_is_reported(caplog, monkeypatch):
-    monkeypatch.setattr(fit_scatter, "WANTED", 50.0)
-    content = replace(cover_content(), objects=[shrub(0.8, 2.0)])
-    fit_scatter.fit_scatter(content, content.classes, 7)
-    assert "there is no room for more" in caplog.text
 
 
 def test_probabilities_of_one_material_sum_to_1_at_most():

@@ -1,12 +1,10 @@
 """A gallery shows every terrain with its still, verdict and size, and nothing of a page becomes HTML."""
 
 import json
-import os
 from pathlib import Path
 
 import pytest
 
-from dav_gswt.cli import gallery as cli
 from dav_gswt.errors import InputError
 from dav_gswt.terrain.gallery import list_entries, write_gallery
 
@@ -60,18 +58,3 @@ def test_a_page_without_its_front_is_named(tmp_path, page, changes):
     with pytest.raises(InputError, match=r"front\.json.*make (the page|it) again"):
         write_gallery([folder], TEMPLATES, tmp_path / "gallery")
     assert not (tmp_path / "gallery").exists()
-
-
-def test_the_newest_page_of_every_scene_is_found(tmp_path, page, monkeypatch, capsys):
-    ages = {"meadow/seed0/x/terrain/page": 3, "meadow/seed1/terrain/page": 2, "desert/seed0/terrain/page": 1}
-    for where, age in ages.items():
-        os.utime(page(f"results/{where}", where[:3]) / "front.json", (1e9 - age, 1e9 - age))
-    found = cli.find_pages(tmp_path / "results")
-    assert [str(path.relative_to(tmp_path)) for path in found] == [
-        "results/desert/seed0/terrain/page",
-        "results/meadow/seed1/terrain/page",
-    ]
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cli, "TEMPLATES", TEMPLATES)
-    assert cli.main([]) == 0 and "results/gallery/index.html: des, mea" in capsys.readouterr().out
-    assert cli.main(["--out", "elsewhere", "nowhere"]) == 1 and "nowhere" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Scatter: the instances shared with the page, no overlap, no lattice, densities, and independence of the window."""
+"""Scatter: the instances shared with the page, no overlap, and independence of the window."""
 
 import json
 from dataclasses import replace
@@ -93,8 +93,3 @@ def test_something_wider_than_a_tile_keeps_its_distance():
     scatter = Scatter(ScatterEntry(1, 0.0, 0.0, 1), [thing(2.5 * SIDE, 0, 0.6)], SIDE)
     places = places_of(window_of(scatter))
     assert len(places) > 5 and len(cKDTree(places).query_pairs(5 * SIDE)) == 0
-
-
-def test_an_object_of_probability_0_is_nowhere(plain):
-    none = replace(plain, objects=[thing(0.3, 0, 0.0)])
-    assert len(window_of(none, size=10)) == len(window_of(plain, size=0)) == 0

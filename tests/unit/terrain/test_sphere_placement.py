@@ -1,14 +1,14 @@
-"""Pictures of planets: no holes, also at edges, corners and far out; the plane as the limit; sky and shots."""
+"""Pictures of planets: no holes, also at edges, corners and far out; the plane as the limit; the sky."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixtures.terrains import MAGENTA, SIDE, SKY, manifest_of, two_level_terrain
+from fixtures.terrains import MAGENTA, SIDE, SKY, two_level_terrain
 
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.errors import InputError
-from dav_gswt.terrain import finite, sphere_backdrop, stills
+from dav_gswt.terrain import finite, stills
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.ground_mapping import camera_on, mapping_of
 from dav_gswt.terrain.sphere import frame_at, make_sphere
@@ -85,25 +85,6 @@ def test_the_backdrop_is_finite_and_dark_far_away(tiles, height):
     colours = backdrop.colours_along(np.random.default_rng(1).normal(size=(200, 3)))
     assert np.isfinite(colours).all() and colours.min() >= 0 and colours.max() <= 1
     assert (backdrop.colours_along(np.array([[0.0, 0.0, 1.0]])).max() < 1e-3) == (height > 100)
-
-
-def test_the_last_tiles_end_at_the_horizon_or_before_it():
-    end, low, dip = sphere_backdrop.find_end(100.0, 101.0, 1000.0)
-    assert end == sphere_backdrop.NO_END and dip == pytest.approx(np.sqrt(1 - (100 / 101) ** 2))
-    end, low, dip = sphere_backdrop.find_end(1e9, 1e9 + 2, 100.0)
-    assert end == 100 and low == pytest.approx(2 / 100, rel=0.01), "as in the plane: height over distance"
-
-
-def test_the_stills_of_a_planet_are_a_walker_a_hill_and_an_orbit(tiles):
-    planet = replace(tiles, heights=make_sphere(4.0, SIDE))
-    assert [shot.name for shot in stills.list_shots(planet, 0.5)] == [shot.name for shot in stills.SHOTS]
-    assert stills.list_shots(tiles, 0.5) == list(stills.SHOTS)
-    manifest = manifest_of(0.5, MAGENTA)
-    for shot in stills.list_shots(planet, 0.5):
-        camera = stills.shot_camera(shot, planet, 0.5, 64, 36)
-        height = np.linalg.norm(camera.centre) - planet.heights.radius
-        assert height == pytest.approx(shot.height * 0.5)
-        assert stills.render_shot(planet, shot, manifest, 64, 36).std() > 0.03
 
 
 def test_no_rectangle_is_cut_from_a_sphere(tiles):

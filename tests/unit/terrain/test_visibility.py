@@ -43,23 +43,6 @@ def test_what_the_camera_sees_is_there(request, surface, pitch, height):
     )
 
 
-def test_what_is_out_of_sight_is_not_there(terrain):
-    cells = visibility.visible_cells(terrain, walking(terrain))
-    assert len(cells) < 0.3 * (2 * terrain.reach + 1) ** 2
-    ahead = np.array([np.cos(np.radians(60)), np.sin(np.radians(60))])
-    middle = np.stack([cells.i + 0.5, cells.j + 0.5], 1) * SIDE - 2.0
-    assert (middle @ ahead > -2 * SIDE).all()
-
-
-def test_cells_come_back_to_front_and_the_nearest_nine_are_marked(terrain):
-    cells = visibility.visible_cells(terrain, walking(terrain, 60.0, 9.0))
-    steps = np.abs(cells.i) + np.abs(cells.j)
-    assert (np.diff(steps) <= 0).all() and steps[-1] == 0
-    assert set(zip(cells.i[cells.close].tolist(), cells.j[cells.close].tolist(), strict=True)) <= {
-        (i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)
-    }
-
-
 def test_levels_follow_the_distance(terrain):
     camera = walking(terrain)
     cells = visibility.visible_cells(terrain, camera)
@@ -121,14 +104,6 @@ def test_orders_are_those_shared_with_the_page():
         assert draw_order.nearest_order(along, entry["kept"], to, slope) == entry["position"]
 
 
-def test_three_by_three_cells_are_worked_by_hand():
-    i, j = window(0, 0, 3, 3)
-    sequence, steps = draw_order.sort_cells(i, j, (0, 1))
-    assert steps.tolist() == [1, 2, 3, 0, 1, 2, 1, 2, 3]
-    expected = [(2, 0), (2, 2), (1, 0), (2, 1), (1, 2), (0, 0), (1, 1), (0, 2), (0, 1)]
-    assert [(int(i[k]), int(j[k])) for k in sequence] == expected
-
-
 @given(st.floats(0, 1, exclude_max=True), st.floats(0, 1, exclude_max=True), st.floats(-np.pi, np.pi))
 def test_no_ray_meets_a_cell_before_one_that_is_drawn_after_it(x, y, angle):
     """The slow way: walk along a ray from the eye and note the cells in the order that it enters them."""
@@ -141,16 +116,3 @@ def test_no_ray_meets_a_cell_before_one_that_is_drawn_after_it(x, y, angle):
     # a step of 1e-3 may cut a corner where two edges are met at once: those cells hide nothing of each other
     drawn = [place[cell] for cell in entered]
     assert drawn == sorted(drawn, reverse=True)
-
-
-@given(st.floats(-2, 2), st.floats(-2, 2), st.integers(0, 2**32 - 1))
-def test_on_a_slope_the_order_is_that_of_the_slope(east, north, seed):
-    """Seen along one of the directions' images under J^-T, depths on the slope are that direction's on level ground."""
-    rng = np.random.default_rng(seed)
-    along, which = orders.DirectionRings().directions(), int(rng.integers(17))
-    flat = rng.normal(size=(30, 3))
-    slope = np.array([east, north])
-    draped = flat + (flat[:, :2] @ slope)[:, None] * [0, 0, 1]
-    to = along[which] - np.array([east, north, 0]) * along[which, 2]
-    np.testing.assert_allclose(draped @ to, flat @ along[which], atol=1e-12)
-    assert draw_order.nearest_order(along, list(range(17)), to, slope) == which

@@ -5,14 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from dav_gswt.terrain.weights import crossfade_opacity, finer_share, level_weights
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "weights.json").read_text())
 FAR = np.array([0.0, 1e-9, 5.0, 9.0, 9.5, 10.0, 10.5, 11.0, 20.0, 1e12, np.inf])
-bands = st.one_of(st.sampled_from([0.0, 1e-12, 1e6]), st.floats(0.0, 1e6))
 
 
 def test_weights_are_those_shared_with_the_page():
@@ -39,16 +36,3 @@ def test_the_share_is_finite_and_falls_from_one_to_zero(band, smooth):
     share = finer_share(FAR, 10.0, band, smooth)
     assert np.isfinite(share).all() and (np.diff(share) <= 0).all() and share[-1] == 0
     assert (share[0] == 1) == (band < 10) and share[FAR == 10.0] == 0.5
-
-
-@given(st.lists(st.tuples(st.floats(1e-3, 1e4), bands), min_size=0, max_size=5), st.floats(0, 1e5), st.booleans())
-def test_weights_are_shares_of_one_whatever_the_bands(levels, distance, smooth):
-    switches = [*sorted(s for s, _ in levels), np.inf]
-    weights = level_weights(np.array([distance]), switches, [*(b for _, b in levels), 0.0], smooth)[:, 0]
-    assert (weights >= 0).all() and weights.sum() == pytest.approx(1, abs=1e-14)
-
-
-def test_two_equal_gaussians_half_drawn_hide_as_much_as_one():
-    half = crossfade_opacity(np.array([0.9]), np.array([0.5]))[0]
-    assert half == pytest.approx(1 - 0.1**0.5)
-    assert 1 - (1 - half) ** 2 == pytest.approx(0.9, abs=1e-15)  # the linear fade's .45 twice hides .70

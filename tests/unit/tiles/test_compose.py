@@ -13,7 +13,6 @@ from dav_gswt.field import concatenate_fields
 from dav_gswt.reconstruction import discs, underlay
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import coarse_levels, compose, store
-from dav_gswt.tiles.layout import CENTRE
 
 
 def test_every_tile_holds_exactly_one_disc_a_cell_at_every_level(tiles):
@@ -42,12 +41,6 @@ def test_tiles_with_the_same_colour_on_a_side_hold_the_same_gaussians_along_it(t
                 # sin^2(pi 4 / 48) = 0.067 of it one block inside
                 np.testing.assert_array_equal(other.means[:, :2], strips[0].means[:, :2])
                 np.testing.assert_array_equal(other.sh, strips[0].sh)
-
-
-def test_the_centre_reaches_neither_the_border_nor_is_it_missing(tiles):
-    block = 4
-    assert (tiles.labels[:, :block] != CENTRE).all() and (tiles.labels[:, :, -block:] != CENTRE).all()
-    assert (tiles.labels[:, 20:28, 20:28] == CENTRE).all()
 
 
 def test_mean_heights_of_the_finest_tiles_are_equal(tiles):
@@ -171,21 +164,10 @@ def test_a_cell_without_a_disc_stays_empty(tile):
     assert half.ground.sum() == CELLS**2 // 4 - 1 and np.isfinite(half.means).all()
 
 
-@pytest.mark.parametrize("cells", [7, 2])
-def test_cells_that_do_not_halve_are_refused(tile, cells):
-    with pytest.raises(ValueError, match=f"{cells} cells"):
-        coarse_levels.merge_cells(tile, cells, SPACING)
-
-
 def test_tiles_go_on_where_the_exemplar_ends(cut, tiles):
     five = cut(wanted=5)
     assert five.report.layout.levels == 5 and five.report.layout.composed_levels == 3
     assert five.side == tiles.side
     scales = [[float(np.exp(f.log_scales).mean()) for f in level] for level in five.fields]
     assert (np.diff(scales, axis=0) > 0).all()
-    for level, fields in enumerate(five.fields):
-        n = 48 >> level
-        for field in fields:
-            x, y = np.floor(field[field.ground].means[:, :2] / (five.spacing * 2**level)).astype(int).T
-            np.testing.assert_array_equal(np.bincount(y * n + x, minlength=n * n), 1)
-            assert (field.means[:, :2] >= 0).all() and (field.means[:, :2] <= np.float32(five.side)).all()
+    assert [field.ground.sum() for level in five.fields for field in level[:1]] == [(48 >> k) ** 2 for k in range(5)]

@@ -7,7 +7,6 @@ import pytest
 from fixtures import mixed_ground as made
 
 from dav_gswt.errors import InputError
-from dav_gswt.lod import store as level_store
 from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.materials import build as materials
 from dav_gswt.materials import store as material_store
@@ -69,12 +68,6 @@ def test_tiles_of_several_materials_are_written_and_read(tiles, tmp_path):
     for one, two in zip(read, tiles, strict=True):
         np.testing.assert_array_equal(one.fields[-1][3].means, two.fields[-1][3].means)
         np.testing.assert_array_equal(one.labels, two.labels)
-
-
-def test_levels_of_several_materials_are_written_and_read(sets, tmp_path):
-    level_store.write_material_levels(sets, tmp_path / "levels", {})
-    read = level_store.read_material_levels(tmp_path / "levels")
-    assert [len(own.fields[0]) for own in read] == [len(own.fields[0]) for own in sets]
 
 
 def test_a_bundle_is_made_of_tiles_materials_and_objects(found, tiles, tmp_path, monkeypatch):

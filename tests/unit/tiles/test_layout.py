@@ -16,12 +16,6 @@ PLACES = PatchPlaces(
 )
 
 
-def test_edge_colours_are_the_bits_of_the_tile_number():
-    # 16 c + 8 W + 4 N + 2 E + S, in the order W N E S
-    assert layout.edge_colours(16 + 8 + 1) == (1, 0, 0, 1)
-    assert layout.edge_colours(4 + 2) == (0, 1, 1, 0)
-
-
 @pytest.mark.parametrize("levels", [1, 3, 6, 8, layout.AUTO])
 @pytest.mark.parametrize("exemplar", [32, 100, 448])
 @pytest.mark.parametrize("strip", [0.05, 0.125, 0.3])
@@ -48,16 +42,6 @@ def test_auto_makes_the_levels_that_are_ever_drawn():
     for side, levels in ((128, 6), (112, 6), (96, 5), (60, 5), (32, 4), (20, 3)):
         plan = layout.plan_layout(4 * side, layout.AUTO, 0.25, 0.125)
         assert plan.levels == levels and abs(plan.side - side) <= 2 ** (levels - 2)
-
-
-def test_levels_that_the_ground_does_not_hold_are_left_out_with_a_warning(caplog):
-    with caplog.at_level("WARNING"):
-        plan = layout.plan_layout(40, 8, 0.5, 0.16)
-    assert plan.levels == 5 and plan.side == 32
-    assert "the exemplar's 40 cells a side hold tiles with 5 levels, not 8" in caplog.text
-    caplog.clear()
-    layout.plan_layout(40, layout.AUTO, 0.5, 0.16)
-    assert not caplog.text
 
 
 def test_an_exemplar_smaller_than_any_tile_is_refused():

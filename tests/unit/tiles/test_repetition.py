@@ -39,16 +39,6 @@ def test_only_what_shows_counts():
     assert shown.compute_costs(place[None])[0] == pytest.approx((power(tile) - own(tile)) * 16 * 16 / (6 * 8))
 
 
-def test_ground_of_one_colour_costs_nothing():
-    shown = repetition.start_overlay(np.full((30, 30, 3), 0.3), 16, (16, 16))
-    assert shown.compute_costs(np.array([[0, 0], [3, 3]])).tolist() == pytest.approx([0, 0], abs=1e-12)
-
-
-def test_large_tiles_are_sampled_more_coarsely():
-    shown = repetition.start_overlay(exemplar(m=400), 200, (200, 200))
-    assert shown.sample == 3 and shown.crop(np.array([100, 100])).shape == (66, 66, 3)
-
-
 def test_pairs_are_charged_what_both_bring_back_but_for_their_own():
     empty = repetition.start_overlay(exemplar(), 16, (16, 16))
     places = np.array([[0, 0], [8, 4], [20, 24]])

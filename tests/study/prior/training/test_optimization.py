@@ -44,11 +44,3 @@ def test_a_training_that_was_killed_ends_with_the_same_weights(tmp_path, monkeyp
     for name, value in whole.state_dict().items():
         torch.testing.assert_close(again.state_dict()[name], value, msg=name)
     assert not list(tmp_path.iterdir())
-
-
-def test_masks_hide_bands_and_blocks_of_some_examples():
-    known = optimization.draw_masks(400, torch.Generator().manual_seed(0))
-    hidden = (known == 0).any(dim=(1, 2, 3))
-    assert 0.25 < hidden.float().mean() < 0.45
-    across = (known[:, 0] == 0).all(2).any(1) | (known[:, 0] == 0).all(1).any(1)
-    assert across.any() and (hidden & ~across).any()

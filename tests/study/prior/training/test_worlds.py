@@ -6,7 +6,7 @@ import pytest
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.raster import render
-from dav_gswt.study.prior.training import worlds, worlds_ground, worlds_light, worlds_objects
+from dav_gswt.study.prior.training import worlds, worlds_ground, worlds_light
 
 
 def same(a: GaussianField, b: GaussianField) -> bool:
@@ -60,26 +60,6 @@ def test_a_lit_level_surface_reflects_sun_and_sky():
     surface = worlds_light.Surface(one, np.array([[0, 0, 1.0]]), np.full((1, 3), 0.4), np.ones(1))
     found = worlds_light.reflect(sun_at(30), flat_with_a_wall(), surface, np.zeros(3))
     np.testing.assert_allclose(found, 0.4 * (0.5 + 0.5), rtol=1e-3)  # sin 30 of the sun, all of the sky
-
-
-def test_the_surface_of_a_sharp_box_lies_on_its_faces():
-    planes, away = np.concatenate([np.eye(3), -np.eye(3)]), np.full(6, 0.5)
-    rng = np.random.default_rng(0)
-    points, normals, spacing = worlds_objects.sample_surface(rng, 600, planes, away, 200.0, np.array([2.0, 1.0, 0.5]))
-    np.testing.assert_allclose(np.abs(points / [1, 0.5, 0.25]).max(1), 1, atol=0.01)
-    assert np.median(np.abs(normals).max(1)) > 0.999
-    assert spacing == pytest.approx(np.sqrt(2 * (2 * 1 + 2 * 0.5 + 1 * 0.5) / 600), rel=0.05)
-
-
-@pytest.mark.parametrize("name", worlds_objects.KINDS)
-def test_an_object_stands_on_the_ground_and_has_as_many_gaussians_as_its_kind_says(name):
-    kind = worlds_objects.KINDS[name]
-    one = kind.make(np.random.default_rng(1), kind.gaussians)
-    assert len(one) == kind.gaussians
-    assert all(np.isfinite(getattr(one, f.name)).all() for f in fields(worlds_objects.Cloud))
-    assert -0.8 < one.means[:, 2].min() < 0.4 and one.means[:, 2].max() < 2
-    assert (one.scales > 0).all() and (one.albedo > 0).all() and (one.albedo < 1).all()
-    np.testing.assert_allclose(np.linalg.norm(one.quats, axis=1), 1, atol=1e-6)
 
 
 def test_noise_has_deviation_1_wherever_it_is_asked():

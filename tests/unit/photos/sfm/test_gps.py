@@ -44,10 +44,9 @@ def test_heights_that_drift_along_a_line_do_not_say_where_up_is():
     assert says_up and spread == pytest.approx(np.hypot(along.std(), (30 * np.cos(along)).std()))
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_photos_along_a_line_leave_the_ground_level(reconstruct, seed):
+def test_photos_along_a_line_leave_the_ground_level(reconstruct):
     """Ten photos on 90 metres, receivers 2 metres off: about the line the positions say nothing."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     model = synth.model(synth.flight(1, 10, step=0.25), synth.plain(500, 1.0, rng))
     best = reconstruct(model)
     at = place(model, rng, 2.0)
@@ -126,14 +125,8 @@ def test_oblique_views_fix_a_focal_length_that_exif_has_wrong(reconstruct):
 
 
 def test_a_focal_length_that_shall_be_held_or_that_views_from_above_leave_open_stays(reconstruct):
-    for model, hold, said in (
-        (oblique(), True, "held"),
-        (
-            synth.model(synth.flight(3, 3), synth.plain(300, 0.7, np.random.default_rng(0), relief=0.02)),
-            False,
-            "EXIF's",
-        ),
-    ):
+    above = synth.model(synth.flight(3, 3), synth.plain(300, 0.7, np.random.default_rng(0), relief=0.02))
+    for model, hold, said in ((oblique(), True, "held"), (above, False, "EXIF's")):
         best = reconstruct(model, 1.08 * synth.FOCAL)
         before = best.images[1].cam_from_world().matrix()
         found = settle(best, {1: 1.08 * synth.FOCAL}, hold)

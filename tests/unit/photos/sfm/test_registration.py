@@ -15,8 +15,9 @@ from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SfmSign, SfmVerdict, read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
-from dav_gswt.photos.photo_set import list_lenses, prepare_photos
-from dav_gswt.photos.sfm import gps, registration
+from dav_gswt.photos.photo_set import prepare_photos
+from dav_gswt.photos.sfm import gps, registration, solution
+from dav_gswt.photos.sfm.mapping import Approach
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_image
 from dav_gswt.photos.sfm.solution import SfmPhoto
 
@@ -108,21 +109,36 @@ def test_a_run_repeats_to_the_bit_whatever_the_threads(photos, registered):
         assert np.array_equal(one.rotation, two.rotation) and np.array_equal(one.translation, two.translation)
 
 
-def test_positions_by_gps_give_metres_and_north_and_the_photos_folder_is_whole(photos, tmp_path, monkeypatch):
-    """The flight, 160 metres high and turned by 30 degrees, with receivers a decimetre off."""
-    rng, turn = np.random.default_rng(8), np.radians(30.0)
-    true = np.array([c.centre for c in flight()]) * 160
-    c, s = np.cos(turn), np.sin(turn)
-    at = true @ [[c, s, 0], [-s, c, 0], [0, 0, 1]] + rng.normal(0, 0.1, true.shape)
-    world = Georeference(46.8, -92.0, 180.0, 0.0, 1.0)
-    places = dict(zip(sorted(photos.iterdir()), world.to_earth(at).tolist(), strict=True))
-    monkeypatch.setattr(gps, "read_gps_position", lambda path: tuple(places[path]))
+WORLD = Georeference(46.8, -92.0, 180.0, 0.0, 1.0)
+
+
+def fly_in_metres():
+    """Positions by GPS: the flight, 160 metres high and turned by 30 degrees, with receivers a decimetre off."""
+    c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
+    true = np.array([camera.centre for camera in flight()]) * 160
+    return true @ [[c, s, 0], [-s, c, 0], [0, 0, 1]] + np.random.default_rng(8).normal(0, 0.1, true.shape)
+
+
+@pytest.fixture
+def locate(photos, monkeypatch):
+    """Gives the photos positions by GPS."""
+
+    def give(at):
+        places = dict(zip(sorted(photos.iterdir()), WORLD.to_earth(at).tolist(), strict=True))
+        monkeypatch.setattr(gps, "read_gps_position", lambda path: tuple(places[path]))
+
+    return give
+
+
+def test_positions_by_gps_give_metres_and_north_and_the_photos_folder_is_whole(photos, tmp_path, locate):
+    at = fly_in_metres()
+    locate(at)
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "old").touch()
     made = prepare_photos(photos, tmp_path / "out", OPTIONS)
-    assert made.unit == "metre" and made.flying_height == pytest.approx(np.median(true[:, 2]), rel=0.02)
+    assert made.unit == "metre" and made.flying_height == pytest.approx(np.median(at[:, 2]), rel=0.02)
     stored = read_colmap_model(tmp_path / "out" / "sparse")
-    back = world.to_world(made.georeference.to_earth(np.array([c.centre for c in stored.cameras])))
+    back = WORLD.to_world(made.georeference.to_earth(np.array([c.centre for c in stored.cameras])))
     assert np.abs(back - at).max() < 1.0  # of flights of 100 metres: features are read to half a pixel, 0.2 m here
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["ground.json", "images", "lenses.json", "sparse"]
     assert read_scene_frame(tmp_path / "out" / "ground.json") == made
@@ -167,24 +183,6 @@ def test_photos_share_a_camera_by_size_and_focal_length(tmp_path, cameras, count
     assert entered[0].has_prior_focal_length and not entered[3].has_prior_focal_length
 
 
-def test_a_given_focal_length_takes_the_place_of_exifs(photos):
-    described = registration._describe_photo(photos / "000.jpg", "000.png", replace(OPTIONS, focal=2 * FILM, size=160))
-    assert described.focal == pytest.approx(synth.FOCAL, rel=1e-6)  # twice as long, at half the size
-    assert (described.full, described.width, described.height) == ((320, 240), 160, 120)
-    described = registration._describe_photo(photos / "000.jpg", "000.png", OPTIONS)
-    assert described.focal == pytest.approx(synth.FOCAL * round(FILM) / FILM, rel=1e-6)
-
-
-def test_the_lens_of_most_pictures_comes_first(registered):
-    cameras, lenses = list(registered.model.cameras), list(registered.lenses)
-    cameras[0], lenses[0] = replace(cameras[0], fx=111.0), pycolmap.Camera(lenses[0].todict())
-    kinds = list_lenses(
-        replace(registered, model=replace(registered.model, cameras=tuple(cameras)), lenses=tuple(lenses))
-    )
-    assert [kind.pinhole[0] for kind in kinds] == [cameras[1].fx, 111.0]
-    assert [kind.camera for kind in kinds] == [lenses[1], lenses[0]]
-
-
 def test_an_undistorted_picture_is_what_a_pinhole_camera_sees(tmp_path):
     """A smooth scene photographed through a lens with distortion, against the same scene through the pinhole."""
     lens = pycolmap.Camera(model="SIMPLE_RADIAL", width=200, height=150, params=[180, 100, 75, -0.1])
@@ -216,6 +214,26 @@ def test_photos_that_cannot_be_used_are_refused(tmp_path):
     image_files.write_png(tmp_path / "2.png", np.full((60, 80, 3), 0.5))
     with pytest.raises(InputError, match="0 of 3 photos.*texture"):
         register_photos(tmp_path, OPTIONS)
+
+
+@pytest.mark.slow
+def test_positions_are_priors_of_mapping_unless_they_contradict_the_photos(photos, locate, monkeypatch):
+    at = fly_in_metres()
+    locate(at)
+    priors = Approach("incremental", hold_focal=True, use_gps=True)
+    with monkeypatch.context() as patch:
+        patch.setattr(registration, "find_solution", lambda scene, _, seed: solution._solve(priors, scene, seed))
+        found = register_photos(photos, OPTIONS)
+    assert found.model.names == NAMES and found.verdict.grade == "good"
+    back = WORLD.to_world(found.positions.about.to_earth(np.array([c.centre for c in found.model.cameras])))
+    assert np.abs(back - at).max() < 1.0
+    locate(np.random.default_rng(5).normal(0, 60, (8, 3)))
+    found = register_photos(photos, OPTIONS)
+    assert found.positions is None and found.model.names == NAMES
+    assert found.verdict.grade == "doubtful" and [sign.name for sign in found.verdict.objections] == ["GPS"]
+    tried = [text.split(":")[0] for text in found.verdict.tried]
+    assert tried == ["incremental mapping", str(priors), "global mapping, EXIF's focal length held"]
+    assert apart(found.model.cameras, flight()) < 0.01
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from fixtures import photos as synth
 
-from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import SfmSign, SfmVerdict
 from dav_gswt.photos.sfm.verdict import (
     THRESHOLDS,
@@ -14,7 +13,6 @@ from dav_gswt.photos.sfm.verdict import (
     combine_grades,
     find_groups,
     judge_model,
-    require_trust,
 )
 
 HEIGHT = 40.0  # metres in a unit of the made models
@@ -95,18 +93,11 @@ def test_points_that_two_photos_see_are_no_good_sign(model):
     assert grades(judge(short))["track length"] == "refused"
 
 
-def test_most_photos_left_out_make_a_model_doubtful_and_no_more(model):
-    verdict = judge(model, images=50)
-    assert verdict.grade == "doubtful" and "20 of 50 photos" in verdict.objections[0].reason
-
-
-def test_two_groups_are_named(model):
+def test_two_groups_make_a_model_doubtful(model):
     groups = find_groups(list("abcdefgh"), [(0, 1, 90), (1, 2, 90), (3, 4, 90), (4, 5, 90), (5, 6, 90), (2, 3, 12)])
     assert groups == (tuple("defg"), tuple("abc"))
     assert find_groups(list("abcd"), [(0, 1, 90), (2, 3, 90)], placed=[0, 3]) == (tuple("abcd"),)
-    verdict = judge(model, groups=groups)
-    assert verdict.grade == "doubtful"
-    assert "your photos fall into 2 groups (d ... g | a ... c)" in verdict.objections[0].reason
+    assert judge(model, groups=groups).grade == "doubtful"
 
 
 def signs(*grades: tuple[str, str]) -> list[SfmSign]:
@@ -127,16 +118,3 @@ def signs(*grades: tuple[str, str]) -> list[SfmSign]:
 )
 def test_signs_are_weighed_together(found, grade):
     assert combine_grades(signs(*found)) == grade
-
-
-def test_a_refused_model_stops_with_its_reasons_and_what_was_tried():
-    verdict = SfmVerdict("refused", tuple(signs(("GPS", "refused"), ("tilt", "good"))), ("incremental", "global"))
-    with pytest.raises(InputError, match=r"a reason \(tried: incremental; global\).*verdict: warn"):
-        require_trust(verdict)
-    require_trust(replace(verdict, grade="doubtful"))
-
-
-def test_positions_within_their_own_error_are_no_sign(model):
-    at = np.random.default_rng(0).normal(0, 0.5, (len(model.names), 3))
-    for positions in (at, np.zeros_like(at)):
-        assert "GPS" not in grades(judge(model, positions=positions))

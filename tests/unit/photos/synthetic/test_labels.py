@@ -59,13 +59,6 @@ def test_twigs_with_gaps_between_them_are_one_footprint():
     assert covered.sum() * 0.01**2 == pytest.approx(0.6**2, rel=0.1)
 
 
-def test_a_mask_of_a_material_leaves_objects_out(known):
-    found = labels.draw_label_map(known, SQUARE, 80)
-    assert found.mask("meadow").sum() == (found.material == 2).sum() - (found.object[20:] > 0).sum()
-    with pytest.raises(KeyError):
-        found.mask("water")
-
-
 def test_a_place_belongs_to_the_nearest_object_of_the_kind_that_holds_it(known):
     x, y = np.array([1.0, 1.3, 1.6, -1.0]), np.array([2.0, 2.3, 2.0, 0.2])
     assert labels.label_places(known, x, y, "shrub").tolist() == [1, 1, 0, 0]

@@ -24,11 +24,6 @@ def test_band_noise_keeps_to_its_band_with_mean_0_and_deviation_1():
     assert energy[(k > 1.0) & (k < 4.0)].sum() > 0.2 * energy.sum()
 
 
-def test_a_raster_without_any_wave_is_refused():
-    with pytest.raises(ValueError, match="no wavelength"):
-        noise.make_noise(np.random.default_rng(0), 1, 1.0, 1.0, 0.1, 1.0)
-
-
 @pytest.mark.parametrize("wind", [0.5, 2.0])
 def test_ripples_have_their_length_along_the_wind_and_grow_in_phase_with_it(wind):
     n, period, length = 256, 8.0, 0.4
@@ -37,19 +32,14 @@ def test_ripples_have_their_length_along_the_wind_and_grow_in_phase_with_it(wind
     where = strength[:-1, :-1] > 0.5  # away from forks, where a phase has no slope
     slope = np.array([s[where].mean() for s in step]) * n / period
     expected = 2 * np.pi / length * np.array([np.cos(wind), np.sin(wind)])
-    assert slope == pytest.approx(
-        expected, abs=0.1 * 2 * np.pi / length
-    )  # the lobe is 11 to 17 % wide, over ~400 ripples
+    # the lobe is 11 to 17 % wide, over ~400 ripples
+    assert slope == pytest.approx(expected, abs=0.1 * 2 * np.pi / length)
     assert strength.min() >= 0 and strength.max() <= 1
 
 
-def test_a_ripple_rises_slowly_and_falls_fast(golden):
+def test_a_ripple_has_its_profile(golden):
     phase = np.linspace(-np.pi, np.pi, 2001)
-    profile = noise.ripple_profile(phase)
-    rise = np.diff(profile) > 0
-    assert rise.mean() > 0.52
-    assert profile.max() <= 1 and profile.min() >= -1
-    golden("ripple profile", profile)
+    golden("ripple profile", noise.ripple_profile(phase))
 
 
 def test_a_raster_is_sampled_at_texel_centres_between_them_and_across_its_edge():

@@ -76,37 +76,19 @@ def dark(monkeypatch):
     monkeypatch.setattr(photo_set, "triangulate_points", nothing)
 
 
-@pytest.mark.parametrize(
-    "given, groups",
-    [
-        pytest.param(
-            {"layout": "cap", "min_elevation": 60, "oblique": 3},
-            {"high": ["test_00.png", "test_01.png"], "oblique": ["test_02.png", "test_03.png", "test_04.png"]},
-            id="cap",
-        ),
-        pytest.param(
-            {"layout": "paper", "walkers": 2},
-            {"hemisphere": ["test_00.png", "test_01.png"], "walker": ["test_02.png", "test_03.png"]},
-            id="paper",
-        ),
-    ],
-)
-def test_test_views_are_written_by_group_and_every_picture_with_its_truth(dark, tmp_path, given, groups):
-    photo_set.render_set(ENTRY | given, tmp_path)
+def test_test_views_are_written_by_group_and_every_picture_with_its_truth(dark, tmp_path):
+    entry = ENTRY | {"layout": "cap", "min_elevation": 60, "oblique": 3}
+    groups = {"high": ["test_00.png", "test_01.png"], "oblique": ["test_02.png", "test_03.png", "test_04.png"]}
+    photo_set.render_set(entry, tmp_path)
     frame = read_scene_frame(tmp_path / "ground.json")
     assert frame.test_groups == {group: tuple(names) for group, names in groups.items()}
     assert frame.test == tuple(name for group in groups.values() for name in group)
-    assert set(frame.renderer) == {"mitsuba", "variant", "llvm"} and frame.images == frame.registered == 3
+    assert frame.images == frame.registered == 3
     stored = read_colmap_model(tmp_path / "sparse")
-    for name, camera in zip(frame.test, synthetic.test_views(ENTRY | given), strict=True):
+    for name, camera in zip(frame.test, synthetic.test_views(entry), strict=True):
         assert stored.camera(name).centre == pytest.approx(camera.centre)
         assert (tmp_path / "truth" / name).with_suffix(".exr").read_text() == str(camera.centre.tolist())
     pictures = sorted(p.name for p in (tmp_path / "images").iterdir())
     assert pictures == [*frame.test, "view_00.png", "view_01.png", "view_02.png"]
     found = read_label_map(tmp_path / "truth")
     assert (found.material == 1).all() and found.extent == Extent(-3.0, -3.0, 3.0, 3.0)
-
-
-def test_names_of_more_than_a_hundred_views_sort_by_number():
-    names = [name for name, _ in photo_set._name_views("view", synthetic.start_views(ENTRY | {"photos": 120}))]
-    assert names == sorted(names) and names[0] == "view_000.png" and names[-1] == "view_119.png"
