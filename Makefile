@@ -53,7 +53,7 @@ CORE := $(wildcard workflow/lib/dav_gswt/raster/core/*.cpp workflow/lib/dav_gswt
 lint-code:
 	@$(BIN)/ruff check --quiet .
 	@$(BIN)/ruff format --check --quiet .
-	@$(BIN)/snakefmt --check --quiet Snakefile rules
+	@$(BIN)/snakefmt --check Snakefile rules 2>/dev/null
 	@$(BIN)/clang-format --dry-run -Werror $(CORE)
 	@$(BIN)/lint-imports --no-cache >.venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
 
