@@ -17,7 +17,7 @@ const BUDGET = 1_000_000; // Gaussians of an update
 
 /**
  * Open a terrain: the address of a page folder or a bundle, its zip, or its files. Resolves when its manifest is read;
- * `loaded` resolves when its chunks are read, or as many of them as the cache holds.
+ * `loaded` resolves when its chunks are read: all of them, or the coarsest level of a set that is larger than the cache.
  *
  * @param {string | URL | Blob | Iterable<File>} where
  * @param {{ onProgress?: (progress: import("./data/bundle.js").Progress) => void, onError?: (error: Error) => void }} [options]
