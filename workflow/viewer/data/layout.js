@@ -22,6 +22,7 @@ export const MAX_ORDERS = 255; // directions
 export const NO_ORDER = 255; // direction of cells that are sorted by depth
 export const NEAR = 0.1; // near plane, as a share of the eye floor
 export const CACHE_BYTES = 192e6; // of chunks that are kept in memory
+const VIEW_SHARE = 0.75; // of the cache, for one view: with half of it the nearest ground is often coarser
 const MAX_ROWS = 4096; // every graphics card has textures of this height
 export const MAX_COUNT = MAX_ROWS * ROW; // Gaussians of a chunk
 const MAX_PAGES = 131072, MIN_PAGES = 1024; // of orders on the GPU: at most 8M entries, 32 MB
@@ -47,8 +48,8 @@ export function recordRows(manifest) {
 }
 
 /**
- * What a view may use of the chunk cache in a set that does not fit into it: half, so that turning around or walking a
- * few steps finds the chunks of the previous view. null: the whole set fits.
+ * What a view may use of the chunk cache in a set that does not fit into it. The rest keeps chunks of the views before, so
+ * that turning around or walking a few steps finds them. null: the whole set fits.
  *
  * @param {Manifest} manifest
  * @returns {{ bytes: number, rows: number } | null}
@@ -57,7 +58,7 @@ export function viewRoom(manifest) {
   const chunks = listChunks(manifest), rows = recordRows(manifest);
   const allBytes = chunks.reduce((sum, { entry }) => sum + entry.bytes, 0);
   const allRows = chunks.reduce((sum, { entry }) => sum + Math.ceil(entry.count / ROW), 0);
-  return allBytes <= CACHE_BYTES && allRows <= rows ? null : { bytes: CACHE_BYTES / 2, rows: rows / 2 };
+  return allBytes <= CACHE_BYTES && allRows <= rows ? null : { bytes: VIEW_SHARE * CACHE_BYTES, rows: VIEW_SHARE * rows };
 }
 
 /**
