@@ -24,21 +24,6 @@ from faults import Mutant, list_mutants
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = Path("workflow/lib/dav_gswt")
 LIMIT = 3600  # seconds of a test run: a mutant may never end
-COPIED = [
-    "Snakefile",
-    "Makefile",
-    "pyproject.toml",
-    "rules",
-    "scripts",
-    "config",
-    "profiles",
-    "workflow",
-    "tests",
-    "docs",
-]
-COPIED += ["resources", "examples", "benchmarks", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"]
-COPIED += ["mkdocs.yml", "requirements.lock", "requirements-test.lock", "requirements-docs.lock"]
-COPIED += ["requirements-weights.lock", "results/README.md", ".ci", ".github"]
 
 
 def main() -> int:
@@ -103,14 +88,11 @@ def list_groups() -> dict[str, list[Path]]:
 
 
 def copy_repository(copy: Path) -> Path:
-    """A copy of the repository with an environment of its own, whose packages are links to those of this one."""
-    for name in COPIED:
-        source, target = ROOT / name, copy / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if source.is_dir() and not source.is_symlink():
-            shutil.copytree(source, target, symlinks=True, ignore=shutil.ignore_patterns("__pycache__", "node_modules"))
-        elif source.exists():
-            shutil.copy(source, target, follow_symlinks=False)
+    """Copy the tracked files, and make an environment whose packages are links to this environment's packages."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for name in listed.split("\0")[:-1]:
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, copy / name, follow_symlinks=False)
     site = Path(f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages")
     environment, packages = copy / ".venv", ROOT / ".venv" / site
     (environment / site).mkdir(parents=True)
@@ -184,7 +166,7 @@ def run_tests(copy: Path, mutant: Mutant | None, fast: bool) -> str:
 
 
 def list_nearest_tests(path: Path) -> list[str]:
-    """Folders and files of tests to run first: those of the same package."""
+    """Tests of the same package, which run first."""
     if path.is_relative_to("workflow/viewer"):
         return ["tests/browser"]
     parts = path.relative_to(LIBRARY).parts
