@@ -4,7 +4,7 @@
 
 Mutants are drawn by seed: a group of code (a package of the library, the C++ core, the viewer), then a kind of fault,
 then a place, found by syntax tree. Each is put into a copy of the repository, where `make test` runs with -x, the
-tests nearest to the fault first; survivors are tested by `make test-all` too. Results are in
+tests nearest to the fault first; survivors are tested by the slow tests too. Results are in
 results/mutants/seed<N>.json, and an interrupted run goes on from there. This is a tool, not part of the test suite.
 """
 
@@ -148,9 +148,9 @@ def run_tests(copy: Path, mutant: Mutant | None, fast: bool) -> str:
         return "it does not compile"
     touch_stamps(copy)
     nearest = [place for place in list_nearest_tests(mutant.path) if (copy / place).exists()] if mutant else []
-    target = "test" if fast else "test-all"
+    marked = "" if fast else " -m slow"
     for tests in (" ".join(nearest), "") if nearest else ("",):
-        command = ["make", target, "PYTEST_OPTIONS=-x -q -p no:cacheprovider", f"TESTS={tests}"]
+        command = ["make", "test", f"PYTEST_OPTIONS=-x -q -p no:cacheprovider{marked}", f"TESTS={tests}"]
         job = subprocess.Popen(command, cwd=copy, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                                errors="replace", start_new_session=True)  # fmt: skip
         try:
@@ -192,7 +192,7 @@ def report(results: list[dict]) -> None:
     """Print how many mutants each tier caught."""
     fast = sum(found["fast"] != "survived" for found in results)
     both = sum(found["fast"] != "survived" or found.get("slow", "survived") != "survived" for found in results)
-    print(f"make test: {fast} of {len(results)} mutants caught; with make test-all: {both} of {len(results)}")
+    print(f"make test: {fast} of {len(results)} mutants caught; with the slow tests: {both} of {len(results)}")
 
 
 if __name__ == "__main__":
