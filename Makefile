@@ -6,14 +6,13 @@ WORKERS ?= 2
 EXAMPLES ?= 2000
 SEED ?= 0
 COUNT ?= 20
-OPENSPLAT ?= opensplat
 PYTHON ?= python3
 # Threads that wait sleep: other jobs use the processors too.
 export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
-.PHONY: setup reference run view gallery test test-all test-study lint lint-code lint-types lint-viewer lint-docs mutants \
-  compare bench docs prior compiler sanitize fuzz
+.PHONY: setup reference run view gallery test test-all lint lint-code lint-types lint-viewer lint-docs mutants \
+  bench docs sanitize fuzz
 .DELETE_ON_ERROR:
 
 # .venv alone
@@ -38,11 +37,7 @@ test: .venv/installed-test
 
 # about 20 minutes: also interrupted runs, Slurm, Firefox, real photos, fuzzing
 test-all: .venv/installed-test
-	@$(PYTEST) -m "not study" $(TESTS)
-
-# about 15 minutes: the tests of the study
-test-study: .venv/installed-test
-	@$(PYTEST) -m study $(TESTS)
+	@$(PYTEST) -m "" $(TESTS)
 
 # formatters, linters, types, the documentation; all of them, also if one fails
 lint: .venv/installed-test
@@ -81,10 +76,6 @@ fuzz: .venv/installed-test
 	@FUZZ_EXAMPLES=$(EXAMPLES) FUZZ_SEED=$(SEED) FUZZ_TABLE=results/fuzz.md \
 	  $(BIN)/python -m pytest tests/fuzz -m "" --hypothesis-seed=$(SEED) -q && cat results/fuzz.md
 
-# OpenSplat's fit beside ours, of the same photos; OPENSPLAT: the program, which you build yourself
-compare: .venv/installed
-	@$(BIN)/snakemake --cores $(CORES) --config 'study={compare: {opensplat: "$(OPENSPLAT)"}}' -- compare
-
 bench: .venv/installed-test
 	@for bench in benchmarks/*.py; do PYTHONPATH=tests:tests/browser $(BIN)/python $$bench || exit 1; done
 
@@ -92,15 +83,9 @@ bench: .venv/installed-test
 docs: .venv/installed-docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
-# docs/reference/config.md, policies.md and reruns.md, and the schema: made from the config models;
-# docs/research/results/claims.md: made from the tables of docs/research/data
+# docs/reference/config.md and policies.md, and the schema: made from the config models
 reference: .venv/installed
-	@$(BIN)/python -m dav_gswt.study.config_reference
-	@$(BIN)/python -m dav_gswt.study.claims
-
-# hours: the weights that come with the project were made so
-prior: .venv/installed
-	@$(BIN)/snakemake --cores $(CORES) -- results/prior/terrain.safetensors
+	@$(BIN)/python -m dav_gswt.config.reference
 
 SOURCES := pyproject.toml requirements.lock requirements-weights.lock $(wildcard workflow/lib/dav_gswt/raster/core/*)
 # a set-up that had to do without a compiler is done again as soon as there is one
@@ -129,3 +114,6 @@ INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check
 .venv/installed-test: .venv/installed-docs requirements-test.lock
 	@$(INSTALL) -r requirements-test.lock
 	@touch $@
+
+# targets of a neighbour that uses this workflow, where it is there
+-include study/targets.mk

@@ -10,8 +10,8 @@ from snakemake.utils import min_version
 min_version("9.13")  # the release that brought pathvars
 
 
-configfile: f"{workflow.basedir}/config/config.yaml"
-configfile: f"{workflow.basedir}/config/study.yaml"
+# not workflow.basedir: another workflow may include this one
+configfile: f"{workflow.current_basedir}/config/config.yaml"
 
 
 report: "workflow/report/workflow.rst"
@@ -35,7 +35,6 @@ include: "rules/tiles.smk"
 include: "rules/bundle.smk"
 include: "rules/terrain.smk"
 include: "rules/export.smk"
-include: "rules/study/study.smk"
 
 
 # Below the includes: Snakemake skips constraints on wildcards that reach an output through a pathvar unless they are

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from fixtures.browser import chromium, chromium_path, served
 from fixtures.page_visit import Visit
 from record import report_figures
 
@@ -18,7 +19,6 @@ from dav_gswt.bundle import store
 from dav_gswt.cli.gallery import find_pages
 from dav_gswt.images.metrics import psnr
 from dav_gswt.paths import RESULTS
-from dav_gswt.study.terrain.browser import chromium, chromium_path, served
 from dav_gswt.terrain import endless, stills
 
 SCENE = "desert"

@@ -13,10 +13,9 @@ from collections.abc import Callable, Iterator
 
 import psutil
 from fixtures import bundles
+from fixtures.browser import FLAGS, chromium_path
 from pages import page_of
 from record import report_figures
-
-from dav_gswt.study.terrain.browser import FLAGS, chromium_path
 
 GROUND = bundles.Ground(discs=264, levels=6, speckle=20)
 TARGETS = {"page_memory_mb": 300.0}

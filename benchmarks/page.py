@@ -9,10 +9,9 @@ import statistics
 import sys
 
 from fixtures import bundles
+from fixtures.browser import FLAGS, chromium_path
 from pages import page_of
 from record import report_figures
-
-from dav_gswt.study.terrain.browser import FLAGS, chromium_path
 
 GROUND = bundles.Ground(discs=100, levels=3, speckle=20)  # 16 tiles x (100^2 + 50^2 + 25^2) = 210,000
 VISITS = 5

@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 from fixtures import land_covers
+from fixtures.browser import FLAGS, chromium_path, served
 from fixtures.page_visit import VIEWER
 from record import report_figures
 
@@ -21,7 +22,6 @@ from dav_gswt.bundle import build
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.bundle.manifest import NAME
 from dav_gswt.files import read_json
-from dav_gswt.study.terrain.browser import FLAGS, chromium_path, served
 from dav_gswt.terrain.page import write_page
 
 DISCS, LEVELS, BLADES = 100, 3, 64  # 10,000 Gaussians a tile, and some

@@ -20,6 +20,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from dav_gswt.study.terrain.frames import VISIT
+from fixtures.browser import FLAGS, chromium_path, served
 from fixtures.page_visit import VIEWER
 from record import report_figures
 
@@ -27,8 +29,6 @@ from dav_gswt.bundle import store
 from dav_gswt.field import concatenate_fields, write_field
 from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.raster import render
-from dav_gswt.study.terrain.browser import FLAGS, chromium_path, served
-from dav_gswt.study.terrain.frames import VISIT
 from dav_gswt.terrain import endless, stills, visibility
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.object_placement import group_by_cell

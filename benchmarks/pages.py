@@ -7,9 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from fixtures import bundles
+from fixtures.browser import served
 from fixtures.page_visit import VIEWER
 
-from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.page import write_page
 
 

@@ -16,7 +16,7 @@ from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
 from dav_gswt.views.policy_names import NEEDS_PHOTOS, ORACLES, POLICY_NAMES
 from dav_gswt.workflow import NamedEntries, lift_job_rate_limit, list_command_line_values
 
-BASE = Path(workflow.basedir)
+BASE = Path(str(workflow.current_basedir)).parent
 BUNDLE_SCHEMA = str(BASE / "workflow/schemas/davgswt.schema.json")
 VIEWER = sorted(
     str(path) for path in (BASE / "workflow/viewer").rglob("*") if path.suffix in (".js", ".ts", ".html", ".css")
@@ -25,15 +25,23 @@ NEVER = r"(?!)"  # a constraint that nothing meets
 PLAIN_TILING = r"[a-z][a-z0-9_-]*(?<!-refined)(?<!-expansion)"  # an entry of `tilings`
 CHOOSING = "|".join(map(paths.policy_pattern, POLICY_NAMES))  # policies, as a constraint
 
+# A workflow that includes this one may have top-level keys of its own. It names them here, each with a function that gets
+# the checked config and the key's value, and returns the config with what it adds.
+EXTENSIONS = globals().get("EXTENSIONS", {})
+
 try:
     given = merge_tables(config, parse_command_line(list_command_line_values(workflow)))
+    others = {key: given.pop(key, {}) for key in EXTENSIONS}
     given = check_config(add_scene_files(given, BASE / "config/scenes"))
+    for key, extend in EXTENSIONS.items():
+        given = extend(given, others[key])
 except InputError as error:
     raise WorkflowError(str(error)) from None
 config.clear()
 config.update(given)
+config.update({table: NamedEntries(table, config[table]) for table in ("scenes", "presets", "tilings", "priors")})
 
-# presets whose photos another one chooses, those that the study makes of them included, and all others
+# Presets whose photos another preset selects, and all other presets. An ending "-..." names a variant of a preset.
 CHOOSERS = "|".join(name for name, preset in config["presets"].items() if not preset.get("choose_with")) or NEVER
 FITS_ONCE = "|".join(name for name, preset in config["presets"].items() if preset.get("choose_with")) or NEVER
 FITS_ONCE = rf"(?!(?:{CHOOSERS})/)(?:{FITS_ONCE})(?:-[^/]+)?"

@@ -6,6 +6,33 @@ them share the first scoring. A round after a stop asks for no pose and hands th
 """
 
 
+RENDERED_CANDIDATES = 40  # spread over all candidates
+
+
+rule render_candidates:
+    """Render what some candidates truly show, at the size they are scored: for the policy `oracle` alone."""
+    input:
+        frame="<results>/<photos>/ground.json",
+    output:
+        truth=directory("<results>/<photos>/candidates"),
+    log:
+        "<logs>/<photos>/render_candidates.log",
+    benchmark:
+        "<benchmarks>/<photos>/render_candidates.tsv"
+    wildcard_constraints:
+        scene=scenes_by("render"),
+    threads: 2
+    resources:
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("60m"),
+    params:
+        scene=scene_keys("render_candidates"),
+        poses=RENDERED_CANDIDATES,
+        source=code_of("render_candidates"),
+    script:
+        "../scripts/render_candidates.py"
+
+
 rule score_coarse:
     """Score every candidate pose by what the coarse field does not know there, and freeze the scales of the terms."""
     input:

@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures import paint_pages
+from fixtures.browser import served
 from fixtures.bundles import Ground, write_bundle
 from fixtures.land_covers import SIDE, write_cover_bundle
 from fixtures.page_visit import VIEWER, camera_at
 
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
-from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain import endless, stills, visibility
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills
 from dav_gswt.terrain.page import write_page

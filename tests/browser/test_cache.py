@@ -3,10 +3,9 @@
 from collections import Counter
 
 import pytest
+from fixtures.browser import served
 from fixtures.bundles import Ground
 from fixtures.page_visit import VIEWER
-
-from dav_gswt.study.terrain.browser import served
 
 GROUND = Ground(discs=64, levels=3, speckle=20)  # 16 tiles of 4096, 1024 and 256 Gaussians: 2.9 MB
 CACHE = 960e3  # bytes: a third

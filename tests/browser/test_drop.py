@@ -9,6 +9,7 @@ from base64 import b64encode
 import numpy as np
 import pytest
 from fixtures import bundles, paint_pages
+from fixtures.browser import served
 from fixtures.bundles import Ground
 from fixtures.dropped_files import drop, files_of, with_values, zipped
 from fixtures.land_covers import write_cover_bundle
@@ -18,7 +19,6 @@ from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField, rgb_to_sh
-from dav_gswt.study.terrain.browser import served
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 OTHER = Ground(discs=8, salt=99, speckle=20)

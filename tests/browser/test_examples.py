@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures import exits
 from fixtures.bundles import SKY, Ground
 from fixtures.land_covers import cover_content, write_cover_bundle
 from fixtures.page_visit import VIEWER, camera_at
@@ -24,7 +25,6 @@ from dav_gswt.export.axes import Y_DOWN, turn_field
 from dav_gswt.field import read_field
 from dav_gswt.images.metrics import psnr
 from dav_gswt.raster import render
-from dav_gswt.study.terrain import exits
 from dav_gswt.terrain import stills
 from dav_gswt.terrain.finished import terrain_from_page
 from dav_gswt.terrain.heights import Hills

@@ -2,9 +2,9 @@
 
 import pytest
 from fixtures import bundles
+from fixtures.browser import served
 from fixtures.frame_counts import COUNT_CALLS, count_calls
 
-from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.heights import Hills
 
 pytestmark = pytest.mark.slow

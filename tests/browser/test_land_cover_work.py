@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
+from fixtures.browser import served
 from fixtures.land_covers import SIDE, write_cover_bundle
 from fixtures.page_visit import VIEWER
 
-from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page
 

@@ -1,9 +1,8 @@
 """Loading: coarse levels first, nothing from outside, and one readable message where something is wrong."""
 
 import pytest
+from fixtures.browser import served
 from fixtures.bundles import Ground
-
-from dav_gswt.study.terrain.browser import served
 
 
 def test_no_request_leaves_the_page_and_nothing_is_complained_about(visit, plain):

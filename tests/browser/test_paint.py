@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from fixtures.browser import served
 from fixtures.dropped_files import drop
 from fixtures.land_covers import SIDE
 from fixtures.page_visit import VIEWER, camera_at
@@ -12,7 +13,6 @@ from fixtures.paint_pages import ABOVE, BLANK, PIXEL, SPREAD, THINGS, WALKER, is
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.files import read_json
-from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from fixtures import bundles
+from fixtures.browser import served
 from fixtures.bundles import Ground, colour_of
 
-from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.choice import tile_at
 
 SIDE, SALT = Ground().side, Ground().salt

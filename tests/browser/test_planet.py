@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.browser import served
 from fixtures.bundles import SKY, Ground
 from fixtures.page_visit import camera_at
 from fixtures.terrains import two_level_terrain
 
 from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.bundle.store import Bundle
-from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.sphere import make_sphere
 

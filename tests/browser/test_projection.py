@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 from fixtures import bundles
+from fixtures.browser import served
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.bundle import store
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
-from dav_gswt.study.terrain.browser import served
 
 AT, DEVIATION, PAINT = np.array([3.0, 1.0, 0.1]), np.array([0.3, 0.05, 0.02]), np.array([230, 40, 90, 200])
 TURN = np.array([0.96, 0.05, -0.09, 0.26])  # any quaternion

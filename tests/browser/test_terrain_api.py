@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from fixtures import paint_pages
+from fixtures.browser import served
 from fixtures.bundles import Ground, directions
 from fixtures.land_covers import write_cover_bundle
 from fixtures.page_visit import VIEWER, Visit
@@ -12,7 +13,6 @@ from fixtures.page_visit import VIEWER, Visit
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.files import read_json, write_json
-from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.choice import tile_at
 from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page

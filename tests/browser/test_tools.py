@@ -4,9 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from fixtures.browser import served
 from fixtures.bundles import Ground
-
-from dav_gswt.study.terrain.browser import served
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 

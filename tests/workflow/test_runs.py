@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import yaml
+from fixtures.browser import served
 from fixtures.page_visit import Visit
 from fixtures.runs import TINY, USUAL
 from jsonschema import Draft202012Validator
@@ -16,7 +17,6 @@ from dav_gswt.files import digest_files, read_json
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.reconstruction import ground
-from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.stills import SHOTS
 
 CONFIGS = (USUAL, TINY)

@@ -10,25 +10,27 @@ _STRING_OR_COMMENT = re.compile(
     r'''"""(?:\\.|[^\\])*?"""|\'\'\'(?:\\.|[^\\])*?\'\'\'|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'|#[^\n]*''', re.S
 )
 _BLANK = re.compile(r"[ \t]*(?:\n[ \t]*)*\n")
-_IMPORT = re.compile(r"^[ \t]*(?:from (dav_gswt[\w.]*) import (\([^)]*\)|[^\n]*)|import (dav_gswt[\w.]*))", re.M)
+_IMPORT = re.compile(r"^[ \t]*(?:from ([\w.]+) import (\([^)]*\)|[^\n]*)|import ([\w.]+))", re.M)
 
 
 @cache
-def digest_code(script: Path) -> str:
+def digest_code(script: Path, *packages: Path) -> str:
     """Digest of every library file that a script imports, directly or through other library files.
+
+    packages: the folders of the packages whose files count; without any, this library's.
 
     Imports inside functions count, docstrings and comments do not. The C++ sources count where the rasterizer is
     imported. Files are read once a process: a plan asks for each script's digest many times.
     """
-    files: dict[str, Path] = {}
-    found = list(_imported_modules(script))
+    packages, files = packages or (LIBRARY,), dict[str, Path]()
+    found = list(_imported_modules(script, packages))
     while found:
         module = found.pop()
         if module not in files:
-            file = _file_of(module)
+            file = _file_of(module, packages)
             assert file is not None, f"{module}: only modules with a file are ever found"
             files[module] = file
-            found += _imported_modules(file)
+            found += _imported_modules(file, packages)
     digest = sha256("".join(_read_code(files[module]) for module in sorted(files)).encode())
     if "dav_gswt.raster" in files:
         digest.update(_core_sources())
@@ -60,13 +62,15 @@ def _read_code(file: Path) -> str:
 
 
 @cache
-def _imported_modules(file: Path) -> tuple[str, ...]:
+def _imported_modules(file: Path, packages: tuple[Path, ...]) -> tuple[str, ...]:
     """The library modules that a file imports, and the packages that they lie in."""
     found: set[str] = set()
     for origin, names, plain in _IMPORT.findall(file.read_text(encoding="utf-8")):
+        if (plain or origin).partition(".")[0] not in {package.name for package in packages}:
+            continue
         found.update(_parents_of(plain or origin))
         named = re.findall(r"\w+", re.sub(r" as \w+|#.*", "", names))
-        found.update(f"{origin}.{name}" for name in named if _file_of(f"{origin}.{name}"))
+        found.update(f"{origin}.{name}" for name in named if _file_of(f"{origin}.{name}", packages))
     return tuple(sorted(found))
 
 
@@ -76,9 +80,10 @@ def _parents_of(module: str) -> list[str]:
 
 
 @cache
-def _file_of(module: str) -> Path | None:
+def _file_of(module: str, packages: tuple[Path, ...]) -> Path | None:
     """The file of a library module or package; None where the name is none (a function, a compiled module)."""
-    place = LIBRARY.joinpath(*module.split(".")[1:])
+    top, *parts = module.split(".")
+    place = next(package for package in packages if package.name == top).joinpath(*parts)
     files = (place / "__init__.py", place.with_suffix(".py"))
     return next((file for file in files if file.is_file()), None)
 

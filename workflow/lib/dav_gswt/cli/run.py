@@ -20,7 +20,7 @@ from dav_gswt.logs import describe_os_error
 from dav_gswt.paths import encode_branch, stage_folder
 from dav_gswt.raster import backends
 
-CONFIG, STUDY = Path("config/config.yaml"), Path("config/study.yaml")
+CONFIG = Path("config/config.yaml")
 SCENES = Path("config/scenes")
 SMALLER = Path("config/without_compiler.yaml")
 LOGGER = Path("workflow/logger")  # a plugin of Snakemake, found by PYTHONPATH
@@ -56,20 +56,11 @@ def main(arguments: list[str] | None = None) -> int:
 
 def load_config(overlays: list[Path], changes: dict | None = None) -> dict:
     """The config of this folder with all defaults, as the workflow reads it."""
-    _refuse_names_of_the_study(read_config([CONFIG]), read_config([STUDY]))
-    return check_config(add_scene_files(read_config([CONFIG, STUDY, *overlays], changes), SCENES))
-
-
-def _refuse_names_of_the_study(own: dict, study: dict) -> None:
-    """Raises: InputError: an entry of the config has the name of one of the study, which would go before it."""
-    for table, entries in study.items():
-        if isinstance(entries, dict) and isinstance(own.get(table), dict):
-            for name in sorted(entries.keys() & own[table].keys()):
-                raise InputError(f"{CONFIG}: {table}.{name}: {STUDY} has an entry of this name; give yours another")
+    return check_config(add_scene_files(read_config([CONFIG, *overlays], changes), SCENES))
 
 
 def list_presets(overlays: list[Path]) -> list[str]:
-    """Presets for terrains: those of the config, without the study's own."""
+    """Presets for terrains: those of the config."""
     return list(read_config([CONFIG, *overlays])["presets"])
 
 

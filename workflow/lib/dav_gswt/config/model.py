@@ -1,6 +1,6 @@
 """The whole config of the product."""
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -88,7 +88,6 @@ class Config(ConfigModel):
     priors: dict[Name, PriorSettings] = key("diffusion priors", {})
     presets: dict[Name, Preset] = key("speed against accuracy", renamed="qualities", min_length=1)
     tilings: dict[Name, Tiling] = key("how tiles are cut", renamed="seams", min_length=1)
-    study: dict[str, Any] = key("what the study compares: the section Study below", {})
 
     @model_validator(mode="after")
     def _require_known_names(self) -> "Config":

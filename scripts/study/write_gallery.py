@@ -1,9 +1,0 @@
-"""Rule write_gallery: scenes, their verdicts and numbers, and a walk, on a page."""
-
-from dav_gswt.logs import logging_to
-from dav_gswt.study import gallery, markdown
-
-with logging_to(snakemake.log[0]):
-    params = snakemake.params
-    rows = [gallery.tabulate_scene(cell) for cell in params.cells]
-    markdown.write_page(snakemake.output.page, gallery.format_gallery(rows, params.walk, params.seconds))

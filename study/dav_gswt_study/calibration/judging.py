@@ -1,0 +1,111 @@
+"""Collects scores of candidates and the true error there, and compares them with `measures`."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32, Float64
+from numpy import ndarray as Array
+
+from dav_gswt.field import GaussianField, read_field
+from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset
+from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
+from dav_gswt.photos.training_views import TrainingView, read_training_views
+from dav_gswt.photos.view_split import ViewSplit
+from dav_gswt.reconstruction.ground import Ground, read_ground
+from dav_gswt.views import oracle, prior_sampling
+from dav_gswt.views.candidates import Candidates
+from dav_gswt.views.pose_maps import PoseMaps
+from dav_gswt.views.prior_sampling import PriorConfig
+from dav_gswt.views.scores import Scores
+from dav_gswt.views.scoring import PHOTO_WIDTH, build_conditions
+from dav_gswt.views.uncertainty import combine_terms
+from dav_gswt_study.calibration import controls, measures
+
+
+@dataclass(frozen=True)
+class CalibrationTarget:
+    """The field whose scores are compared. taken: the photos so far. size: longer side of the photos of its fit."""
+
+    scene: dict
+    field: GaussianField
+    grid: Ground
+    frame: SceneFrame
+    taken: list[TrainingView]
+    size: int
+
+
+def read_target(given, scene: dict, split: ViewSplit, captures: list[str], size: int) -> CalibrationTarget:
+    """Read the target. given: files `field`, `ground`, `frame`, `images`, `model`. captures: of earlier rounds."""
+    taken = read_training_views(given.images, given.model, split.start, captures, PHOTO_WIDTH)
+    field, grid = read_field(given.field), read_ground(given.ground)
+    return CalibrationTarget(scene, field, grid, read_scene_frame(given.frame), taken, size)
+
+
+def calibrate_scores(
+    judged: CalibrationTarget,
+    some: Candidates,
+    views: list[TrainingView],
+    scored: tuple[Scores, PoseMaps],
+    lam: float,
+    seed: int,
+    prior: PriorConfig | None = None,
+) -> tuple[dict, list[dict]]:
+    """Compare scores with true errors. Returns the content of calibration.json, and a row per candidate.
+
+    some, views: candidates and their true pictures. scored: scores and maps. lam: weight of LPIPS in u. prior: also for
+    the estimates of `controls`.
+    """
+    row = {name: i for i, name in enumerate(scored[0].names)}
+    terms, shown = _select_terms(*scored, [row[pose.name] for pose, _ in some], lam)
+    terms |= geometric_baselines(
+        [pose for pose, _ in some], [pose_of_camera("", v.camera, judged.frame) for v in judged.taken]
+    )
+    if prior is not None and some:
+        given = judged.field, judged.grid, some, judged.taken, judged.frame
+        condition, masks = build_conditions(*given, prior.model.size)
+        others = controls.control_maps(prior, condition)
+        shown |= others
+        # `residual` takes the place of the scores' term: that of samples from other noises, whatever was asked for them
+        terms |= {name: prior_sampling.weighted_mean(m, masks) for name, m in others.items()}
+    corrected = judged.frame.kind == "photos"  # photos differ in exposure
+    error, error_maps = oracle.measure_errors(judged.field, judged.grid, views, judged.size, corrected)
+    table = [
+        {"pose": pose.name, "error": error[i]} | {name: values[i] for name, values in terms.items()}
+        for i, (pose, _) in enumerate(some)
+    ]
+    return measures.summarise(terms, shown, error, error_maps, seed), table
+
+
+def choose_candidates(
+    judged: CalibrationTarget, candidates: Candidates, scored: Scores, given: dict, count: int
+) -> tuple[Candidates, list[TrainingView]]:
+    """Choose candidates, spread over the scored ones. Returns them and their true pictures.
+
+    given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `oracle.write_truth`).
+    """
+    names = set(scored.names)
+    known = [(pose, camera) for pose, camera in candidates if pose.name in names]
+    if given.get("truth"):
+        return oracle.read_truth(known, given["truth"])
+    some = oracle.spread_candidates(known, count)
+    return some, list(oracle.render_truth(judged.scene, some, given["images"]))
+
+
+def geometric_baselines(some: list[Pose], taken: list[Pose]) -> dict[str, Float64[Array, "n"]]:
+    """Baseline scores: `low`, degrees below the zenith, and `far`, distance to the nearest photo."""
+    at, photos = (np.array([pose_offset(pose) for pose in poses]).reshape(-1, 3) for poses in (some, taken))
+    apart = np.linalg.norm(at[:, None] - photos, axis=-1).min(1, initial=np.inf)
+    return {"low": np.array([90.0 - pose.elevation for pose in some]), "far": apart}
+
+
+def _select_terms(
+    scores: Scores, maps: PoseMaps, rows: list[int], lam: float
+) -> tuple[dict[str, Float64[Array, "n"]], dict[str, Float32[Array, "n _ _"]]]:
+    """Terms and maps of some rows; with a prior u is among the terms."""
+    terms = {name: values[rows] for name, values in scores.terms.items()}
+    shown = {"opacity": maps.opacity[rows]}
+    if "w2_sq" in scores.terms:
+        assert maps.w2_sq is not None  # it is written beside the term
+        u = combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
+        terms, shown = terms | {"u": u[rows]}, shown | {"w2_sq": maps.w2_sq[rows]}
+    return terms, shown

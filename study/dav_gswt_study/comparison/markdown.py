@@ -1,0 +1,86 @@
+"""The page about view selection: policies compared over groups of scenes, scene by scene, and with all photos."""
+
+from dav_gswt_study.comparison.tables import EVERY
+from dav_gswt_study.markdown import format_number, format_table
+
+NAMED = {  # measures, and decimals
+    "psnr": ("PSNR, dB", 2),
+    "worst_psnr": ("worst tenth of views, dB", 2),
+    "walker_psnr": ("views at eye level, dB", 2),
+    "lpips": ("LPIPS, lower by", 4),
+}
+ALL_SCENES = "all scenes"
+
+
+def describe_comparison(
+    curves: list[dict], results: list[dict], compared: list[dict], grouped: list[dict], worth: list[dict], baseline: str
+) -> dict:
+    """Values of the page's template.
+
+    curves, results, compared, grouped, worth: rows of `read_curves`, `summarise_cells`, `compare_to_baseline`,
+    `compare_groups` and `check_predictions`.
+    """
+    overall = [row | {"group": ALL_SCENES} for row in compared if row["scene"] == EVERY]
+    every = next((row for row in worth if row["scene"] == EVERY), None)
+    return {
+        "baseline": baseline,
+        "version": curves[0]["version"],
+        "renderer": curves[0]["renderer"],
+        "groups": format_groups(grouped + overall),
+        "scenes": format_scenes(compared, baseline),
+        "ends": format_ends(results),
+        "worth": every,
+    }
+
+
+def format_groups(rows: list[dict]) -> str:
+    """nAUC less the baseline's, a row a group and policy, a column a measure.
+
+    In brackets the 95 % interval, where there is more than one cell. LPIPS is turned over: above 0 is always better.
+    """
+    found = {(row["group"], row["policy"], row["measure"]): row for row in rows}
+    lines = []
+    for group, policy in dict.fromkeys((row["group"], row["policy"]) for row in rows):
+        psnr = found[group, policy, "psnr"]
+        cells = [_format_cell(found.get((group, policy, measure)), places) for measure, (_, places) in NAMED.items()]
+        lines.append([group, f"`{policy}`", psnr["units"], *cells, f"{psnr['wins']}, {psnr['ties']}, {psnr['losses']}"])
+    heads = ["", "policy", "pairs", *(name for name, _ in NAMED.values()), "wins, ties, losses"]
+    return format_table(heads, lines)
+
+
+def format_scenes(compared: list[dict], baseline: str) -> str:
+    """PSNR less the baseline's, a row a scene and k, a column a policy, the best over all scenes first."""
+    psnr = [row for row in compared if row["measure"] == "psnr"]
+    best = sorted((row for row in psnr if row["scene"] == EVERY), key=lambda row: -row["mean"])
+    found = {(row["policy"], row["scene"], row["k"]): row for row in psnr}
+    places = sorted({(row["scene"], row["k"]) for row in psnr} - {(EVERY, "")})
+    lines = [
+        [f"{scene}, {k} a round", *(_format_cell(found.get((row["policy"], scene, k))) for row in best)]
+        for scene, k in places
+    ]
+    return format_table([f"less `{baseline}`, dB", *(f"`{row['policy']}`" for row in best)], lines)
+
+
+def format_ends(results: list[dict]) -> str:
+    """Where each policy ends, means over starts: PSNR, LPIPS, dB under all photos where these were fitted."""
+    lines = []
+    for scene, policy, k in dict.fromkeys((row["scene"], row["policy"], row["k"]) for row in results):
+        mine = [row for row in results if (row["scene"], row["policy"], row["k"]) == (scene, policy, k)]
+        means = [
+            _average(mine, key, digits) for key, digits in (("psnr", 2), ("walker_psnr", 2), ("lpips", 3), ("gap", 2))
+        ]
+        lines.append([scene, f"`{policy}`", len(mine), mine[0]["photos"], *means])
+    heads = ["scene", "policy", "starts", "photos", "PSNR, dB", "at eye level", "LPIPS", "under all photos, dB"]
+    return format_table(heads, lines)
+
+
+def _average(rows: list[dict], key: str, digits: int) -> str:
+    values = [row[key] for row in rows if row[key] is not None]
+    return format_number(sum(values) / len(values), digits) if values else ""
+
+
+def _format_cell(row: dict | None, places: int = 2) -> str:
+    if row is None:
+        return ""
+    mean, low, high = (None if row[key] is None else f"{row[key]:+.{places}f}" for key in ("mean", "low", "high"))
+    return f"{mean}" if low is None else f"{mean} ({low}, {high})"

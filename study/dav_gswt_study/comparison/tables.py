@@ -1,0 +1,154 @@
+"""From curves to results: a row a cell, and every policy less the baseline, paired, with intervals."""
+
+from dataclasses import asdict
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt_study.comparison.curves import CELL
+from dav_gswt_study.comparison.stats import nauc, photos_to_reach
+from dav_gswt_study.statistics import adjust_holm, bootstrap_paired
+
+EVERYTHING = "all"  # the policy that takes the whole pool: what there is to reach, and no curve
+EVERY = "every"  # scene, in the rows over all of them
+UNIT = ("scene", "preset", "seed", "k")
+JUDGED = {"psnr": 1, "worst_psnr": 1, "walker_psnr": 1, "lpips": -1}  # measures of curves: 1 where more is better
+
+
+def summarise_cells(curves: list[dict]) -> list[dict]:
+    """A row a cell: nAUC, PSNR and the other measures of its last round, photos to reach WAY of all, cost.
+
+    gap: dB under all photos; empty, as `to_reach`, where all were not tried or were not reached.
+    """
+    best = {unit[:3]: rounds[-1]["psnr"] for unit, policy, rounds in _group_cells(curves) if policy[0] == EVERYTHING}
+    table = []
+    for unit, policy, rounds in _group_cells(curves):
+        if policy[0] == EVERYTHING:
+            continue
+        photos, psnr = (np.array([row[key] for row in rounds], float) for key in ("photos", "psnr"))
+        goal, last = best.get(unit[:3]), rounds[-1]
+        row = {key: last[key] for key in CELL} | {"photos": last["photos"], "nauc": nauc(photos, psnr)}
+        row |= {key: last[key] for key in ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")}
+        row |= {f"nauc_{key}": _area(photos, rounds, key) for key in JUDGED if key != "psnr"}
+        row |= {"gap": None if goal is None else goal - last["psnr"]}
+        row |= {"to_reach": None if goal is None else photos_to_reach(photos, psnr, goal)}
+        seconds = [r["seconds"] for r in rounds[1:]]
+        row |= {"seconds": None if None in seconds else sum(seconds)}
+        table.append(row | {"evaluations": sum(r["evaluations"] for r in rounds)})
+    return table
+
+
+def compare_to_baseline(table: list[dict], baseline: str) -> list[dict]:
+    """Every policy less the baseline by the nAUC of each measure of JUDGED: over all scenes, and of each scene and k
+    alone. A difference above 0 is better, of LPIPS too.
+
+    Cells are paired by scene, preset, seed, k and the photos that they end with. holm: p values over all scenes,
+    raised by how many policies were compared. One cell alone has neither interval nor p.
+    """
+    units = [(*(row[key] for key in UNIT), row["photos"]) for row in table]
+    rows = []
+    for measure, sign in JUDGED.items():
+        column = "nauc" if measure == "psnr" else f"nauc_{measure}"
+        cells = {
+            (unit, _policy_key(row)): sign * row[column]
+            for unit, row in zip(units, table, strict=True)
+            if row[column] is not None
+        }
+        rows += [{"measure": measure} | row for row in _compare_cells(cells, baseline)]
+    return rows
+
+
+def compare_groups(table: list[dict], baseline: str, groups: dict[str, str]) -> list[dict]:
+    """Every policy less the baseline over the scenes of each group. groups: the group of each scene; others have none.
+
+    A row as of `compare_to_baseline`, with `group` for the scene; groups in the order of `groups`.
+    """
+    found = []
+    for group in dict.fromkeys(groups.values()):
+        mine = [row for row in table if groups.get(row["scene"]) == group]
+        rows = compare_to_baseline(mine, baseline) if any(row["policy"] == baseline for row in mine) else []
+        found += [row | {"group": group} for row in rows if row["scene"] == EVERY]
+    return found
+
+
+def _compare_cells(cells: dict[tuple, float], baseline: str) -> list[dict]:
+    """Every policy less the baseline, by one measure."""
+    base = {unit: value for (unit, policy), value in cells.items() if policy[0] == baseline}
+    rows = []
+    for policy in sorted({policy for _, policy in cells if policy[0] != baseline}):
+        pairs = {unit: cells[unit, policy] - base[unit] for unit in sorted(base) if (unit, policy) in cells}
+        if not pairs:
+            continue
+        rows.append(_comparison_row(policy, EVERY, "", pairs))
+        for scene, k in sorted({(unit[0], unit[3]) for unit in pairs}):
+            rows.append(
+                _comparison_row(policy, scene, k, {u: v for u, v in pairs.items() if (u[0], u[3]) == (scene, k)})
+            )
+    raised = adjust_holm(
+        {" ".join(_policy_key(row)): row["p"] for row in rows if row["scene"] == EVERY and row["p"] is not None}
+    )
+    return [row | {"holm": raised.get(" ".join(_policy_key(row))) if row["scene"] == EVERY else None} for row in rows]
+
+
+def _area(photos: Float[Array, "t"], rounds: list[dict], measure: str) -> float | None:
+    """The nAUC of a measure; None where a round lacks it."""
+    values = [row[measure] for row in rounds]
+    return None if None in values else nauc(photos, np.array(values, float))
+
+
+def check_predictions(curves: list[dict]) -> list[dict]:
+    """Compare gains of rounds with their predictions (`marginal_gain`), over all scenes and for each.
+
+    share: of the gap that closes, what test views gained (geometric mean), off: standard deviation of its logarithm,
+    both over rounds that gained something; covered: share of all rounds whose gain lies in the interval.
+    """
+    checked: dict[str, list[tuple[dict, float]]] = {}
+    for _, policy, rounds in _group_cells(curves):
+        for before, row in pairwise(rounds):
+            if row["expected"] is not None and policy[0] != EVERYTHING:
+                gained = row["psnr"] - before["psnr"]
+                for name in (EVERY, row["scene"]):
+                    checked.setdefault(name, []).append((row, gained))
+    return [
+        {"scene": name} | _summarise_predictions(found)
+        for name, found in sorted(checked.items(), key=lambda i: i[0] != EVERY)
+    ]
+
+
+def _summarise_predictions(found: list[tuple[dict, float]]) -> dict:
+    logs = np.array([np.log(gain / row["closes"]) for row, gain in found if gain > 0 and row["closes"] > 0])
+    inside = [row["expected_low"] <= gain <= row["expected_high"] for row, gain in found]
+    return {
+        "rounds": len(found),
+        "gained": float(np.mean([gain for _, gain in found])),
+        "expected": float(np.mean([row["expected"] for row, _ in found])),
+        "apart": float(np.mean([abs(gain - row["expected"]) for row, gain in found])),
+        "covered": float(np.mean(inside)),
+        "share": float(np.exp(logs.mean())) if len(logs) else None,
+        "off": float(logs.std(ddof=1)) if len(logs) > 1 else None,
+    }
+
+
+def _comparison_row(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tuple, float]) -> dict:
+    by_scene: dict[str, list[float]] = {}
+    for unit, value in pairs.items():
+        by_scene.setdefault(unit[0], []).append(value)
+    found = asdict(bootstrap_paired({name: np.array(values) for name, values in by_scene.items()}))
+    if len(pairs) < 2:  # nothing tells how far another cell would be from this one
+        found |= dict.fromkeys(("low", "high", "p"))
+    named = dict(zip(("policy", "prior", "p_drop", "lam"), policy, strict=True))
+    return named | {"scene": scene, "k": k, "units": len(pairs)} | found
+
+
+def _policy_key(row: dict) -> tuple[str, ...]:
+    return tuple(str(row[key]) for key in ("policy", "prior", "p_drop", "lam"))
+
+
+def _group_cells(curves: list[dict]):
+    """Unit, policy and rounds of every cell that has at least two rounds."""
+    cells: dict[tuple, list[dict]] = {}
+    for row in sorted(curves, key=lambda row: row["round"]):
+        cells.setdefault((tuple(row[key] for key in UNIT), _policy_key(row)), []).append(row)
+    return [(unit, policy, rounds) for (unit, policy), rounds in sorted(cells.items()) if len(rounds) > 1]

@@ -1,0 +1,110 @@
+"""The page docs/gallery.md: each scene as photographed and as terrain, its verdict and numbers, and a walk."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt.bundle import level_distances
+from dav_gswt.files import atomic_file, read_json
+from dav_gswt.images import image_files
+from dav_gswt.images.jpeg import encode_jpeg
+from dav_gswt.materials.store import read_report
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.page_front import name_of_scene
+from dav_gswt_study.comparison.curves import select_metrics
+from dav_gswt_study.cover import crop_and_shrink
+from dav_gswt_study.markdown import format_number, format_table
+from dav_gswt_study.sweeps.tables import MEGA
+
+HEIGHT, GAP = 300, 4  # pixels: of a row of pictures, and between two of them
+ASPECTS = (4 / 3, 1.0, 16 / 9)  # of a photo, the terrain from above, what a walker sees
+QUALITY, WALK_QUALITY = 82, 55
+WALK, PICTURE = "docs/figures/walk.webp", "docs/figures/gallery_{scene}.jpg"
+
+
+def draw_scene(photo: Path | str, above: Path | str, walker: Path | str, out: Path | str) -> None:
+    """Write a photo, the terrain from above and as a walker sees it side by side, as a JPEG."""
+    parts: list[Float[Array, "_ _ 3"]] = []
+    for path, aspect in zip((photo, above, walker), ASPECTS, strict=True):
+        image = image_files.read_photo(path)
+        parts += [crop_and_shrink(image, round(HEIGHT * aspect), HEIGHT), np.ones((HEIGHT, GAP, 3))]
+    with atomic_file(out) as part:
+        part.write_bytes(encode_jpeg(np.concatenate(parts[:-1], 1), QUALITY))
+
+
+def suit_width(terrain: EndlessTerrain, width: int) -> EndlessTerrain:
+    """The terrain with levels that begin where they do in pictures of the reference's width: nearer in smaller ones."""
+    factor = min(1.0, width / level_distances.WIDTH)
+    scaled = ([factor * value for value in values] for values in (terrain.switches, terrain.bands))
+    return replace(terrain, **dict(zip(("switches", "bands"), scaled, strict=True)))
+
+
+def animate_frames(frames: Sequence[Path | str], rate: int, out: Path | str) -> None:
+    """Write pictures one after the other as an endless WebP. rate: frames a second.
+
+    Raises: ValueError: no frame.
+    """
+    from PIL import Image  # here, not above: Pillow loads its plugins
+
+    if not frames:
+        raise ValueError("an animation needs a frame")
+    first, *others = (Image.open(path).convert("RGB") for path in frames)
+    options = {"duration": round(1000 / rate), "loop": 0, "quality": WALK_QUALITY, "method": 4}
+    with atomic_file(out) as part:
+        first.save(part, format="WEBP", save_all=True, append_images=others, **options)
+
+
+def tabulate_scene(cell: dict) -> dict:
+    """A scene's numbers and verdict.
+
+    cell: `scene`, `kind` of the config, the paths `metrics` and `manifest`, and the folder `materials`, None where the
+    scene's ground was taken as one.
+    """
+    metrics, manifest = read_json(cell["metrics"]), read_json(cell["manifest"])
+    real = cell["kind"] == "photos"
+    found = select_metrics(metrics, "psnr_colour_corrected" if real else "psnr")
+    chunks = [chunk for piece in manifest["tiles"] + (manifest.get("objects") or []) for chunk in piece["chunks"]]
+    row = {"scene": cell["scene"], "real": real, "photos": metrics["photos"], "gaussians": metrics["gaussians"]}
+    row |= {key: found[key] for key in ("psnr", "ssim", "lpips")}
+    row |= {"bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA, "version": metrics["provenance"]["version"]}
+    verdict = read_report(cell["materials"]).verdict if cell["materials"] else None
+    return row | {"grade": verdict and verdict.grade, "reason": verdict and verdict.reason}
+
+
+def format_gallery(rows: list[dict], walk: str, seconds: float) -> str:
+    """The page. rows: of `tabulate_scene`; walk: the scene that is walked over, seconds: for so long."""
+    head = ["scene", "photos", "PSNR (dB)", "SSIM", "LPIPS", "Gaussians", "bundle (MB)"]
+    parts = [
+        "# Gallery",
+        f"Made by `snakemake gallery_page` with version {rows[0]['version']}; do not edit. Every scene as the config "
+        "has it: start photos, two rounds of further ones, materials, tiles. Left: a photo. Middle: the terrain from "
+        "above. Right: as a walker sees it.",
+        f"![A walk of {seconds:.0f} seconds over the terrain of {walk}]({_link(WALK)})",
+        f"*{seconds:.0f} seconds over {name_of_scene(walk)}, rendered by the library.*",
+    ]
+    for row in rows:
+        name = name_of_scene(row["scene"])
+        made = f"{row['photos']} {'photos' if row['real'] else 'rendered photos of synthetic ground'}"
+        verdict = f" Verdict on its ground: *{row['grade']}*: {row['reason']}." if row["grade"] else ""
+        picture = f"![{name}: a photo, from above, as a walker]({_link(PICTURE.format(scene=row['scene']))})"
+        parts += [f"## {name}", picture, f"Made from {made}.{verdict}"]
+    parts += [
+        "## In numbers",
+        "Test photos, which no fit saw, at the size that the preset fits; PSNR of real ones after their exposure is "
+        "fitted. What presets cost is in [a table of its own](research/results/presets.md).",
+        format_table(head, [_format_row(row) for row in rows]),
+    ]
+    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+
+
+def _format_row(row: dict) -> list[str]:
+    numbers = [format_number(row[key], digits) for key, digits in (("psnr", 2), ("ssim", 3), ("lpips", 3))]
+    return [row["scene"], str(row["photos"]), *numbers, str(row["gaussians"]), f"{row['bundle_mb']:.1f}"]
+
+
+def _link(path: str) -> str:
+    return path.removeprefix("docs/")

@@ -1,0 +1,57 @@
+"""The tables of study/docs/results/materials.md, from the tables of study/docs/data."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from dav_gswt_study.csv_tables import read_table
+from dav_gswt_study.markdown import format_table
+
+ACCURACY = ("iou_sand", "iou_meadow", "iou_boulders", "iou_path")
+REPETITION = ("brightness", "landmarks", "busyness", "mean_tile", "next")
+
+
+def describe_materials(tables: Mapping[str, Path | str]) -> dict[str, str]:
+    """What the page's template is filled with: Markdown by the name of each table.
+
+    tables: the files `materials`, `lattice`, `transitions` and `verdicts`.
+    """
+    made = {"materials": _describe_accuracy, "lattice": _describe_repetition, "transitions": _describe_borders}
+    made |= {"verdicts": _describe_verdict}
+    heads = {
+        "materials": ["scene", "sand", "meadow", "boulders", "path", "**mean IoU**", "true objects", "found", "wrong"]
+        + ["precision", "recall", "**F1**"],
+        "lattice": ["scene", "materials", "objects", "excess of brightness", "of landmarks", "busyness", "mean tile"]
+        + ["next"],
+        "transitions": ["scene", "terrain", "photographed", "difference", "interval", "inside", "crops"],
+        "verdicts": ["scene", "of", "share", "objects", "verdict"],
+    }
+    return {name: format_table(heads[name], map(describe, read_table(tables[name]))) for name, describe in made.items()}
+
+
+def _describe_accuracy(row: dict[str, str]) -> Sequence[str]:
+    ious, rates = _round(row, ACCURACY, 2), _round(row, ("precision", "recall", "f1"), 2)
+    return [row["scene"], *ious, *_round(row, ["mean_iou"]), row["objects"], row["found"], row["wrong"], *rates]
+
+
+def _describe_repetition(row: dict[str, str]) -> Sequence[str]:
+    alone = "" if row["of"] == "all" else f", {row['of']} alone"
+    return [row["scene"] + alone, row["materials"], row["objects"], *_round(row, REPETITION)]
+
+
+def _describe_borders(row: dict[str, str]) -> Sequence[str]:
+    if not row["difference"]:  # one material: no border
+        return [row["scene"], *["no border"] * 3, "", "", "0, 0"]
+    low, high = _round(row, ("low", "high"))
+    crops = f"{row['terrain_crops']}, {row['photographed_crops']}"
+    found = _round(row, ("terrain", "photographed", "difference"))
+    return [row["scene"], *found, f"({low}, {high})", *_round(row, ["inside"]), crops]
+
+
+def _describe_verdict(row: dict[str, str]) -> Sequence[str]:
+    return [row["scene"], row["of"], *_round(row, ["share"], 2), row["objects"], f"{row['grade']}: {row['reason']}"]
+
+
+def _round(row: dict[str, str], names: Iterable[str], digits: int = 3) -> list[str]:
+    """Numbers without the 0 before the point."""
+    return [re.sub(r"^(-?)0\.", r"\1.", f"{float(row[name]):.{digits}f}") for name in names]

@@ -1,0 +1,148 @@
+"""A tile set placed as terrain, beside its exemplar: which patch covers every ground cell.
+
+A patch in the terrain is the whole exemplar, moved so that its cell (x, y) comes to the terrain's cell origin + (x, y).
+Both halves of a strip have the same origin, so across a border nothing changes.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray as Array
+
+from dav_gswt.bundle import direction_search
+from dav_gswt.bundle.build import BundleOptions, describe_tiles
+from dav_gswt.bundle.content import BundleContent
+from dav_gswt.field import GaussianField
+from dav_gswt.terrain import endless
+from dav_gswt.terrain.choice import tiles_in
+from dav_gswt.tiles import build, layout, trends
+from dav_gswt.tiles.layout import Exemplar, Layout
+from dav_gswt_study.seams.spatial_index import SpatialIndex
+
+WINDOW = 8  # tiles a side of the terrain that crops are taken from, around its origin
+REACH = 16  # radius of the terrain, in tile sides
+MEAN_RADIUS = 4  # cells on each side over which the height at a point is averaged
+
+
+@dataclass(frozen=True)
+class DetrendedExemplar:
+    """The exemplar of a tile set at every level, without its trend; `ground`: mean colour and height of its cells."""
+
+    exemplar: Exemplar
+    levels: list[SpatialIndex]
+    ground: Float[Array, "m m 4"]
+
+
+@dataclass(frozen=True)
+class PlacedTiles:
+    """A tile set as terrain. tiles: by (level, number). eye_floor: lowest eye height. colour: of the far ground.
+
+    Maps of the window's cells, row 0 in the south; cell (0, 0) of the terrain is at [-first, -first]. patch: a number
+    for each patch and place, an index into `origins`. tile: number of the tile. label: of the cell in it.
+    correction: change of a tile's cells against the exemplar (colour, height); NaN if unknown.
+    """
+
+    source: DetrendedExemplar
+    plan: Layout
+    terrain: endless.EndlessTerrain
+    tiles: dict[tuple[int, int], SpatialIndex]
+    eye_floor: float
+    colour: list[float]
+    first: int
+    patch: Int[Array, "w w"]
+    tile: Int[Array, "w w"]
+    label: Int[Array, "w w"]
+    origins: Int[Array, "patches 2"]
+    correction: Float[Array, "tiles n n 4"]
+
+    @property
+    def spacing(self) -> float:
+        return self.source.exemplar.spacing
+
+    @cached_property
+    def relief(self) -> Float[Array, "w w"]:
+        """Height of the tiles' own ground in every cell of the window; NaN where it is unknown."""
+        y, x = np.mgrid[self.first : self.first + len(self.patch), self.first : self.first + len(self.patch)]
+        column, row = np.moveaxis(np.stack([x, y], -1) - self.origins[self.patch], -1, 0)
+        n = self.plan.side
+        return self.source.ground[row, column, 3] + self.correction[self.tile, y % n, x % n, 3]
+
+    def mean_height(self, at: tuple[int, int]) -> float:
+        """Mean height of the tiles' own ground around a corner of finest cells; 0 where it is unknown."""
+        x, y = (slice(max(v - self.first - MEAN_RADIUS, 0), v - self.first + MEAN_RADIUS) for v in at)
+        near = self.relief[y, x]
+        known = near[np.isfinite(near)]
+        return float(known.mean()) if len(known) else 0.0
+
+    @cached_property
+    def corners(self) -> Int[Array, "n 3"]:
+        """Corners (x, y) of cells where patches meet in one tile, and whether a centre is one of them."""
+        n, patches = self.plan.side, _corner_cells(self.patch)
+        y, x = np.nonzero((patches != patches[0]).any(0))
+        keep = ((x + 1) % n != 0) & ((y + 1) % n != 0)
+        x, y = x[keep], y[keep]
+        return np.stack([x + 1, y + 1, (_corner_cells(self.label)[:, y, x] == layout.CENTRE).any(0)], 1)
+
+
+def detrend_exemplar(
+    levels: list[GaussianField], exemplar: Exemplar, colour: Float[Array, "m m 3"], width: float
+) -> DetrendedExemplar:
+    """The exemplar as `build.cut_tiles` uses it. colour: NaN for holes. width: of the low-pass, in cells."""
+    _, height = build.compute_ground_maps(levels[0], exemplar)
+    trend = trends.fit_trend(colour, height, exemplar, width)
+    flat = [trends.remove_trend(field, trend) for field in levels]
+    corner = np.array([exemplar.west, exemplar.south, 0], np.float32)
+    home = replace(exemplar, west=0.0, south=0.0)
+    flat = [replace(field, means=field.means - corner) for field in flat]
+    return DetrendedExemplar(home, [SpatialIndex.from_field(field) for field in flat], _mean_cells(flat[0], home))
+
+
+def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau: float) -> PlacedTiles:
+    """The tile set on level ground, placed as its bundle of this tau does. Gaussians are not quantised, since the
+    patches of the exemplar that they are compared with are not either.
+    """
+    options = BundleOptions(tau=tau, salt=salt)
+    rings = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels).rings
+    manifest = describe_tiles(BundleContent.of_one_material(tiles), options, rings)
+    terrain = replace(endless.terrain_from_fields(tiles.fields, manifest, {"kind": "flat"}), reach=REACH)
+    plan = tiles.report.layout
+    first = -(WINDOW // 2)
+    numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)
+    n = plan.side
+    label = np.block([[tiles.labels[t] for t in row] for row in numbers]).astype(int)
+    tile = np.kron(numbers, np.ones((n, n), int))
+    cell = n * (np.arange(WINDOW) + first).repeat(n)  # of the tiles' south-western corners
+    origin = np.stack(np.meshgrid(cell, cell), -1) - tiles.shifts[tile, label]
+    origins, patch = np.unique(origin.reshape(-1, 2), axis=0, return_inverse=True)
+    return PlacedTiles(
+        source,
+        plan,
+        terrain,
+        {key: SpatialIndex.from_field(field) for key, field in terrain.tiles.items()},
+        manifest.eye_floor,
+        manifest.ground_colour,
+        first * n,
+        patch.reshape(label.shape),
+        tile,
+        label,
+        origins,
+        np.stack([_measure_correction(tiles, source, number) for number in range(len(tiles.labels))]),
+    )
+
+
+def _corner_cells(cells: Int[Array, "w w"]) -> Int[Array, "4 v v"]:
+    """The four cells around each inner corner."""
+    return np.stack([cells[:-1, :-1], cells[:-1, 1:], cells[1:, :-1], cells[1:, 1:]])
+
+
+def _measure_correction(tiles: build.TileSet, source: DetrendedExemplar, number: int) -> Float[Array, "n n 4"]:
+    labels, shift = tiles.labels[number], tiles.shifts[number]
+    own = _mean_cells(tiles.fields[0][number], Exemplar(0.0, 0.0, tiles.spacing, len(labels)))
+    return own - source.ground[layout.source_cells(labels, shift)]
+
+
+def _mean_cells(field: GaussianField, cells: Exemplar) -> Float[Array, "m m 4"]:
+    colour, height = build.compute_ground_maps(field, cells)
+    return np.concatenate([colour, height[..., None]], -1)

@@ -1,0 +1,111 @@
+"""Render crops of the terrain, or of the exemplar in its place, as stills are rendered, from visible Gaussians alone.
+
+Cells are blended back to front, each in its pre-sorted order; those around the eye are sorted together. A patch alone
+has the order of the cell under the crop's middle, so pre-sorting affects both pictures alike.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Float32
+from numpy import ndarray as Array
+
+from dav_gswt.bundle.manifest import Sky
+from dav_gswt.field import SH0, GaussianField
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.terrain import draw_order, placement, splats, visibility
+from dav_gswt.terrain.backdrop import Backdrop
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt_study.seams.spatial_index import Footprint, SpatialIndex
+
+SKY = Sky([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])  # crops see none
+
+Recolouring = Callable[
+    [GaussianField, Float[Array, "3"]], Float32[Array, "n 3"]
+]  # colours of Gaussians counted from the eye
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The Gaussians of a cell of the terrain, by level. corner: their origin; direction: of their pre-sorted order;
+    close: whether the cell is around the eye.
+    """
+
+    parts: dict[int, GaussianField]
+    corner: Float[Array, "3"]
+    direction: Float[Array, "3"]
+    close: bool
+    cell: tuple[int, int]
+
+
+def collect_pieces(
+    terrain: EndlessTerrain, camera: Camera, footprint: Footprint, tiles: dict[tuple[int, int], SpatialIndex]
+) -> list[Piece]:
+    """What may be visible of the terrain, cell by cell from back to front. tiles: by (level, tile number)."""
+    eye, side, pieces = camera.centre, terrain.side, []
+    cells = visibility.visible_cells(terrain, camera)
+    active = visibility.active_levels(terrain, cells)
+    for k in range(len(cells)):
+        i, j, tile = int(cells.i[k]), int(cells.j[k]), int(cells.tile[k])
+        corner = np.array([i * side, j * side, 0.0])
+        parts = {int(level): tiles[int(level), tile].query(footprint, corner) for level in np.flatnonzero(active[:, k])}
+        if any(len(part) for part in parts.values()):
+            direction = placement.cell_direction(terrain, i, j, tile, eye)
+            pieces.append(Piece(parts, corner, direction, bool(cells.close[k]), (i, j)))
+    return pieces
+
+
+def describe_cell(terrain: EndlessTerrain, eye: Float[Array, "3"], cell: tuple[int, int]) -> Piece:
+    """The piece of a cell without its Gaussians, of the levels that it is drawn with."""
+    i, j = (np.array([v], np.int64) for v in cell)
+    tile, materials = visibility.choose_tiles(terrain, i, j)
+    at = (int(np.floor(eye[0] / terrain.side)), int(np.floor(eye[1] / terrain.side)))
+    close = draw_order.in_near_block(i, j, at)
+    cells = visibility.GridCells(i, j, tile, materials, close, *visibility.measure_distances(terrain, i, j, eye))
+    levels = np.flatnonzero(visibility.active_levels(terrain, cells)[:, 0]).tolist()
+    parts = {level: terrain.tiles[level, int(tile[0])][:0] for level in levels}
+    direction = placement.cell_direction(terrain, *cell, int(tile[0]), eye)
+    return Piece(parts, np.array([*cell, 0.0]) * terrain.side, direction, bool(close[0]), cell)
+
+
+def make_patch_piece(
+    levels: list[SpatialIndex],
+    corner: Float[Array, "3"],
+    template: Piece,
+    correction: Float[Array, "4"],
+    footprint: Footprint,
+) -> Piece:
+    """The visible part of the exemplar with its corner there, the correction added to all colours and heights."""
+    parts = {}
+    for level in template.parts:
+        part = levels[min(level, len(levels) - 1)].query(footprint, corner)  # coarser ones are the tiles' own
+        sh = part.sh.copy()
+        sh[:, 0] += (correction[:3] / SH0).astype(np.float32)
+        parts[level] = replace(part, sh=sh)
+    return replace(template, parts=parts, corner=corner + [0, 0, correction[3]])
+
+
+def render_pieces(
+    terrain: EndlessTerrain, pieces: list[Piece], camera: Camera, ground, recolourings: Sequence[Recolouring] = ()
+) -> list[Float32[Array, "h w 3"]]:
+    """The picture of pieces, given back to front, and the same over black in the colours of each recolouring.
+
+    ground: colour of the far ground.
+    """
+    eye, here = camera.centre, replace(camera, translation=np.zeros(3))
+    behind = Backdrop.for_eye(terrain, eye, SKY, ground)
+    parts = []  # of each piece: its splats, their colours by every recolouring, whether it is close
+    for piece in pieces:
+        field, slope = placement.place_gaussians(terrain, piece.parts, piece.corner, piece.direction, eye)
+        part, indices = splats.project_indexed(behind.blend_far(field), slope, here, terrain.near)
+        parts.append((part, [recolour(field, eye)[indices] for recolour in recolourings], piece.close))
+    parts.sort(key=lambda each: each[2])  # close pieces come last
+    ordered = splats.concatenate_splats([splats.EMPTY, *(part for part, _, _ in parts)])
+    first = sum(len(part) for part, _, close in parts if not close)
+    order = np.concatenate([np.arange(first), first + splats.depth_order(ordered[first:])])
+    ordered = ordered[order]
+    footprint = splats.blend(ordered, here)
+    picture = np.clip(footprint.colour + (1 - footprint.alpha)[..., None] * behind.colours_along(here.rays()[1]), 0, 1)
+    recoloured = (np.concatenate([own[k] for _, own, _ in parts])[order] for k in range(len(recolourings)))
+    return [picture, *(splats.blend(replace(ordered, colours=own), here).colour for own in recoloured)]

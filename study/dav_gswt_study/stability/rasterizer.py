@@ -1,0 +1,262 @@
+"""Checks of the rasterizer in use against the float64 oracle, at the extremes of its inputs."""
+
+import numpy as np
+from fixtures.raster_scenes import random_cloud
+from numpy import ndarray as Array
+
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.raster import Rasterizer, harmonics
+from dav_gswt_study.stability.formula import FLOAT32, Case, Check
+
+SIDE = 24
+PINHOLE = cameras.pinhole((0.3, -4.0, 1.5), (0.0, 0.0, 0.0), SIDE, SIDE, 60.0)
+MAP = cameras.top_down(-2.0, -2.0, SIDE, SIDE, 4 / SIDE, 5.0)
+AHEAD = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, SIDE / 2, SIDE / 2, SIDE, SIDE)
+VIEWS = (("pinhole", PINHOLE), ("map", MAP))
+RIM = 1 / 255  # step of alpha where a splat ends
+Arrays = dict[str, Array]
+PARAMETERS = ("means", "log_scales", "quats", "opacity_logits", "colours")  # of Gaussians, in the oracle's order
+
+
+def render(arrays: Arrays, camera: Camera, near: float = 0.01, antialiased: bool = False) -> Array:
+    """Colour and alpha."""
+    seen = Rasterizer(near=near, antialiased=antialiased).forward(**arrays, camera=camera)
+    return np.concatenate([seen.colour, seen.alpha[..., None]], -1)
+
+
+def render_reference(arrays: Arrays, camera: Camera, near: float = 0.01, antialiased: bool = False) -> Array:
+    import torch
+
+    from dav_gswt.raster import oracle
+
+    gaussians = (torch.tensor(arrays[name], dtype=torch.float64) for name in PARAMETERS)
+    means, log_scales, quats, opacity_logits, colours = gaussians
+    colour, alpha, _ = oracle.forward(
+        means, log_scales, quats, opacity_logits, colours, camera, near=near, antialiased=antialiased
+    )
+    return torch.cat([colour, alpha[..., None]], -1).numpy()
+
+
+def in_all_views(at: str, arrays: Arrays) -> list[Case]:
+    return [
+        Case(f"{at}, {view}{', antialiased' * smooth}", (arrays, camera, 0.01, smooth))
+        for view, camera in VIEWS
+        for smooth in (False, True)
+    ]
+
+
+def scaled_cloud(*scales: float) -> Arrays:
+    """A cloud of 40 Gaussians with these scales, of small opacity so that none hides the others."""
+    return random_cloud(40, log_scales=np.tile(np.log(scales), (40, 1)), opacity_logits=np.full(40, -1.0))
+
+
+def _cloud_cases() -> list[Case]:
+    return in_all_views("a cloud of 200", random_cloud(200))
+
+
+def _near_plane_cases() -> list[Case]:
+    cases = []
+    for near in (1e-3, 1.0, 10.0):
+        for share in (-1.0, 0.0, 1e-8, 0.99, 1.0, 1.01):
+            z = float(np.float32(near) * np.float32(share))
+            one = random_cloud(
+                1, means=[[0, 0, z]], log_scales=np.full((1, 3), np.log(0.1 * near)), opacity_logits=[1.0]
+            )
+            cases.append(Case(f"depth {share:g} of near {near:g}", (one, AHEAD, float(np.float32(near)), False)))
+    return cases
+
+
+def _scale_cases() -> list[Case]:
+    return [
+        p for s in (1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6) for p in in_all_views(f"scale {s:g}", scaled_cloud(s, s, s))
+    ]
+
+
+def _needle_cases() -> list[Case]:
+    shapes = (1e3, 1e-3, 1e-3), (1.0, 1e-6, 1e-6), (1e6, 1.0, 1.0), (1e6, 1e-12, 1e-12)
+    return [p for shape in shapes for p in in_all_views(f"needles {shape[0]:g} x {shape[1]:g}", scaled_cloud(*shape))]
+
+
+def _opacity_cases() -> list[Case]:
+    logits = (-1e4, -100.0, -5.55, 0.0, 4.5, 17.0, 100.0, 1e4)
+    return [p for x in logits for p in in_all_views(f"logit {x:g}", random_cloud(60, opacity_logits=np.full(60, x)))]
+
+
+def _quaternion_cases() -> list[Case]:
+    quats = random_cloud(60)["quats"]
+    sizes = (1e-30, 1e-12, -1.0, 7.0, 1e12, 1e30)
+    return [
+        p
+        for s in sizes
+        for p in in_all_views(f"quaternions times {s:g}", random_cloud(60, quats=quats * np.float32(s)))
+    ]
+
+
+def _render_unit_reference(arrays: Arrays, *how) -> Array:
+    quats = arrays["quats"].astype(np.float64)
+    unit = quats / np.linalg.norm(quats / np.abs(quats).max(), axis=1, keepdims=True) / np.abs(quats).max()
+    return render_reference(arrays | {"quats": unit}, *how)
+
+
+def _tie_cases() -> list[Case]:
+    means = random_cloud(60)["means"]
+    means[:, 2] = 0.5
+    return [Case("60 at one depth, map", (random_cloud(60, means=means), MAP, 0.01, False))]
+
+
+def _orbit_cases() -> list[Case]:
+    cases = []
+    for elevation in (90.0, -90.0, 0.0, 45.0):
+        for azimuth in (0.0, 360.0, 359.999999):
+            e, a = np.radians(elevation), np.radians(azimuth)
+            eye = 4 * np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+            camera = cameras.pinhole(eye, (0.0, 0.0, 0.0), SIDE, SIDE, 60.0)
+            cases.append(
+                Case(f"elevation {elevation:g}, azimuth {azimuth:g}", (random_cloud(100), camera, 0.01, False))
+            )
+    return cases
+
+
+def _white_cases() -> list[Case]:
+    white = np.ones((200, 3))
+    shapes = {
+        "a cloud": random_cloud(200, colours=white),
+        "needles": scaled_cloud(1e6, 1e-6, 1e-6) | {"colours": white[:40]},
+    }
+    return [Case(f"{name}, {view}", (arrays, camera)) for name, arrays in shapes.items() for view, camera in VIEWS]
+
+
+def _render_over_white(arrays: Arrays, camera: Camera) -> Array:
+    """White Gaussians over white: absorbed plus transmitted light."""
+    seen = Rasterizer().forward(**{k: np.ascontiguousarray(v, np.float32) for k, v in arrays.items()}, camera=camera)
+    return seen.colour + (1 - seen.alpha)[..., None]
+
+
+def _gradient_cases() -> list[Case]:
+    """Axes of different lengths: the rotation of a sphere has gradient 0, and errors relative to it mean nothing."""
+    shapes = {f"scales about {s:g}": scaled_cloud(s, 0.5 * s, 2 * s) for s in (1e-12, 1e-6, 1e-3, 1.0, 1e3, 1e6)}
+    shapes["a cloud"] = random_cloud(60)
+    return [Case(f"{name}, {view}", (arrays, camera)) for name, arrays in shapes.items() for view, camera in VIEWS]
+
+
+def _gradients(arrays: Arrays, camera: Camera) -> Array:
+    raster = Rasterizer()
+    raster.forward(**arrays, camera=camera)
+    cases = raster.backward(_output_gradient())
+    return np.concatenate([_divide_by_norm(getattr(cases, name), arrays, camera, name) for name in arrays])
+
+
+def _divide_by_norm(values: Array, arrays: Arrays, camera: Camera, name: str) -> Array:
+    """Gradient of a parameter over its norm."""
+    length = np.linalg.norm(_oracle_gradients(arrays, camera)[name])
+    return np.ravel(values).astype(np.float64) / (length if length > 0 else 1.0)
+
+
+def _gradients_reference(arrays: Arrays, camera: Camera) -> Array:
+    return np.concatenate(
+        [_divide_by_norm(g, arrays, camera, name) for name, g in _oracle_gradients(arrays, camera).items()]
+    )
+
+
+def _oracle_gradients(arrays: Arrays, camera: Camera) -> Arrays:
+    import torch
+
+    from dav_gswt.raster import oracle
+
+    leaves = [torch.tensor(arrays[name], dtype=torch.float64, requires_grad=True) for name in PARAMETERS]
+    means, log_scales, quats, opacity_logits, colours = leaves
+    colour, _, _ = oracle.forward(means, log_scales, quats, opacity_logits, colours, camera)
+    loss = (colour * torch.from_numpy(_output_gradient()).double()).sum()
+    return {name: g.numpy() for name, g in zip(PARAMETERS, torch.autograd.grad(loss, leaves), strict=True)}
+
+
+def _output_gradient() -> Array:
+    return np.random.default_rng(1).standard_normal((SIDE, SIDE, 3)).astype(np.float32)
+
+
+def _weight_cases() -> list[Case]:
+    return [Case(view, (random_cloud(60), camera)) for view, camera in VIEWS]
+
+
+def _sum_weights(arrays: Arrays, camera: Camera) -> Array:
+    raster = Rasterizer()
+    raster.forward(**arrays, camera=camera)
+    return raster.contributions().total
+
+
+def _sum_weights_reference(arrays: Arrays, camera: Camera) -> Array:
+    import torch
+
+    from dav_gswt.raster import oracle
+
+    gaussians = (torch.tensor(arrays[name], dtype=torch.float64) for name in PARAMETERS)
+    means, log_scales, quats, opacity_logits, colours = gaussians
+    view = oracle.move_camera(camera, None, means)
+    splats = oracle.project(means, log_scales, quats, opacity_logits, colours, camera, view)
+    x, y = np.meshgrid(np.arange(SIDE) + 0.5, np.arange(SIDE) + 0.5)
+    found = np.zeros(len(arrays["means"]))
+    found[splats.index] = oracle.weights(splats, torch.from_numpy(np.stack([x.ravel(), y.ravel()], 1))).sum(0)
+    return found
+
+
+def _harmonic_cases() -> list[Case]:
+    rng = np.random.default_rng(0)
+    along = np.concatenate([np.eye(3), -np.eye(3), rng.standard_normal((60, 3))])
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return [
+        Case(
+            f"coefficients of {size:g}, degree {k**0.5 - 1:g}",
+            (rng.standard_normal((66, k, 3)).astype(np.float32) * np.float32(size), along),
+        )
+        for size in (1e-12, 1.0, 1e6)
+        for k in (1, 4, 9, 16)
+    ]
+
+
+def _harmonic_reference(sh: Array, along: Array) -> Array:
+    import torch
+
+    from dav_gswt.raster import oracle
+
+    basis = oracle.basis(torch.from_numpy(along), sh.shape[1]).numpy()
+    return np.maximum(0.5 + (basis[:, :, None] * sh.astype(np.float64)).sum(1), 0) / _largest_coefficient(sh)
+
+
+def _largest_coefficient(sh: Array) -> float:
+    """The largest coefficient, at least 1: the unit of errors of colours."""
+    return max(1.0, float(np.abs(sh).max()))
+
+
+def _harmonic(sh: Array, along: Array) -> Array:
+    return harmonics.colours(sh, along.astype(np.float32)) / _largest_coefficient(sh)
+
+
+STEEP = 2e-2
+AT_RIM = 3 * RIM
+CHECKS = [
+    Check("a usual picture", _cloud_cases, render, render_reference, absolute=2e-5),
+    Check("near plane", _near_plane_cases, render, render_reference, absolute=2e-5),
+    Check("scales", _scale_cases, render, render_reference, absolute=AT_RIM),
+    Check("needles", _needle_cases, render, render_reference, absolute=STEEP),
+    Check("opacity 0 and 1", _opacity_cases, render, render_reference, absolute=AT_RIM),
+    Check("quaternions of any length and sign", _quaternion_cases, render, _render_unit_reference, absolute=AT_RIM),
+    Check("equal depths, by index", _tie_cases, render, render_reference, absolute=AT_RIM),
+    Check("all around", _orbit_cases, render, render_reference, absolute=AT_RIM),
+    Check(
+        "alpha and what is left make 1",
+        _white_cases,
+        _render_over_white,
+        lambda arrays, camera: np.ones((SIDE, SIDE, 3)),
+        absolute=5e-6,
+    ),
+    Check("gradients, each over its length", _gradient_cases, _gradients, _gradients_reference, absolute=1e-3),
+    Check("pixels that show a Gaussian", _weight_cases, _sum_weights, _sum_weights_reference, absolute=1e-3),
+    Check(
+        "spherical harmonics, over the largest coefficient",
+        _harmonic_cases,
+        _harmonic,
+        _harmonic_reference,
+        absolute=FLOAT32,
+    ),
+]

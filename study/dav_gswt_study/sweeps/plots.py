@@ -1,0 +1,105 @@
+"""The figure of a sweep: a panel a measure over what is varied; where rounds are too, PSNR against photos as well."""
+
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt.images import figures
+from dav_gswt_study.sweeps.grid import EVERYTHING
+
+PANELS = {
+    "psnr": "PSNR of test views (dB)",
+    "worst_psnr": "PSNR, worst tenth (dB)",
+    "lpips": "LPIPS of test views",
+    "seam_lpips": "Seam-LPIPS over its floor",
+    "seam_density": "cuts through strong gradients",
+    "uncertainty": "mean uncertainty of tiles",
+    "orders": "pre-sorted orders",
+    "bundle_mb": "bundle (MB)",
+    "score_s": "scoring a round (s)",
+    "recon_s": "reconstruction (s)",
+    "cut_s": "cutting tiles (s)",
+    "stills_s": "three stills (s)",
+    "peak_mb": "peak memory (MB)",
+}
+COLUMNS, WIDE, TALL = 3, 3.3, 2.5  # inches a panel
+LONG = 8  # letters of a name, above which names lie askew
+
+
+def write_figure(path: Path | str, name: str, axes: list[str], rows: list[dict]) -> None:
+    """The figure of `draw_figure`, as a PNG."""
+    figures.save_figure(draw_figure(name, axes, rows), path)
+
+
+def draw_figure(name: str, axes: list[str], rows: list[dict]):
+    """A line a scene: means over seeds, and a dot a seed. name: of the sweep; axes: what is varied, as the config names
+    it. Of two axes the last value of the second is shown, but for curves of PSNR against photos, a line a value of the
+    first."""
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    curves = scenes if "rounds" in axes[1:] else []
+    last = [row for row in rows if len(axes) < 2 or row["varied_1"] == _last(rows, row["varied_0"])]
+    shown = [key for key in PANELS if any(row[key] is not None for row in last)]
+    count = len(curves) + len(shown)
+    figure = figures.make_figure(WIDE * min(COLUMNS, count), TALL * -(-count // COLUMNS) + 0.5)
+    grid = figure.subplots(-(-count // COLUMNS), min(COLUMNS, count), squeeze=False).ravel()
+    for panel, scene in zip(grid, curves, strict=False):
+        _draw_curves(panel, [row for row in rows if row["scene"] == scene])
+        panel.set_title(scene, fontsize=9, loc="left")
+    for panel, key in zip(grid[len(curves) :], shown, strict=False):
+        _draw_panel(panel, axes[0], key, last, scenes)
+    for empty in grid[count:]:
+        empty.axis("off")
+    key = grid[len(curves)].get_legend_handles_labels()
+    figure.legend(*key, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    figure.suptitle(f"sweep {name}", fontsize=10)
+    if curves:
+        grid[0].legend(frameon=False, fontsize=7)
+    return figure
+
+
+def _last(rows: list[dict], value: str) -> str:
+    """The last value of the second axis that the first one's value comes with."""
+    return [row["varied_1"] for row in rows if row["varied_0"] == value][-1]
+
+
+def _draw_panel(panel, axis: str, key: str, rows: list[dict], scenes: list[str]) -> None:
+    values = list(dict.fromkeys(row["varied_0"] for row in rows))
+    for scene, colour in zip(scenes, figures.OKABE_ITO * len(scenes), strict=False):
+        found = {v: [r[key] for r in rows if (r["scene"], r["varied_0"]) == (scene, v)] for v in values}
+        known = {v: [x for x in each if x is not None] for v, each in found.items()}
+        at = [i for i, v in enumerate(values) if known[v]]
+        means = [float(np.mean(known[values[i]])) for i in at]
+        line = 1.2 if all(map(_is_number, values)) else 0  # between names there is nothing
+        panel.plot(at, means, marker="_", markersize=14, markeredgewidth=2, color=colour, linewidth=line, label=scene)
+        for i in at:
+            panel.plot([i] * len(known[values[i]]), known[values[i]], "o", color=colour, markersize=3.5, alpha=0.6)
+    askew = {"rotation": 30, "ha": "right"} if max(map(len, values)) > LONG else {}
+    panel.set_xticks(range(len(values)), values, fontsize=8, **askew)
+    panel.set_xlim(-0.5, len(values) - 0.5)
+    panel.set_xlabel(axis, fontsize=9)
+    _label_axes(panel, PANELS[key])
+
+
+def _is_number(text: str) -> bool:
+    return text.replace(".", "", 1).isdigit()
+
+
+def _draw_curves(panel, rows: list[dict]) -> None:
+    for value, colour in zip(
+        dict.fromkeys(row["varied_0"] for row in rows), figures.OKABE_ITO * len(rows), strict=False
+    ):
+        mine = [row for row in rows if row["varied_0"] == value and row["psnr"] is not None]
+        photos = sorted({row["photos"] for row in mine})
+        means = [float(np.mean([row["psnr"] for row in mine if row["photos"] == n])) for n in photos]
+        if value == EVERYTHING:  # what there is to reach, and no curve
+            panel.axhline(means[-1], color="0.6", linewidth=1.2, linestyle=":", label=f"all {photos[-1]:.0f} photos")
+        else:
+            panel.plot(photos, means, marker="o", markersize=3.5, linewidth=1.4, color=colour, label=value)
+    panel.set_xlabel("photos", fontsize=9)
+    _label_axes(panel, PANELS["psnr"])
+
+
+def _label_axes(panel, label: str) -> None:
+    panel.set_ylabel(label, fontsize=9)
+    panel.tick_params(labelsize=8)
+    panel.grid(alpha=0.3)

@@ -1,0 +1,373 @@
+"""Experiments: what the study's tables and figures are made from, each with its settings and its files."""
+
+from itertools import product
+
+from dav_gswt.paths import encode_number
+from dav_gswt_study.seams import replicates
+from dav_gswt_study.sweeps import grid
+from dav_gswt_study.tables.checks import sweeps_of
+from dav_gswt_study.tradeoff import settings
+
+TABLES = ("timing", "lod", "sensitivity", "ablation")
+FRAMES = "results/tables/viewer.csv"
+FLAT = config | STUDY  # the study's tables beside the product's
+
+
+def viewer_times(wildcards):
+    """What a browser measured of bundles, where the config's `study.tables.viewer` asks for it."""
+    return {"viewer": FRAMES} if STUDY["tables"]["viewer"] else {}
+
+
+def plain_tiling(wildcards):
+    """The entry of `tilings` that a tiling is made of."""
+    return replicates.split_tiling(wildcards.tiling)[0]
+
+
+def made_of(scene):
+    """The wildcards of what is made of a scene with the config's first seed."""
+    return branch(scene) | {"seed": config["seeds"][0]}
+
+
+def measured_of_tiles(made, entry="lod"):
+    """The tables of levels, orders or frames that are gathered: the path of each one's, and what tells it from the others."""
+    found = {}
+    asked = STUDY[entry]
+    keys = ("scene", "seed", "preset", "tiling") + (("tau",) if "tau" in made.output.table else ())
+    for scene in asked["scenes"]:
+        chosen = experiment_branch(scene, asked["fixed"]) if "fixed" in asked else branch(scene)
+        for seed in asked.get("seeds", config["seeds"]):
+            values = chosen | {"seed": seed}
+            (path,) = expand(made.output.table, **values)
+            found[path] = {key: values[key] for key in keys}
+    return found
+
+
+def calibrations():
+    """The cells that are compared: the path of each one's calibration.json, and what tells it from the others."""
+    asked, found = STUDY["calibration"], {}
+    for scene in asked["scenes"]:
+        values = branch(scene, asked["policy"])
+        for seed in config["seeds"]:
+            for t in range(asked["rounds"] + 1):
+                made = rules.calibrate_round if t else rules.calibrate_coarse
+                (path,) = expand(made.output.found, **(values | {"seed": seed, "t": t}))
+                cell = {key: values[key] for key in ("scene", "preset", "policy", "prior", "p_drop")}
+                found[path] = cell | {"seed": seed, "round": t}
+    return found
+
+
+def benchmark_experiments():
+    """The cells of the config's `benchmark`: what tells each from the others, and the files that tell of its rounds."""
+    asked, cells = STUDY["view_benchmark"], []
+    for group in asked["sets"]:
+        for scene, policy, seed, k in product(
+            group["scenes"], group.get("policies", asked["policies"]), group.get("seeds", asked["seeds"]), group["k"]
+        ):
+            policy = {"policy": policy} if isinstance(policy, str) else policy
+            if policy["policy"] != "all" or k == group["k"][0]:  # all of the pool is one round, whatever k is
+                cells.append(benchmark_experiment(scene, policy, seed, k, group))
+    return cells
+
+
+def benchmark_experiment(scene, asked, seed, k, group):
+    """One of them: rounds of k from the scene's start until there are as many photos as the set asks for."""
+    entry, policy = config["scenes"][scene], asked["policy"]
+    rounds = 1 if policy == "all" else (group["photos"] - entry["start"]) // k
+    own = {
+        key: asked[key] if key == "prior" else encode_number(asked[key])
+        for key in ("prior", "p_drop", "lam")
+        if key in asked
+    }
+    preset = {key: group[key] for key in ("preset",) if key in group}
+    values = branch(scene, policy, preset) | own | {"seed": seed, "k": k, "stop": ""}
+    chosen, before, after = values_of_choice(values), range(1, rounds), range(1, rounds + 1)
+
+    def of(first, later, ts, wildcards=values):
+        return expand(first, **wildcards) + expand(later, **(wildcards | {"t": ts}))
+
+    jobs = [of(rules.score_coarse.benchmark, rules.score_round.benchmark, before, chosen)]
+    of_round = (rules.select_poses, rules.capture_views, rules.update_field)
+    jobs += [of([], job.benchmark, after, chosen) for job in of_round]
+    jobs += [of([], rules.fit_chosen_photos.benchmark, after)] * (chosen != values)
+    prior = config["priors"].get(values["prior"], {"samples": 0})
+    return {key: values[key] for key in ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")} | {
+        "corrected": entry["kind"] == "photos",
+        "samples": prior["samples"],
+        "metrics": of(rules.evaluate_coarse.output.metrics, rules.evaluate_round.output.metrics, after),
+        "facts": of(rules.score_coarse.output.facts, rules.score_round.output.facts, before),
+        "times": [list(of_round) for of_round in zip(*jobs, strict=True)],
+    }
+
+
+def seam_branch(scene, variant=None):
+    """The wildcards of a scene's tiles as they are measured: cut as its own entry says, or as another one."""
+    values = branch(scene)
+    return values | ({"tiling": variant} if variant else {})
+
+
+def seam_experiments():
+    """What tells each cell from the others, and its files; a scene's own seam is always among its variants, each drawn
+    as often as is asked for."""
+    asked, cells = STUDY["seams"], []
+    for scene in asked["scenes"]:
+        own = config["scenes"][scene]["tiling"]
+        variants = [
+            (variant, name, number)
+            for variant in dict.fromkeys([*asked["tilings"], own])
+            for number, name in enumerate(replicates.list_replicates(variant, own, asked))
+        ]
+        for (variant, entry, number), seed in product(variants, config["seeds"]):
+            values = seam_branch(scene, entry) | {"seed": seed}
+            files = {"table": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts}
+            files |= {} if number else {"repeats": rules.measure_repetition.output.table}
+            (cell,) = [{name: expand(path, **values)[0] for name, path in files.items()}]
+            about = {key: values[key] for key in ("scene", "seed", "preset")}
+            cells.append(about | {"variant": variant, "replicate": number} | cell)
+    return cells
+
+
+def seam_pictures():
+    """What rule draw_grid draws of each scene, in the order of its shots."""
+    drawn = list(rules.render_grid.output.pictures)
+    return {scene: expand(drawn, **seam_branch(scene)) for scene in STUDY["seams"]["scenes"]}
+
+
+def compared_tilings():
+    """The entries of `seams` that are compared, by name: of other sizes, tiles have no place in common."""
+    names = dict.fromkeys(name for pair in STUDY["forced_choice"]["pairs"] for name in pair)
+    found = {name: config["tilings"][replicates.split_tiling(name)[0]] for name in names if name != FLOOR}
+    if len({tuple(entry[key] for key in ("tile", "strip", "variants")) for entry in found.values()}) > 1:
+        raise WorkflowError(
+            "config: study.forced_choice.pairs: tilings of other `tile`, `strip` or `variants` have no place in common; "
+            f"name such that are only cut in other ways ({', '.join(found)} are not)"
+        )
+    return found
+
+
+def pair_inputs(wildcards):
+    """A scene's levels, its tiles of each seam, LPIPS's weights where they are."""
+    values = seam_branch(wildcards.scene) | {"seed": config["seeds"][0]}
+    made, names = rules.cut_tiles.output, list(compared_tilings())
+    found = {"levels": expand(rules.make_levels.output.levels, **values)[0]}
+    found |= {"seams": expand(made.seams, **(values | {"tiling": names}))}
+    found |= {"tiles": expand(made.tiles, **(values | {"tiling": names}))}
+    return found | lpips_weights(wildcards)
+
+
+def saved_answers(wildcards):
+    """The files of answers, where there are any yet."""
+    folder = Path(STUDY["forced_choice"]["answers"])
+    found = sorted(str(p) for p in folder.glob("*.json") if p.is_file() and not p.name.startswith("."))
+    return {"answers": found} if found else {}
+
+
+def sweep_experiments(name):
+    """The cells of a row of the config's `sweeps`: what tells each from the others, what it varied, and its files."""
+    asked, cells = STUDY["sweeps"][name], {}
+    for chosen in grid.list_combinations(asked["vary"], asked.get("fixed", {})):
+        for scene, seed in product(asked["scenes"], grid.list_seeds(asked["measure"])):
+            values = experiment_branch(scene, chosen) | {"seed": seed}
+            measured = [key for key, seeds in asked["measure"].items() if seed in seeds]
+            cell = sweep_experiment(values, measured) | {"sweep": name, "varied": chosen["shown"]}
+            cells.setdefault(tuple(cell[key] for key in grid.CELL), cell)
+    return list(cells.values())
+
+
+def experiment_branch(scene, chosen):
+    """The wildcards of a cell of settings of its own, which stops nowhere before its last round and paints nothing."""
+    entry, over = config["scenes"][scene], {key: value for key, value in chosen.items() if key != "shown"}
+    asked = config | over
+    rounds = grid.count_rounds(over, asked["policy"], grid.count_start_photos(entry), asked["k"], asked["rounds"])
+    return branch(scene, changes=over | {"rounds": rounds}) | {"stop": "", "inpainted": ""}
+
+
+def benchmark_fits(values):
+    """The benchmarks of the refits of all rounds; where these are another preset's, that of the fit to all photos, too."""
+    chosen = values_of_choice(values)
+    refits = expand(rules.update_field.benchmark, **(chosen | {"t": range(1, values["t"] + 1)}))
+    return refits + (expand(rules.fit_chosen_photos.benchmark, **values) if chosen != values else [])
+
+
+def sweep_experiment(values, measured):
+    """One of them. measured: keys of `measure` that hold for it."""
+    rounds, scene = values["t"], config["scenes"][values["scene"]]
+
+    def of(found, ts=None):
+        return expand(found, **(values if ts is None else values | {"t": list(ts)}))
+
+    tested = rules.evaluate_round if rounds else rules.evaluate_coarse
+    files = {
+        "views": {"metrics": tested.output.metrics},
+        "tiles": {"manifest": rules.bundle_tiles.output.manifest},
+        "seams": {"crops": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts},
+        "stills": {"still": rules.render_terrain.output.stills[0]},
+    }
+    chosen = values_of_choice(values)
+
+    def of_choice(job, ts):
+        return expand(job.benchmark, **(chosen | {"t": list(ts)}))
+
+    times = {"coarse": of_choice(rules.fit_coarse, [rounds]), "update": benchmark_fits(values)}
+    times["score"] = of_choice(rules.score_coarse, [rounds]) if rounds else []
+    times["score"] += of_choice(rules.score_round, range(1, rounds))
+    for key, job in (("select", rules.select_poses), ("capture", rules.capture_views)):
+        times[key] = of_choice(job, range(1, rounds + 1))
+    if {"tiles", "seams", "stills"} & set(measured):
+        times |= {"levels": of(rules.make_levels.benchmark), "cut": of(rules.cut_tiles.benchmark)}
+    times |= {"bundle": of(rules.bundle_tiles.benchmark)} if {"tiles", "stills"} & set(measured) else {}
+    times |= {"stills": of(rules.render_terrain.benchmark)} if "stills" in measured else {}
+    prior = config["priors"].get(values["prior"], {"samples": 0, "steps": 0})
+    cell = {key: values[key] for key in grid.CELL if key != "rounds"} | {"rounds": rounds}
+    return cell | {
+        "corrected": scene["kind"] == "photos",
+        "samples": prior["samples"],
+        "steps": prior["steps"],
+        "files": {key: of(path)[0] for part in measured for key, path in files[part].items()},
+        "times": times,
+    }
+
+
+def tradeoff_experiments():
+    """A cell for every setting of every knob, each knob's most accurate first."""
+    asked, size = STUDY["tradeoff"], settings.find_test_size(FLAT)
+    return [
+        {"knob": s.knob, "setting": s.shown, "most": s.most, "base": s.base, "measure": s.measure}
+        | tradeoff_experiment(asked["scene"], asked["seed"], s.chosen, size, s.measure)
+        for s in settings.list_settings(FLAT)
+    ]
+
+
+def tradeoff_experiment(scene, seed, chosen, size, measure):
+    """One of them. size: of the photos that all are tested on, whatever they were fitted to."""
+    values = experiment_branch(scene, chosen) | {"seed": seed}
+    cell = sweep_experiment(values, ["views", "tiles", measure])
+    (metrics,) = expand(rules.evaluate_at.output.metrics, size=size, **values)
+    return cell | {
+        "sweep": "tradeoff",
+        "varied": {},
+        "files": cell["files"] | {"metrics": metrics},
+        "stills": expand(rules.render_terrain.output.stills, **values) if measure == "stills" else [],
+    }
+
+
+def files_of(cells):
+    """Everything that cells are read from, but for benchmarks."""
+    return [path for cell in cells for path in [*cell["files"].values(), *cell["stills"]]]
+
+
+def walk_settings(wildcards):
+    """A params function: what of the config's `frames` a walk is measured by, whichever the scene."""
+    return {key: STUDY["frames"][key] for key in ("heights", "flight", "width", "height", "budgets")}
+
+
+def swept(table):
+    """An input function: the sweeps that one of the study's tables is made from."""
+    return lambda wildcards: [f"results/sweeps/{name}.csv" for name in STUDY["tables"][table]]
+
+
+def setting_of(sweep):
+    """What a sweep varies."""
+    return next(iter(STUDY["sweeps"][sweep]["vary"]))
+
+
+def default_of(sweep):
+    """The value that a setting has where it is not varied, as tables write it."""
+    return str(config.get(setting_of(sweep), ""))
+
+
+def estimator_branch(scene, policy):
+    """The wildcards of what the study's figures show of a scene after a policy chose."""
+    asked = STUDY["tables"]["figures"]
+    return experiment_branch(scene, {"policy": policy, "rounds": asked["rounds"]}) | {"seed": asked["seed"]}
+
+
+def of_estimators(output):
+    """An input function: a file of each estimator that the study's figure shows."""
+    return lambda wildcards: [
+        expand(output, **estimator_branch(wildcards.scene, policy))[0]
+        for policy in STUDY["tables"]["figures"]["estimators"]
+    ]
+
+
+def figure_files():
+    """The paper's figures: the path of each, by its name in docs/figures; they are of scenes, seed and policy of `study`."""
+    asked, found = STUDY["tables"]["figures"], {}
+    for scene in asked["scenes"]:
+        values = estimator_branch(scene, asked["policy"])
+        shown = {
+            "sphere": rules.plot_sphere.output.plot,
+            "evolution": rules.plot_evolution.output.plot,
+            "estimators": rules.plot_estimators.output.plot,
+            "cuts": rules.plot_cuts.output.plot,
+            "uncertainty": rules.plot_tile_uncertainty.output.plot,
+        }
+        found |= {f"{name}_{scene}": expand(path, **values)[0] for name, path in shown.items()}
+    return found | {"budget": "results/sweeps/budget.png"}
+
+
+def terrain_sheets():
+    """The stills of the terrain of each scene that the study's figures show."""
+    asked = STUDY["tables"]["figures"]
+    return [
+        path
+        for scene in asked["scenes"]
+        for path in expand(rules.make_contact_sheet.output.sheet, **estimator_branch(scene, asked["policy"]))
+    ]
+
+
+def kept_suffix(name):
+    """The ending of a figure of the study in docs/figures: those of photos are a fifth as large as JPEGs."""
+    return ".jpg" if name.startswith(("evolution", "estimators", "cuts")) else ".png"
+
+
+def captions():
+    """What the figures of the study show, in their order."""
+    about = {
+        "sphere": "candidates by what scores said of them, and what was chosen",
+        "evolution": "two test views after the first rounds",
+        "estimators": "test views after as many photos, chosen by each estimator",
+        "cuts": "cuts by colours and by what the ground is",
+        "uncertainty": "uncertainty of tiles, and a walk over them",
+    }
+    return [
+        f"{name.partition('_')[2]}: {about[name.partition('_')[0]]}" if "_" in name else "quality against photos"
+        for name in figure_files()
+    ]
+
+
+def true_candidates(wildcards):
+    """What candidates truly show, where it is rendered; a replayed scene has its photos."""
+    if config["scenes"][wildcards.scene].get("agent") != "render":
+        return {}
+    return {"truth": "<results>/<photos>/candidates"}
+
+
+def refining_prior(wildcards):
+    """The weights of the prior that repairs cuts."""
+    return {"weights": terrain_weights(STUDY["refine"]["prior"])}
+
+
+def deciding_scores(wildcards):
+    """The scores that rounds 1 to t chose by: those that the round before left."""
+    return ["<results>/<scored>/scores.csv", *(f"{round_folder(t)}/scores.csv" for t in range(1, int(wildcards.t)))]
+
+
+def poses_until(wildcards):
+    """The poses that rounds 1 to t chose."""
+    return [f"{round_folder(t)}/poses.json" for t in range(1, int(wildcards.t) + 1)]
+
+
+def figure_rounds(wildcards):
+    """The rounds of the evolution figure: none, the first, and round t."""
+    return sorted({0, 1, int(wildcards.t)})
+
+
+def in_figure_rounds(file):
+    """An input function: a file as each round of the evolution figure left it."""
+    return lambda wildcards: [f"{round_folder(t)}/{file}" for t in figure_rounds(wildcards)]
+
+
+def first_start(wildcards, table):
+    """The view split of a scene of a study's table, by the first of its seeds."""
+    seed = STUDY[table][wildcards.scene]["seeds"][0]
+    return str(paths.stage_folder("start", {"scene": wildcards.scene, "seed": seed}) / "views.json")

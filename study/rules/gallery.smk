@@ -1,0 +1,103 @@
+"""What terrains look like: docs/gallery.md, a picture of each scene, and a walk. `snakemake gallery_page`.
+
+In: photos, stills, metrics, materials and bundles of the scenes of the config's `study.gallery`. Out: docs/gallery.md,
+docs/figures/gallery_{scene}.jpg, docs/figures/walk.webp, and beside the terrain of the walk its frames.
+"""
+
+
+rule draw_scene:
+    """A photo, the terrain from above, and what a walker sees, side by side."""
+    input:
+        images=lambda wildcards: expand(rules.register_photos.output.images, scene=wildcards.shown),
+        views=lambda wildcards: expand(rules.split_views.output.views, **made_of(wildcards.shown)),
+        stills=lambda wildcards: expand(rules.render_terrain.output.stills, **made_of(wildcards.shown)),
+    output:
+        picture="docs/figures/gallery_{shown}.jpg",
+    log:
+        "<logs>/figures/gallery_{shown}.log",
+    benchmark:
+        "<benchmarks>/figures/gallery_{shown}.tsv"
+    params:
+        source=code_of_study("draw_scene"),
+    script:
+        "../scripts/draw_scene.py"
+
+
+rule render_walk:
+    """A walk over the terrain, frame by frame."""
+    input:
+        unpack(height_map),
+        unpack(class_pictures),
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
+    output:
+        frames=directory("<results>/<terrain>/walk"),
+    log:
+        "<logs>/<terrain>/render_walk.log",
+    benchmark:
+        "<benchmarks>/<terrain>/render_walk.tsv"
+    threads: 2
+    resources:
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("4h"),
+    params:
+        size={key: GALLERY.get(key) for key in ("width", "height")},
+        heights=lookup(dpath="heights", within=config),
+        classes=lookup(dpath="classes", within=config),
+        flight=GALLERY.get("flight"),
+        schema=BUNDLE_SCHEMA,
+        source=code_of_study("render_walk"),
+    script:
+        "../scripts/render_walk.py"
+
+
+rule draw_walk:
+    """The walk as one moving picture."""
+    input:
+        frames=lambda wildcards: expand(rules.render_walk.output.frames, **made_of(GALLERY["walk"])),
+    output:
+        picture="docs/figures/walk.webp",
+    log:
+        "<logs>/figures/draw_walk.log",
+    benchmark:
+        "<benchmarks>/figures/draw_walk.tsv"
+    resources:
+        mem_mb=per_attempt(3000),
+    params:
+        rate=GALLERY["rate"],
+        source=code_of_study("draw_walk"),
+    script:
+        "../scripts/draw_walk.py"
+
+
+rule write_gallery:
+    """Scenes, their verdicts and numbers, and a walk, on a page."""
+    input:
+        expand(rules.draw_scene.output.picture, shown=GALLERY["scenes"]),
+        rules.draw_walk.output.picture,
+        lambda wildcards: [
+            cell[key] for cell in gallery_cells() for key in ("metrics", "manifest", "materials") if cell[key]
+        ],
+    output:
+        page="docs/gallery.md",
+    log:
+        "<logs>/figures/write_gallery.log",
+    benchmark:
+        "<benchmarks>/figures/write_gallery.tsv"
+    params:
+        cells=lambda wildcards: gallery_cells(),
+        walk=GALLERY["walk"],
+        seconds=GALLERY.get("flight", {}).get("frames", 0) / GALLERY["rate"],
+        source=code_of_study("write_gallery"),
+    script:
+        "../scripts/write_gallery.py"
+
+
+rule gallery_page:
+    """The gallery of the docs."""
+    input:
+        rules.write_gallery.output.page,
+
+
+localrules:
+    gallery_page,

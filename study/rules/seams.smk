@@ -1,0 +1,174 @@
+"""Seams: can anybody find the borders and the cuts, and does the terrain repeat? `snakemake seams`.
+
+In: levels and tiles. Out, per experiment (a scene, a seed, a tiling): crops.csv, facts.json, repetition.csv; of each scene's
+own tiling 20 x 20 tiles from above and walking, flat and hilly. Gathered: results/tables/seams.csv (every crop),
+seam_summary.csv, seam_ablation.csv and repetition.csv, the last three also in study/docs/data; the page
+study/docs/results/seams.md.
+"""
+
+
+rule measure_seams:
+    """Crops on borders and cuts of each material, beside the same of uncut patches and of tiles cut straight."""
+    input:
+        unpack(lambda wildcards: lpips_weights()),
+        levels="<results>/<levels>",
+        seams="<results>/<tiles>/seams.json",
+        tiles="<results>/<tiles>/tiles",
+    output:
+        crops="<results>/<seams>/crops.csv",
+        facts="<results>/<seams>/facts.json",
+    log:
+        "<logs>/<seams>/measure_seams.log",
+    benchmark:
+        "<benchmarks>/<seams>/measure_seams.tsv"
+    priority: -1  # after all jobs of two threads: between them one core would stand idle
+    threads: 1  # crops are small: two cells beside each other take half the time
+    resources:
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("20m"),
+    params:
+        tiling=lambda wildcards: config["tilings"][plain_tiling(wildcards)],
+        seed=integer("seed"),
+        tau=real("tau"),
+        source=code_of_study("measure_seams"),
+    script:
+        "../scripts/measure_seams.py"
+
+
+rule measure_repetition:
+    """Autocorrelation of a large top view and of the exemplar."""
+    input:
+        levels="<results>/<levels>",
+        seams="<results>/<tiles>/seams.json",
+        tiles="<results>/<tiles>/tiles",
+    output:
+        table="<results>/<seams>/repetition.csv",
+        plot="<results>/<seams>/repetition.png",
+    log:
+        "<logs>/<seams>/measure_repetition.log",
+    benchmark:
+        "<benchmarks>/<seams>/measure_repetition.tsv"
+    threads: 2
+    resources:
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("10m"),
+    params:
+        tiling=lambda wildcards: config["tilings"][plain_tiling(wildcards)],
+        seed=integer("seed"),
+        source=code_of_study("measure_repetition"),
+    script:
+        "../scripts/measure_repetition.py"
+
+
+rule render_grid:
+    """Twenty by twenty tiles, from above and at a walker's height: is there a grid?"""
+    input:
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
+    output:
+        pictures=expand(
+            "<results>/<seams>/{shot}_{surface}.png",
+            shot=["grid", "walker"],
+            surface=["flat", "hilly"],
+            allow_missing=True,
+        ),
+    log:
+        "<logs>/<seams>/render_grid.log",
+    benchmark:
+        "<benchmarks>/<seams>/render_grid.tsv"
+    priority: -1
+    threads: 1  # most of it places Gaussians, one cell after another
+    resources:
+        mem_mb=per_attempt(6000),
+        runtime=per_attempt("20m"),
+    params:
+        size=lookup(dpath="stills", within=config),
+        schema=BUNDLE_SCHEMA,
+        source=code_of_study("render_grid"),
+    script:
+        "../scripts/render_grid.py"
+
+
+rule gather_seams:
+    """Every crop of every cell in one table; what follows from them, added to what earlier runs found."""
+    input:
+        measured=lambda wildcards: [
+            cell[name] for cell in seam_experiments() for name in ("table", "facts", "repeats") if name in cell
+        ],
+    output:
+        crops="results/tables/seams.csv",
+        summary="results/tables/seam_summary.csv",
+        ablation="results/tables/seam_ablation.csv",
+        repetition="results/tables/repetition.csv",
+        kept=update(expand("study/docs/data/{table}.csv", table=["seam_summary", "seam_ablation", "repetition"])),
+        plot="study/docs/figures/seam_ablation.png",
+    log:
+        "<logs>/seams/gather_seams.log",
+    benchmark:
+        "<benchmarks>/seams/gather_seams.tsv"
+    params:
+        cells=lambda wildcards: seam_experiments(),
+        study=lambda wildcards: STUDY["seams"],
+        source=code_of_study("gather_seams"),
+    script:
+        "../scripts/gather_seams.py"
+
+
+rule write_seams:
+    """What was found, as a page to read, and all that was drawn on one sheet."""
+    input:
+        tables=list(rules.gather_seams.output.kept),
+        ablation=rules.gather_seams.output.plot,
+        template=str(Path(HERE, "report/seams.md")),
+        drawn=lambda wildcards: [path for paths in seam_pictures().values() for path in paths],
+    output:
+        page="study/docs/results/seams.md",
+        sheet="study/docs/figures/seam_sheet.jpg",
+    log:
+        "<logs>/seams/write_seams.log",
+    benchmark:
+        "<benchmarks>/seams/write_seams.tsv"
+    params:
+        pictures=lambda wildcards: seam_pictures(),
+        own=lambda wildcards: {scene: config["scenes"][scene]["tiling"] for scene in STUDY["seams"]["scenes"]},
+        source=code_of_study("write_seams"),
+    script:
+        "../scripts/write_seams.py"
+
+
+rule plot_cuts:
+    """Cuts by colour alone beside those by what the ground is, drawn into the same tiles."""
+    input:
+        seams=[f"<results>/<round>{{inpainted}}/tiles_{kind}/seams.json" for kind in ("colour", "semantic")],
+        tiles=[f"<results>/<round>{{inpainted}}/tiles_{kind}/tiles" for kind in ("colour", "semantic")],
+    output:
+        plot=report(
+            "<results>/<round>{inpainted}/seam_cuts.png",
+            caption="../report/cuts.rst",
+            category="Figures",
+            labels={"figure": "cuts by colour and by kind of ground", "scene": "{scene}"},
+        ),
+    log:
+        "<logs>/<round>{inpainted}/plot_cuts.log",
+    benchmark:
+        "<benchmarks>/<round>{inpainted}/plot_cuts.tsv"
+    params:
+        source=code_of_study("plot_cuts"),
+    script:
+        "../scripts/plot_cuts.py"
+
+
+rule seams:
+    """Measure the seams of the config's `seam_study`, and draw what is to be looked at."""
+    input:
+        lambda wildcards: list(rules.gather_seams.output),
+        lambda wildcards: list(rules.write_seams.output),
+        lambda wildcards: [
+            path
+            for scene in STUDY["seams"]["scenes"]
+            for path in expand(list(rules.plot_cuts.output), **seam_branch(scene))
+        ],
+
+
+localrules:
+    seams,

@@ -1,0 +1,23 @@
+"""Rule compare_fitters: other programs' fits and ours, of the same photos."""
+
+from pathlib import Path
+
+from dav_gswt.logs import logging_to
+from dav_gswt.provenance import describe_machine, record_provenance
+from dav_gswt.reconstruction.fit_settings import CoarseSettings, select_settings
+from dav_gswt_study import csv_tables, fit_profile, markdown, peers
+
+with logging_to(snakemake.log[0]):
+    out, asked = snakemake.output, dict(snakemake.params.asked)
+    program = peers.find_program(asked["opensplat"])  # before any work
+    settings = select_settings(CoarseSettings, asked)
+    folder = Path(snakemake.input.frame).parent
+    photos = peers.select_photos(fit_profile.read_photo_set(folder, settings.size, asked["margin"]))
+    curves = {peers.OURS: fit_profile.profile_fit(photos, settings, every=asked["every"]).curve}
+    curves |= peers.profile_others(program, photos, asked, Path(out.table).parent)
+    rows = [{"program": program} | row for program, curve in curves.items() for row in curve]
+    csv_tables.write_table(out.table, rows)
+    peers.plot_programs(rows, out.plot)
+    made = record_provenance({"frame": snakemake.input.frame}, asked) | describe_machine()
+    values = peers.describe(rows, photos, asked, made)
+    markdown.write_page(out.page, markdown.render_template(snakemake.input.template, values))

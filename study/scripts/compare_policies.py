@@ -1,0 +1,20 @@
+"""Rule compare_policies: from curves to tables and a figure."""
+
+from dav_gswt.logs import logging_to
+from dav_gswt_study import csv_tables
+from dav_gswt_study.comparison import curves, markdown, plots, tables
+from dav_gswt_study.markdown import render_template, write_page
+
+with logging_to(snakemake.log[0]):
+    out, params = snakemake.output, snakemake.params
+    rounds = curves.read_curves(snakemake.input.curves)
+    results = tables.summarise_cells(rounds)
+    compared = tables.compare_to_baseline(results, params.baseline)
+    worth = tables.check_predictions(rounds)
+    csv_tables.write_table(out.results, results)
+    csv_tables.write_table(out.compared, compared)
+    csv_tables.write_table(out.worth, worth)
+    plots.write_figure(out.plot, rounds, compared, params.baseline)
+    grouped = tables.compare_groups(results, params.baseline, params.groups)
+    values = markdown.describe_comparison(rounds, results, compared, grouped, worth, params.baseline)
+    write_page(out.page, render_template(snakemake.input.template, values | {"table": snakemake.wildcards.table}))

@@ -1,0 +1,12 @@
+"""Rule gather_frames: frame times of all scenes."""
+
+from dav_gswt.logs import logging_to
+from dav_gswt_study import csv_tables
+from dav_gswt_study.terrain import frames
+
+with logging_to(snakemake.log[0]):
+    paths, made = snakemake.input, snakemake.output
+    rows = frames.gather_frames(snakemake.params.cells, paths.library, paths.page)
+    for path in (made.table, made.kept):
+        csv_tables.write_table(path, rows)
+    csv_tables.write_table(made.viewer, frames.select_viewer_rows(rows))

@@ -1,0 +1,11 @@
+"""Rule measure_materials: materials and objects of a synthetic scene against its true labels."""
+
+from dav_gswt.logs import logging_to
+from dav_gswt.photos.synthetic.labels import read_label_map
+from dav_gswt_study import csv_tables
+from dav_gswt_study.materials import accuracy
+
+with logging_to(snakemake.log[0]):
+    truth, found = read_label_map(snakemake.input.truth), accuracy.read_found_labels(snakemake.input.materials)
+    row = accuracy.score_materials(truth, found) | accuracy.score_objects(truth, found)
+    csv_tables.write_table(snakemake.output.table, [row | {"excluded": float(found.excluded.mean())}])

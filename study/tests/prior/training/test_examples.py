@@ -1,0 +1,87 @@
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry import camera_layouts
+from dav_gswt.prior.interface import Condition
+from dav_gswt_study.prior.training import example_files, examples
+
+SEED, COUNT = 4, 2
+
+
+@pytest.fixture(scope="module")
+def made():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(examples, "STEPS", (20, 25))
+        patch.setattr(examples, "PHOTO_SIZES", (96, 112))
+        yield examples.make_examples(SEED, COUNT)
+
+
+@pytest.fixture
+def stored(tmp_path, made):
+    path = tmp_path / "part0.npz"
+    example_files.write_examples(path, made)
+    return path
+
+
+def same(a, b) -> bool:
+    arrays = [[getattr(e.condition, f.name) for f in fields(Condition)] + [e.rgba, e.inverse_depth] for e in (a, b)]
+    return all(x.shape == y.shape and x.tobytes() == y.tobytes() for x, y in zip(*arrays, strict=True))
+
+
+def test_a_seed_makes_the_same_examples_of_what_a_prior_takes_and_the_fit_resembles_the_truth(made):
+    assert same(made, examples.make_examples(SEED, COUNT))
+    made.condition.check()
+    assert len(made) == len(made.condition) == COUNT
+    for image in (made.condition.colour, made.condition.alpha, made.condition.photo, made.rgba):
+        assert image.min() >= 0 and image.max() <= 1
+    assert (made.condition.inverse_depth >= 0).all() and np.isfinite(made.inverse_depth).all()
+    assert (made.rgba[..., 3].mean((1, 2)) >= examples.LEAST_COVER).all()
+    both = (made.condition.alpha > 0.95) & (made.rgba[..., 3] > 0.95)
+    apart = np.abs(made.condition.colour - made.rgba[..., :3])[both]
+    assert both.mean() > 0.2
+    assert 0.001 < apart.mean() < 0.15  # neither the truth itself nor another place
+
+
+def test_a_camera_inside_a_thing_is_known_and_a_turned_one_stays_where_it_is():
+    field, camera = examples.make_world(0).field, camera_layouts.orbit(90, 0, 7.0, (0, 0, 0), 8, 8, 55)
+    assert examples.is_clear(field, camera)
+    assert not examples.is_clear(field, camera_layouts.orbit(90, 0, 0.1, field.means[0], 8, 8, 55))
+    turned = examples.aim_camera(camera, np.array([1.0, 2.0, 0.0]))
+    np.testing.assert_allclose(turned.centre, camera.centre, atol=1e-9)
+    np.testing.assert_allclose(turned.project(np.array([[1.0, 2.0, 0.0]]))[0], [[4, 4]], atol=1e-9)
+
+
+def test_stored_examples_come_back_to_the_bytes_precision(stored, tmp_path, made):
+    again = example_files.read_examples(stored)
+    np.testing.assert_allclose(again.rgba, made.rgba, atol=0.5 / 255 + 1e-6)
+    np.testing.assert_allclose(again.condition.colour, made.condition.colour, atol=0.5 / 255 + 1e-6)
+    np.testing.assert_allclose(again.inverse_depth, made.inverse_depth, rtol=1e-3, atol=1e-4)
+    np.testing.assert_allclose(again.condition.relative, made.condition.relative, rtol=1e-3, atol=1e-4)
+    assert stored.stat().st_size < 100_000 * COUNT
+    example_files.write_examples(tmp_path / "again.npz", made)
+    assert stored.read_bytes() == (tmp_path / "again.npz").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "name, value, message",
+    [
+        ("photo", None, "photo is missing"),
+        ("rgba", lambda a: a[:-1], "rgba is"),
+        ("colour", lambda a: a.astype(np.float32), "colour is float32"),
+        ("relative", lambda a: np.full_like(a, np.nan), "relative holds numbers that are not finite"),
+        ("photo", lambda a: np.array([{}]), "photo is object"),
+    ],
+)
+def test_wrong_arrays_are_refused_by_name_and_half_a_file_is_refused(stored, name, value, message):
+    with np.load(stored) as file:
+        arrays = dict(file)
+    old = arrays.pop(name)
+    np.savez_compressed(stored, **(arrays if value is None else arrays | {name: value(old)}))
+    with pytest.raises(InputError, match=message):
+        example_files.read_examples(stored)
+    stored.write_bytes(stored.read_bytes()[: stored.stat().st_size // 2])
+    with pytest.raises(InputError, match="not readable as examples"):
+        example_files.read_examples(stored)

@@ -1,0 +1,83 @@
+from dataclasses import replace
+
+import numpy as np
+
+from dav_gswt.bundle import chunks
+from dav_gswt.bundle.encoding import Encoding
+from dav_gswt.config import load
+from dav_gswt.errors import InputError
+from dav_gswt.field import write_field
+from dav_gswt.files import write_json
+from dav_gswt.images import image_files
+from dav_gswt_study.stability import running, tables
+from dav_gswt_study.stability.extremes import ALL, EXTREMES, make_ground_field
+
+FILES = [running.DEFAULT_CONFIG, "study/config.yaml", running.TEST_CONFIG]
+WELL = {"exit_code": 0, "message": None, "traceback": False, "not_finite": 0, "blank_stills": 0, "stills_psnr": None}
+
+
+def test_what_is_laid_over_the_config_is_what_the_config_allows_or_says(root):
+    for extreme in ALL:
+        given = load.read_config([root / file for file in FILES], extreme.overrides)
+        try:
+            load.check_config(load.add_scene_files(given, root / "config/scenes"))
+        except InputError as error:
+            said = WELL | {"exit_code": 1, "message": str(error)}
+            assert extreme.error_pattern and tables.has_failed_as_expected(extreme, said), extreme.name
+
+
+def test_worlds_differ_in_size_alone():
+    small, large = make_ground_field(12, 1e-2), make_ground_field(12, 1e7)
+    np.testing.assert_allclose(large.means, 1e9 * small.means.astype(float), rtol=1e-6)
+    np.testing.assert_allclose(large.log_scales - small.log_scales, np.log(1e9), rtol=1e-6)
+    np.testing.assert_array_equal(large.sh, small.sh)
+
+
+def test_a_run_ends_well_only_without_any_fault_and_fails_well_only_with_its_own_message():
+    assert tables.has_finished(EXTREMES["tau-0"], WELL)
+    faults = dict(exit_code=1, traceback=True, not_finite=2, blank_stills=1, stills_psnr=20.0)
+    assert not any(tables.has_finished(EXTREMES["tau-0"], WELL | {name: value}) for name, value in faults.items())
+    one = EXTREMES["one-gaussian"]
+    right = WELL | {"exit_code": 1, "message": "finished.ply: the field has 1 opaque Gaussians; a surface"}
+    assert tables.has_failed_as_expected(one, right)
+    for fault in (dict(exit_code=0), dict(message="another"), dict(message=None), dict(traceback=True)):
+        assert not tables.has_failed_as_expected(one, right | fault)
+
+
+def test_a_number_that_is_not_finite_is_found_in_a_table_in_a_field_and_in_a_chunk(tmp_path):
+    path = tmp_path / "a.csv"
+    for word, finite in (("infinite", True), ("nan", False), ("-inf", False)):
+        path.write_text(f"name,value\nx,1.5\ny,{word}\n")
+        assert running.is_finite(path) == finite
+    for value in (0.5, np.nan):
+        given = make_ground_field(3, 1.0)
+        given.means[4, 1] = value
+        write_field(given, tmp_path / "a.ply")
+        assert running.is_finite(tmp_path / "a.ply") == np.isfinite(value)
+    given, path = make_ground_field(3, 1.0), tmp_path / "chunks/lod0_tile_00.bin"
+    path.parent.mkdir()
+    code = Encoding.fit([given], 1.0, 0.01)
+    rows, order = code.encode(given), np.arange(len(given))[None]
+    entry = chunks.write_chunk(rows, order, tmp_path, "chunks/lod0_tile_00.bin", chunks.ChunkOrders(0, [0]))
+    beyond = replace(code, log_scale=[1000.0, 1.0])  # the exponential of it is no number
+    for encoding, finite in ((code, True), (beyond, False)):
+        manifest = {"tiles": [{"chunks": [vars(entry)]}], "encoding": vars(encoding)}
+        write_json(tmp_path / "davgswt.json", manifest)
+        assert running.is_finite(path) == finite
+
+
+def test_a_row_tells_whether_a_world_looks_as_one_of_another_size(tmp_path):
+    def tabulate(picture, name="world-1e6", not_finite=()):
+        (tmp_path / name).mkdir(exist_ok=True)
+        for still in tables.NEAR_STILLS:
+            image_files.write_png(tmp_path / name / f"{still}.png", picture)
+        found = WELL | {"name": name, "warnings": [], "checked": 3, "not_finite": list(not_finite)}
+        write_json(tmp_path / name / "outcome.json", found | {"gaussians": 9, "seconds": 1.0, "peak_mb": 2.0})
+        return tables.tabulate_run(EXTREMES[name], tmp_path)
+
+    picture = np.random.default_rng(0).uniform(0, 1, (20, 30, 3)).astype(np.float32)
+    tabulate(picture, "world-1")
+    assert (row := tabulate(picture))["as_expected"] and row["stills_psnr"] == 100
+    assert not tabulate(picture[::-1].copy())["as_expected"]
+    assert tabulate(np.full_like(picture, 0.4))["blank_stills"] == 2
+    assert not tabulate(picture, not_finite=["a.ply"])["as_expected"]

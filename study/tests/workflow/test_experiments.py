@@ -1,0 +1,130 @@
+"""Experiments of the study on the tiny run: tables, figures and pages come out, and nothing is made twice."""
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import answer_files
+import pytest
+import yaml
+from fixtures.runs import TINY, USUAL
+
+from dav_gswt.files import read_json
+from dav_gswt.images import image_files
+from dav_gswt_study.tables import spread
+
+CONFIGS = (USUAL, TINY)
+CELL = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k2"
+
+
+@pytest.fixture
+def copied(tiny, tmp_path) -> Path:
+    """A copy of the tiny run, for experiments that add to it."""
+    return shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)
+
+
+def write_study(folder: Path, **study) -> tuple:
+    """Config files of the tiny run with other settings of the study."""
+    (path := folder / "few.yaml").write_text(yaml.safe_dump({"study": study}))
+    return USUAL, TINY, path
+
+
+def read_rows(path: Path) -> list[dict]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, copied, tmp_path):
+    """tau over what is there: one bundle and its stills are new; a table, a figure, and what tables make of them."""
+    sweep = {"scenes": ["desert"], "vary": {"tau": [0.3, 0.6]}, "fixed": {"policy": "farthest"}, "baseline": "0.6"}
+    sweep |= {"measure": {"views": [0], "tiles": [0], "stills": [0]}}
+    figures = {"scenes": ["desert"], "seed": 0, "estimators": ["w2"], "policy": "farthest", "rounds": 1}
+    tables = {"timing": "few", "sensitivity": ["few"], "ablation": ["few"], "also": [], "figures": figures}
+    made = [f"results/tables/{name}.csv" for name in ("timing", "sensitivity", "ablation")]
+    uncertainty = str(tiny.bundle.relative_to(tiny.folder) / "uncertainty.png")
+    configs = write_study(tmp_path, sweeps={"few": sweep}, tables=tables)
+    done = snakemake(copied, "--cores", "2", "results/sweeps/few.png", *made, uncertainty, configs=configs)
+    assert "8 of 8 steps (100%) done" in done.stdout  # bundle, stills, gather, plot, three tables, uncertainty
+    rows = read_rows(copied / "results/sweeps/few.csv")
+    assert [(row["tau"], row["scene"], row["photos"]) for row in rows] == [(t, "desert", "7") for t in ("0.3", "0.6")]
+    assert all(float(row[key]) > 0 for row in rows for key in ("psnr", "bundle_mb", "orders", "recon_s", "stills_s"))
+    assert rows[0]["psnr"] == rows[1]["psnr"] and rows[0]["seam_lpips"] == ""
+    assert (copied / "study/docs/data/sweep_few.csv").read_text().count("\n") == 3
+    for path in ("results/sweeps/few.png", uncertainty):
+        assert image_files.read_size(copied / path)[0] > 600
+
+
+def test_a_finished_run_is_traded_off(snakemake, copied, tmp_path):
+    """The settings are tau 0, 0.6 (the base) and 1 of the tiles that the tiny run made."""
+    base = {"preset": "draft", "tiling": "semantic", "prior": "terrain"}
+    configs = write_study(tmp_path, tradeoff={"scene": "desert", "base": base, "presets": ["draft"], "only": ["tau"]})
+    page = "study/docs/results/tradeoff.md"
+    done = snakemake(copied, "--cores", "2", "--scheduler", "greedy", page, configs=configs)
+    assert "8 of 8 steps (100%) done" in done.stdout  # metrics, two bundles and their stills, table, plot, page
+    rows = read_rows(copied / "results/tradeoff/tradeoff.csv")
+    assert [row["setting"] for row in rows] == ["draft", "0", "0.6", "1"]
+    assert all(float(row[key]) > 0 for row in rows for key in ("seconds", "own_seconds", "psnr", "bundle_mb"))
+    assert "`draft` is the best for its time" in (copied / page).read_text()
+    assert image_files.read_size(copied / "study/docs/figures/tradeoff_knobs.png")[0] > 300
+
+
+def test_a_finished_run_has_figures_of_its_views(snakemake, copied):
+    made = [f"{CELL}/{figure}_1.png" for figure in ("sphere", "evolution")]
+    done = snakemake(copied, "--cores", "2", *made, configs=CONFIGS)
+    assert "2 of 2 steps (100%) done" in done.stdout  # all they need is there
+    for path in made:
+        assert image_files.read_size(copied / path)[0] >= 1000 and image_files.read_photo(copied / path).std() > 0.05
+
+
+def test_a_kit_is_made_answered_and_analysed(snakemake, copied):
+    snakemake(copied, "--cores", "2", "perceptual_kit", configs=CONFIGS)
+    home = copied / "results/forced_choice/kit"
+    key = read_json(home / "key.json")
+    assert (home / "page/index.html").is_file() and len(key["items"]) == 3  # two crops, and a check
+    (copied / "answers").mkdir()
+    for number in range(4):
+        told = answer_files.answers(key, number, lambda item, number=number: item["check"] or number == 0)
+        (copied / f"answers/2afc_{told['participant']}.json").write_text(json.dumps(told))
+    snakemake(copied, "--cores", "1", "perceptual_results", configs=CONFIGS)
+    every, desert = read_rows(copied / "results/tables/forced_choice.csv")
+    assert (every["scene"], every["participants"], every["share"]) == ("every", "4", "0.25")
+    assert float(every["low"]) < float(every["binomial_low"]) and desert["share"] == "0.25"
+    (copied / "answers/zzz.json").write_text('{"format": "davgswt-2afc"}')
+    done = snakemake(copied, "--cores", "1", "perceptual_results", configs=CONFIGS, check=False)
+    assert done.returncode and "answers/zzz.json: " in done.stdout and "remove it" in done.stdout
+
+
+def test_what_the_page_s_shortcuts_cost_is_measured_and_drawn(snakemake, copied):
+    snakemake(copied, "--cores", "2", "presort_table", configs=CONFIGS)
+    rows = read_rows(copied / "results/tables/presort.csv")
+    assert len(rows) == 12 and {r["scene"] for r in rows} == {"desert"}
+    assert all(float(r["psnr"] or "inf") > 25 for r in rows if r["shortcut"] != "levels")
+
+
+def test_frames_of_the_library_and_of_the_page_are_timed(chromium, snakemake, copied):
+    """The budgets that were asked for, and what the study's tables join; no time is asserted but that there is one."""
+    snakemake(copied, "--cores", "2", "frame_times", configs=CONFIGS)
+    rows = read_rows(copied / "results/tables/frames.csv")
+    asked = [(renderer, budget) for renderer in ("library", "page") for budget in ("2000", "1000")]
+    assert [(r["renderer"], r["budget"]) for r in rows] == asked
+    assert all(float(r["splats"]) > 0 and float(r["render_ms"]) > 0 for r in rows)
+    # the page also brings the end of the ground nearer; the library stops at the coarsest level, here of two
+    assert all(float(r["splats"]) <= float(r["budget"]) for r in rows if r["renderer"] == "page")
+    (joined,) = spread.read_viewer(copied / "results/tables/viewer.csv")
+    assert (joined["scene"], joined["tau"]) == ("desert", "0.6") and 0 < joined["update_share"] <= 1
+
+
+def test_every_level_of_every_tile_is_measured(tiny, snakemake, copied):
+    snakemake(copied, "--cores", "2", "lod_table", configs=CONFIGS)
+    rows = read_rows(copied / "results/tables/lod.csv")
+    levels = len(read_json(tiny.bundle / "davgswt.json")["levels"])
+    assert {(int(r["tile"]), int(r["level"])) for r in rows} == {(t, lv) for t in range(16) for lv in range(levels)}
+    assert all((r["oblique_db"] == "") == (r["level"] == "0") for r in rows)
+
+
+def test_a_run_that_cannot_be_done_leaves_its_message(snakemake, tmp_path):
+    snakemake(tmp_path, "--cores", "1", "results/stability/two-photos")
+    found = json.loads((tmp_path / "results/stability/two-photos/outcome.json").read_text())
+    assert found["exit_code"] == 1 and not found["traceback"]
+    assert found["message"].startswith("config: scenes.desert.photos: input should be greater than or equal to 3")

@@ -1,2 +1,0 @@
-// The global that trials.js (written by dav_gswt.study.forced_choice.kit) defines: lists of [item, left, right].
-declare const STUDY: { study: string; seconds: number; lists: [string, string, string][][] };
