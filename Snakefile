@@ -35,6 +35,7 @@ include: "rules/tiles.smk"
 include: "rules/bundle.smk"
 include: "rules/terrain.smk"
 include: "rules/export.smk"
+include: "rules/sweeps.smk"
 
 
 # Below the includes: Snakemake skips constraints on wildcards that reach an output through a pathvar unless they are

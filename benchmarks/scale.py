@@ -7,10 +7,10 @@ results/bench.json.
 import subprocess
 import sys
 
+from dav_gswt.study.scale import growth
 from record import report_figures
 
-from dav_gswt.study import csv_tables
-from dav_gswt.study.scale import growth
+from dav_gswt import csv_tables
 
 TABLE = "docs/research/data/scale.csv"
 TARGETS = {"fit_200_photos_memory_mb": 2000.0, "standard_46_photos_seconds": 120.0}

@@ -25,4 +25,4 @@ claims: .venv/installed
 
 # hours: the weights that come with the project were made so
 prior: .venv/installed
-	@$(BIN)/snakemake -s study/Snakefile --cores $(CORES) -- results/prior/terrain.safetensors
+	@$(BIN)/snakemake -s study/Snakefile --cores $(CORES) -- study/results/prior/terrain.safetensors

@@ -217,7 +217,7 @@ class Measure(ConfigModel):
 
 
 class Sweep(ConfigModel):
-    """`snakemake results/sweeps/<name>.png`: what one setting changes."""
+    """`snakemake study/results/sweeps/<name>.png`: what one setting changes."""
 
     scenes: Names = key("scenes with photos; policies are compared fairly with `agent: replay`")
     vary: Vary = key("the setting and its values")

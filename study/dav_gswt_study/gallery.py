@@ -13,12 +13,11 @@ from dav_gswt.files import atomic_file, read_json
 from dav_gswt.images import image_files
 from dav_gswt.images.jpeg import encode_jpeg
 from dav_gswt.materials.store import read_report
+from dav_gswt.sweeps import MEGA, select_metrics
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.page_front import name_of_scene
-from dav_gswt_study.comparison.curves import select_metrics
 from dav_gswt_study.cover import crop_and_shrink
 from dav_gswt_study.markdown import format_number, format_table
-from dav_gswt_study.sweeps.tables import MEGA
 
 HEIGHT, GAP = 300, 4  # pixels: of a row of pictures, and between two of them
 ASPECTS = (4 / 3, 1.0, 16 / 9)  # of a photo, the terrain from above, what a walker sees

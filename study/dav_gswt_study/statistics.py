@@ -117,13 +117,6 @@ def compute_paired_test(differences: dict[str, Float[Array, "_"]]) -> PairedTest
     return PairedTest(units, boot.mean, low, high, t, df, two_sided_p(t, df), boot.mean / deviation)
 
 
-def sum_or_none(values: Iterable[float | None]) -> float | None:
-    """The sum; None where one of the values is not known."""
-    values = list(values)
-    known = [value for value in values if value is not None]
-    return float(sum(known)) if len(known) == len(values) else None
-
-
 def subtract_or_none(a: float | None, b: float | None) -> float | None:
     """a - b; None where one of them is not known."""
     return None if a is None or b is None else float(a - b)

@@ -9,7 +9,7 @@ from dav_gswt_study.tables.checks import sweeps_of
 from dav_gswt_study.tradeoff import settings
 
 TABLES = ("timing", "lod", "sensitivity", "ablation")
-FRAMES = "results/tables/viewer.csv"
+FRAMES = "study/results/tables/viewer.csv"
 FLAT = config | STUDY  # the study's tables beside the product's
 
 
@@ -34,7 +34,7 @@ def measured_of_tiles(made, entry="lod"):
     asked = STUDY[entry]
     keys = ("scene", "seed", "preset", "tiling") + (("tau",) if "tau" in made.output.table else ())
     for scene in asked["scenes"]:
-        chosen = experiment_branch(scene, asked["fixed"]) if "fixed" in asked else branch(scene)
+        chosen = study_branch(scene, asked["fixed"]) if "fixed" in asked else branch(scene)
         for seed in asked.get("seeds", config["seeds"]):
             values = chosen | {"seed": seed}
             (path,) = expand(made.output.table, **values)
@@ -166,65 +166,31 @@ def sweep_experiments(name):
     asked, cells = STUDY["sweeps"][name], {}
     for chosen in grid.list_combinations(asked["vary"], asked.get("fixed", {})):
         for scene, seed in product(asked["scenes"], grid.list_seeds(asked["measure"])):
-            values = experiment_branch(scene, chosen) | {"seed": seed}
+            values = study_branch(scene, chosen) | {"seed": seed}
             measured = [key for key, seeds in asked["measure"].items() if seed in seeds]
-            cell = sweep_experiment(values, measured) | {"sweep": name, "varied": chosen["shown"]}
+            cell = describe_experiment(values, measured) | {"sweep": name, "varied": chosen["shown"]}
             cells.setdefault(tuple(cell[key] for key in grid.CELL), cell)
     return list(cells.values())
 
 
-def experiment_branch(scene, chosen):
-    """The wildcards of a cell of settings of its own, which stops nowhere before its last round and paints nothing."""
+def study_branch(scene, chosen):
+    """The wildcards of a cell of settings of its own, which may give the photos that it ends with instead of its rounds."""
     entry, over = config["scenes"][scene], {key: value for key, value in chosen.items() if key != "shown"}
     asked = config | over
     rounds = grid.count_rounds(over, asked["policy"], grid.count_start_photos(entry), asked["k"], asked["rounds"])
-    return branch(scene, changes=over | {"rounds": rounds}) | {"stop": "", "inpainted": ""}
+    return experiment_branch(scene, over | {"rounds": rounds})
 
 
-def benchmark_fits(values):
-    """The benchmarks of the refits of all rounds; where these are another preset's, that of the fit to all photos, too."""
-    chosen = values_of_choice(values)
-    refits = expand(rules.update_field.benchmark, **(chosen | {"t": range(1, values["t"] + 1)}))
-    return refits + (expand(rules.fit_chosen_photos.benchmark, **values) if chosen != values else [])
-
-
-def sweep_experiment(values, measured):
-    """One of them. measured: keys of `measure` that hold for it."""
-    rounds, scene = values["t"], config["scenes"][values["scene"]]
-
-    def of(found, ts=None):
-        return expand(found, **(values if ts is None else values | {"t": list(ts)}))
-
-    tested = rules.evaluate_round if rounds else rules.evaluate_coarse
-    files = {
-        "views": {"metrics": tested.output.metrics},
-        "tiles": {"manifest": rules.bundle_tiles.output.manifest},
-        "seams": {"crops": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts},
-        "stills": {"still": rules.render_terrain.output.stills[0]},
-    }
-    chosen = values_of_choice(values)
-
-    def of_choice(job, ts):
-        return expand(job.benchmark, **(chosen | {"t": list(ts)}))
-
-    times = {"coarse": of_choice(rules.fit_coarse, [rounds]), "update": benchmark_fits(values)}
-    times["score"] = of_choice(rules.score_coarse, [rounds]) if rounds else []
-    times["score"] += of_choice(rules.score_round, range(1, rounds))
-    for key, job in (("select", rules.select_poses), ("capture", rules.capture_views)):
-        times[key] = of_choice(job, range(1, rounds + 1))
-    if {"tiles", "seams", "stills"} & set(measured):
-        times |= {"levels": of(rules.make_levels.benchmark), "cut": of(rules.cut_tiles.benchmark)}
-    times |= {"bundle": of(rules.bundle_tiles.benchmark)} if {"tiles", "stills"} & set(measured) else {}
-    times |= {"stills": of(rules.render_terrain.benchmark)} if "stills" in measured else {}
+def describe_experiment(values, measured):
+    """A cell of the product's sweeps, with its seams where they are measured, and how its prior samples."""
+    cell = describe_run(values, [key for key in ("views", "tiles", "stills") if key in measured])
+    if "seams" in measured:
+        made = rules.measure_seams.output
+        cell["files"] |= {key: expand(path, **values)[0] for key, path in (("crops", made.crops), ("facts", made.facts))}
+        jobs = {"levels": rules.make_levels, "cut": rules.cut_tiles}
+        cell["times"] |= {key: expand(job.benchmark, **values) for key, job in jobs.items()}
     prior = config["priors"].get(values["prior"], {"samples": 0, "steps": 0})
-    cell = {key: values[key] for key in grid.CELL if key != "rounds"} | {"rounds": rounds}
-    return cell | {
-        "corrected": scene["kind"] == "photos",
-        "samples": prior["samples"],
-        "steps": prior["steps"],
-        "files": {key: of(path)[0] for part in measured for key, path in files[part].items()},
-        "times": times,
-    }
+    return cell | {"samples": prior["samples"], "steps": prior["steps"]}
 
 
 def tradeoff_experiments():
@@ -239,8 +205,8 @@ def tradeoff_experiments():
 
 def tradeoff_experiment(scene, seed, chosen, size, measure):
     """One of them. size: of the photos that all are tested on, whatever they were fitted to."""
-    values = experiment_branch(scene, chosen) | {"seed": seed}
-    cell = sweep_experiment(values, ["views", "tiles", measure])
+    values = study_branch(scene, chosen) | {"seed": seed}
+    cell = describe_experiment(values, ["views", "tiles", measure])
     (metrics,) = expand(rules.evaluate_at.output.metrics, size=size, **values)
     return cell | {
         "sweep": "tradeoff",
@@ -262,7 +228,7 @@ def walk_settings(wildcards):
 
 def swept(table):
     """An input function: the sweeps that one of the study's tables is made from."""
-    return lambda wildcards: [f"results/sweeps/{name}.csv" for name in STUDY["tables"][table]]
+    return lambda wildcards: [f"study/results/sweeps/{name}.csv" for name in STUDY["tables"][table]]
 
 
 def setting_of(sweep):
@@ -278,7 +244,7 @@ def default_of(sweep):
 def estimator_branch(scene, policy):
     """The wildcards of what the study's figures show of a scene after a policy chose."""
     asked = STUDY["tables"]["figures"]
-    return experiment_branch(scene, {"policy": policy, "rounds": asked["rounds"]}) | {"seed": asked["seed"]}
+    return study_branch(scene, {"policy": policy, "rounds": asked["rounds"]}) | {"seed": asked["seed"]}
 
 
 def of_estimators(output):
@@ -302,7 +268,7 @@ def figure_files():
             "uncertainty": rules.plot_tile_uncertainty.output.plot,
         }
         found |= {f"{name}_{scene}": expand(path, **values)[0] for name, path in shown.items()}
-    return found | {"budget": "results/sweeps/budget.png"}
+    return found | {"budget": "study/results/sweeps/budget.png"}
 
 
 def terrain_sheets():

@@ -2,7 +2,7 @@
 
 In: levels and tiles of each tiling that is compared; the answers that people saved. Out, per scene:
 forced_choice/{scene}/pairs; forced_choice/kit/page, a page that works offline and does not say which crop is which, and
-kit/key.json, which does; results/tables/forced_choice.csv and its figure. `snakemake perceptual_kit`, `perceptual_results`.
+kit/key.json, which does; study/results/tables/forced_choice.csv and its figure. `snakemake perceptual_kit`, `perceptual_results`.
 """
 
 PAGE_PARTS = sorted(str(path) for path in (HERE / "forced_choice").iterdir() if path.is_file())
@@ -14,7 +14,7 @@ rule render_pairs:
     input:
         unpack(pair_inputs),
     output:
-        pairs=directory("<results>/forced_choice/{scene}/pairs"),
+        pairs=directory("study/results/forced_choice/{scene}/pairs"),
     log:
         "<logs>/forced_choice/{scene}/render_pairs.log",
     benchmark:
@@ -41,8 +41,8 @@ rule make_kit:
         pairs=lambda wildcards: expand(rules.render_pairs.output.pairs, scene=STUDY["forced_choice"]["scenes"]),
         parts=PAGE_PARTS,
     output:
-        page=directory("<results>/forced_choice/kit/page"),
-        key="<results>/forced_choice/kit/key.json",
+        page=directory("study/results/forced_choice/kit/page"),
+        key="study/results/forced_choice/kit/key.json",
     log:
         "<logs>/forced_choice/make_kit.log",
     benchmark:
@@ -62,14 +62,14 @@ rule evaluate_answers:
         key=rules.make_kit.output.key,
         schema=ANSWERS_SCHEMA,
     output:
-        table="results/tables/forced_choice.csv",
+        table="study/results/tables/forced_choice.csv",
         plot=report(
-            "results/figures/forced_choice.png",
+            "study/results/figures/forced_choice.png",
             caption="../report/forced_choice.rst",
             category="Figures",
             labels={"figure": "which seams are harder to see"},
         ),
-        facts="results/forced_choice/participants.json",
+        facts="study/results/forced_choice/participants.json",
     log:
         "<logs>/forced_choice/evaluate_answers.log",
     benchmark:

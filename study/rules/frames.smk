@@ -2,7 +2,7 @@
 
 In: the bundles of the config's `study.frames`, the viewer. Out, beside each bundle: frames/library.csv (rendered by the library on
 the CPU), frames/page.csv (by the page in a headless Chromium), frames/flicker.csv (what changes from a frame to the next of a
-slow walk); results/tables/frames.csv, viewer.csv and a figure. Needs Chromium and requirements-test.lock. Milliseconds hold
+slow walk); study/results/tables/frames.csv, viewer.csv and a figure. Needs Chromium and requirements-test.lock. Milliseconds hold
 for the machine and its load, which every row names.
 """
 
@@ -89,7 +89,7 @@ rule gather_frames:
         library=lambda wildcards: list(measured_of_tiles(rules.time_library, "frames")),
         page=lambda wildcards: list(measured_of_tiles(rules.time_page, "frames")),
     output:
-        table="results/tables/frames.csv",
+        table="study/results/tables/frames.csv",
         viewer=FRAMES,
         kept="study/docs/data/frames.csv",
     log:
@@ -108,7 +108,7 @@ rule plot_frames:
     input:
         table=rules.gather_frames.output.table,
     output:
-        plot="results/figures/frames.png",
+        plot="study/results/figures/frames.png",
         kept="study/docs/figures/frames.png",
     log:
         "<logs>/figures/plot_frames.log",

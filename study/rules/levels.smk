@@ -1,6 +1,6 @@
 """Levels and pre-sorted orders against the finest level and exact sorting: `snakemake lod_table orders_table`.
 
-In: tiles. Out: lod.csv and orders.csv beside them; of the scenes of the config's `study.lod` results/tables/lod.csv, orders.csv.
+In: tiles. Out: lod.csv and orders.csv beside them; of the scenes of the config's `study.lod` study/results/tables/lod.csv, orders.csv.
 """
 
 
@@ -31,7 +31,7 @@ rule gather_lod:
         tables=lambda wildcards: list(measured_of_tiles(rules.measure_levels)),
     output:
         table=report(
-            "results/tables/lod.csv",
+            "study/results/tables/lod.csv",
             caption="../report/lod.rst",
             category="Tables",
             labels={"table": "levels of detail"},
@@ -72,7 +72,7 @@ use rule gather_lod as gather_orders with:
     input:
         tables=lambda wildcards: list(measured_of_tiles(rules.measure_orders)),
     output:
-        table="results/tables/orders.csv",
+        table="study/results/tables/orders.csv",
     log:
         "<logs>/tables/gather_orders.log",
     benchmark:

@@ -2,7 +2,7 @@
 terrains repeat: `snakemake lattice_table`. Both with the pictures of study/docs/results/materials.md: `snakemake materials_pages`.
 
 In: the materials of the scenes of the config's `study.materials` and their true labels, the bundles of `study.lattice`.
-Out: results/tables/materials.csv, results/tables/lattice.csv, and beside each bundle a picture of 20 x 20 tiles from above.
+Out: study/results/tables/materials.csv, study/results/tables/lattice.csv, and beside each bundle a picture of 20 x 20 tiles from above.
 """
 
 
@@ -28,7 +28,7 @@ use rule gather_lod as gather_materials with:
         tables=lambda wildcards: list(measured_of_tiles(rules.measure_materials, "materials")),
     output:
         table=report(
-            "results/tables/materials.csv",
+            "study/results/tables/materials.csv",
             caption="../report/materials.rst",
             category="Tables",
             labels={"table": "materials and objects"},
@@ -77,7 +77,7 @@ use rule gather_lod as gather_lattice with:
         tables=lambda wildcards: list(measured_of_tiles(rules.measure_lattice, "lattice")),
     output:
         table=report(
-            "results/tables/lattice.csv",
+            "study/results/tables/lattice.csv",
             caption="../report/lattice.rst",
             category="Tables",
             labels={"table": "repetition of terrains"},
@@ -130,7 +130,7 @@ use rule gather_lod as gather_transitions with:
         tables=lambda wildcards: list(measured_of_tiles(rules.measure_transitions, "transitions")),
     output:
         table=report(
-            "results/tables/transitions.csv",
+            "study/results/tables/transitions.csv",
             caption="../report/transitions.rst",
             category="Tables",
             labels={"table": "borders of materials"},
@@ -173,7 +173,7 @@ rule gather_verdicts:
         ],
     output:
         table=report(
-            "results/tables/verdicts.csv",
+            "study/results/tables/verdicts.csv",
             caption="../report/verdicts.rst",
             category="Tables",
             labels={"table": "verdicts on materials"},

@@ -1,7 +1,7 @@
 """Another program's fit beside ours, on the same photos and machine.
 
 In: the photos of the scene of the config's `study.compare`, and OpenSplat, a program of the user's, or gsplat and a
-GPU. Out: study/docs/data/fitters.csv, figures/fitters.png, results/fitters.md. `make compare
+GPU. Out: study/docs/data/fitters.csv, figures/fitters.png, study/results/fitters.md. `make compare
 OPENSPLAT=/path/to/opensplat` makes them.
 """
 

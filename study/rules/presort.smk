@@ -1,6 +1,6 @@
 """What the page's shortcuts do to a picture: pre-sorted orders, levels and rounding. `snakemake presort_table`.
 
-In: bundles and tiles. Out: presort.csv beside each bundle; results/tables/presort.csv and its figure.
+In: bundles and tiles. Out: presort.csv beside each bundle; study/results/tables/presort.csv and its figure.
 """
 
 
@@ -34,7 +34,7 @@ use rule gather_lod as gather_presort with:
     input:
         tables=lambda wildcards: list(measured_of_tiles(rules.measure_presort)),
     output:
-        table="results/tables/presort.csv",
+        table="study/results/tables/presort.csv",
     log:
         "<logs>/tables/gather_presort.log",
     benchmark:
@@ -49,7 +49,7 @@ rule plot_presort:
     input:
         table=rules.gather_presort.output.table,
     output:
-        plot="results/figures/presort.png",
+        plot="study/results/figures/presort.png",
         kept="study/docs/figures/presort.png",
         data="study/docs/data/presort.csv",
     log:

@@ -1,7 +1,7 @@
 """The project's own prior: its training, and how good it is on worlds that it was not trained on.
 
-In: nothing of a scene. Out: results/prior/examples/part{part}.npz, what it learns from (part p holds views of the synthetic worlds 20 p to
-20 p + 19); results/prior/terrain.safetensors, its weights, which `make prior` trains: hours; study/docs/data/prior_trial.csv and
+In: nothing of a scene. Out: study/results/prior/examples/part{part}.npz, what it learns from (part p holds views of the synthetic worlds 20 p to
+20 p + 19); study/results/prior/terrain.safetensors, its weights, which `make prior` trains: hours; study/docs/data/prior_trial.csv and
 figures/prior_samples.png, of the weights that come with the library.
 """
 
@@ -16,7 +16,7 @@ TRIAL = dict(m=5, p_drop=0.15, steps=8, seed=0)  # as the config asks the prior
 rule make_examples:
     """Views of procedural worlds: the truth, and what fields fitted from few photos show of it."""
     output:
-        examples="<results>/prior/examples/part{part}.npz",
+        examples="study/results/prior/examples/part{part}.npz",
     log:
         "<logs>/prior/examples/part{part}.log",
     benchmark:
@@ -37,10 +37,10 @@ rule make_examples:
 rule train_prior:
     """Train the project's own prior on all examples; an interrupted training resumes at its last checkpoint."""
     input:
-        examples=expand("<results>/prior/examples/part{part}.npz", part=range(PARTS)),
+        examples=expand("study/results/prior/examples/part{part}.npz", part=range(PARTS)),
     output:
-        weights="<results>/prior/terrain.safetensors",
-        losses="<results>/prior/terrain_losses.csv",
+        weights="study/results/prior/terrain.safetensors",
+        losses="study/results/prior/terrain_losses.csv",
     log:
         "<logs>/prior/train_prior.log",
     benchmark:
@@ -65,7 +65,7 @@ rule evaluate_prior:
     """
     input:
         weights=lambda wildcards: terrain_weights("terrain"),
-        examples=expand("<results>/prior/examples/part{part}.npz", part=HELD_OUT),
+        examples=expand("study/results/prior/examples/part{part}.npz", part=HELD_OUT),
         lpips=lambda wildcards: list(lpips_weights(wildcards).values()),
     output:
         table="study/docs/data/prior_trial.csv",

@@ -1,6 +1,6 @@
 """Where the rasterizer's time goes, and how near it comes to what the processor can do: `snakemake raster_profile`.
 
-In: the field of the config's `study.scale`. Out: study/docs/data/rasterizer.csv, results/rasterizer.md,
+In: the field of the config's `study.scale`. Out: study/docs/data/rasterizer.csv, study/results/rasterizer.md,
 figures/rasterizer.png. Needs the C++ core and an otherwise idle machine.
 """
 

@@ -8,7 +8,7 @@ In: what the config's `study.tables` names. Out: study/docs/results/results.md w
 rule write_results:
     """The study's tables and figures as a page of docs/."""
     input:
-        **{name: f"results/tables/{name}.csv" for name in TABLES},
+        **{name: f"study/results/tables/{name}.csv" for name in TABLES},
         figures=lambda wildcards: list(figure_files().values()),
     output:
         page="study/docs/results/results.md",
@@ -28,8 +28,8 @@ rule write_results:
 rule study:
     """All tables and figures of the paper, from our own runs."""
     input:
-        expand("results/tables/{name}.csv", name=TABLES),
-        lambda wildcards: expand("results/sweeps/{name}.png", name=sweeps_of(STUDY["tables"])),
+        expand("study/results/tables/{name}.csv", name=TABLES),
+        lambda wildcards: expand("study/results/sweeps/{name}.png", name=sweeps_of(STUDY["tables"])),
         lambda wildcards: list(figure_files().values()) + terrain_sheets(),
         lambda wildcards: [rules.write_results.output.page, rules.write_stability.output.page],
         lambda wildcards: rules.write_tradeoff.output.page,

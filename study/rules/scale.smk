@@ -1,7 +1,7 @@
 """How costs grow: fits over photos and pixels, renders over Gaussians, scores over candidates, views over tiles.
 
-In: the first field of the scene of the config's `study.scale`. Out: results/scale/{kind}_{size}.json, each by a process
-of its own on an otherwise idle machine; study/docs/data/scale.csv, results/scale.md, figures/scale.png.
+In: the first field of the scene of the config's `study.scale`. Out: study/results/scale/{kind}_{size}.json, each by a process
+of its own on an otherwise idle machine; study/docs/data/scale.csv, study/results/scale.md, figures/scale.png.
 """
 
 
@@ -10,7 +10,7 @@ rule render_scale_photos:
     input:
         unpack(scale_field),
     output:
-        images=directory("results/scale/photos/{amount}x{pixels}"),
+        images=directory("study/results/scale/photos/{amount}x{pixels}"),
     log:
         "<logs>/scale/render_photos_{amount}x{pixels}.log",
     benchmark:
@@ -33,11 +33,11 @@ rule measure_scale:
     input:
         unpack(scale_field),
         images=lambda wildcards: expand(
-            "results/scale/photos/{cell[0]}x{cell[1]}",
+            "study/results/scale/photos/{cell[0]}x{cell[1]}",
             cell=[found] if (found := scale_photos(wildcards.what, int(wildcards.amount))) else [],
         ),
     output:
-        cost="results/scale/{what}_{amount}.json",
+        cost="study/results/scale/{what}_{amount}.json",
     log:
         "<logs>/scale/{what}_{amount}.log",
     benchmark:
@@ -63,7 +63,7 @@ rule gather_scale:
     """The curves of all cells, their exponents and a figure."""
     input:
         template=str(HERE / "report/scale.md"),
-        cells=[f"results/scale/{what}_{amount}.json" for what, amount in scale_cells()],
+        cells=[f"study/results/scale/{what}_{amount}.json" for what, amount in scale_cells()],
     output:
         table="study/docs/data/scale.csv",
         page="study/docs/results/scale.md",

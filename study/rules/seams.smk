@@ -1,7 +1,7 @@
 """Seams: can anybody find the borders and the cuts, and does the terrain repeat? `snakemake seams`.
 
 In: levels and tiles. Out, per experiment (a scene, a seed, a tiling): crops.csv, facts.json, repetition.csv; of each scene's
-own tiling 20 x 20 tiles from above and walking, flat and hilly. Gathered: results/tables/seams.csv (every crop),
+own tiling 20 x 20 tiles from above and walking, flat and hilly. Gathered: study/results/tables/seams.csv (every crop),
 seam_summary.csv, seam_ablation.csv and repetition.csv, the last three also in study/docs/data; the page
 study/docs/results/seams.md.
 """
@@ -96,10 +96,10 @@ rule gather_seams:
             cell[name] for cell in seam_experiments() for name in ("table", "facts", "repeats") if name in cell
         ],
     output:
-        crops="results/tables/seams.csv",
-        summary="results/tables/seam_summary.csv",
-        ablation="results/tables/seam_ablation.csv",
-        repetition="results/tables/repetition.csv",
+        crops="study/results/tables/seams.csv",
+        summary="study/results/tables/seam_summary.csv",
+        ablation="study/results/tables/seam_ablation.csv",
+        repetition="study/results/tables/repetition.csv",
         kept=update(expand("study/docs/data/{table}.csv", table=["seam_summary", "seam_ablation", "repetition"])),
         plot="study/docs/figures/seam_ablation.png",
     log:

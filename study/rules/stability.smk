@@ -1,7 +1,7 @@
 """Numerical stability at the extremes: every formula in float32 against float64, and the workflow at the ends of its range.
 
-In: the library; the config of the tests, overridden by each extreme. Out: results/tables/stability.csv, a row a formula;
-results/stability/{extreme}/; results/tables/stability_runs.csv, a row a run; both also in study/docs/data; the page
+In: the library; the config of the tests, overridden by each extreme. Out: study/results/tables/stability.csv, a row a formula;
+study/results/stability/{extreme}/; study/results/tables/stability_runs.csv, a row a run; both also in study/docs/data; the page
 study/docs/results/stability.md. `snakemake stability`.
 """
 
@@ -11,7 +11,7 @@ from dav_gswt_study.stability.extremes import EXTREMES
 rule measure_formulas:
     """Compare every formula with its float64 reference over its whole range."""
     output:
-        table="results/tables/stability.csv",
+        table="study/results/tables/stability.csv",
         kept="study/docs/data/stability.csv",
         facts="study/docs/data/stability.json",
     log:
@@ -32,7 +32,7 @@ rule run_extreme:
     input:
         configs=[str(Path(BASE, name)) for name in ("config/config.yaml", "config/test/config.yaml")],
     output:
-        folder=directory("results/stability/{extreme}"),
+        folder=directory("study/results/stability/{extreme}"),
     log:
         "<logs>/stability/run_{extreme}.log",
     benchmark:
@@ -56,7 +56,7 @@ rule gather_extremes:
     input:
         runs=expand(rules.run_extreme.output.folder, extreme=list(EXTREMES)),
     output:
-        table="results/tables/stability_runs.csv",
+        table="study/results/tables/stability_runs.csv",
         kept="study/docs/data/stability_runs.csv",
     log:
         "<logs>/stability/gather_extremes.log",

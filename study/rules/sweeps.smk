@@ -1,11 +1,11 @@
 """Sweeps: what one setting changes; one table and one figure for each row of the config's `study.sweeps`.
 
 In: what its experiments left, each a scene, a seed and a combination of settings; what experiments have in common is made once.
-Out: results/sweeps/{sweep}.csv and {sweep}.png; study/docs/data/sweep_{sweep}.csv, where runs add up.
+Out: study/results/sweeps/{sweep}.csv and {sweep}.png; study/docs/data/sweep_{sweep}.csv, where runs add up.
 """
 
 
-rule gather_sweep:
+rule gather_comparison:
     """Collect what every cell of a sweep measured and what it cost."""
     input:
         measured=lambda wildcards: [
@@ -13,7 +13,7 @@ rule gather_sweep:
         ],
     output:
         table=report(
-            "results/sweeps/{sweep}.csv",
+            "study/results/sweeps/{sweep}.csv",
             caption="../report/sweep.rst",
             category="Sweeps",
             labels={"sweep": "{sweep}", "shown": "table"},
@@ -25,18 +25,18 @@ rule gather_sweep:
         "<benchmarks>/sweeps/gather_{sweep}.tsv"
     params:
         cells=lambda wildcards: sweep_experiments(wildcards.sweep),
-        source=code_of_study("gather_sweep"),
+        source=code_of_study("gather_comparison"),
     script:
-        "../scripts/gather_sweep.py"
+        "../scripts/gather_comparison.py"
 
 
-rule plot_sweep:
+rule plot_comparison:
     """Draw what a sweep measured over what it varied."""
     input:
-        table="results/sweeps/{sweep}.csv",
+        table="study/results/sweeps/{sweep}.csv",
     output:
         plot=report(
-            "results/sweeps/{sweep}.png",
+            "study/results/sweeps/{sweep}.png",
             caption="../report/sweep.rst",
             category="Sweeps",
             labels={"sweep": "{sweep}", "shown": "figure"},
@@ -47,6 +47,6 @@ rule plot_sweep:
         "<benchmarks>/sweeps/plot_{sweep}.tsv"
     params:
         axes=lambda wildcards: list(STUDY["sweeps"][wildcards.sweep]["vary"]),
-        source=code_of_study("plot_sweep"),
+        source=code_of_study("plot_comparison"),
     script:
-        "../scripts/plot_sweep.py"
+        "../scripts/plot_comparison.py"

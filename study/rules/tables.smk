@@ -1,18 +1,18 @@
 """The paper's tables with their own columns from our runs, the paper's values beside them as columns `paper_`; figures.
 
-In: sweeps that the config's `study.tables` names. Out: results/tables/timing.csv, sensitivity.csv, ablation.csv, also in
-study/docs/data; results/figures/estimators_{scene}.png; uncertainty.png beside a bundle.
+In: sweeps that the config's `study.tables` names. Out: study/results/tables/timing.csv, sensitivity.csv, ablation.csv, also in
+study/docs/data; study/results/figures/estimators_{scene}.png; uncertainty.png beside a bundle.
 """
 
 
-rule tabulate_timing:
+rule compare_timing:
     """What each stage took in our runs, and what a frame of the viewer takes."""
     input:
         unpack(viewer_times),
-        sweep=lambda wildcards: "results/sweeps/{timing}.csv".format(**STUDY["tables"]),
+        sweep=lambda wildcards: "study/results/sweeps/{timing}.csv".format(**STUDY["tables"]),
     output:
         table=report(
-            "results/tables/timing.csv",
+            "study/results/tables/timing.csv",
             caption="../report/timing.rst",
             category="Tables",
             labels={"table": "timing"},
@@ -25,9 +25,9 @@ rule tabulate_timing:
     params:
         value=lambda wildcards: default_of(STUDY["tables"]["timing"]),
         families=lambda wildcards: {n: s["family"] for n, s in config["scenes"].items() if "family" in s},
-        source=code_of_study("tabulate_timing"),
+        source=code_of_study("compare_timing"),
     script:
-        "../scripts/tabulate_timing.py"
+        "../scripts/compare_timing.py"
 
 
 rule tabulate_sensitivity:
@@ -37,7 +37,7 @@ rule tabulate_sensitivity:
         sweeps=swept("sensitivity"),
     output:
         table=report(
-            "results/tables/sensitivity.csv",
+            "study/results/tables/sensitivity.csv",
             caption="../report/sensitivity.rst",
             category="Tables",
             labels={"table": "sensitivity"},
@@ -62,7 +62,7 @@ rule tabulate_ablation:
         sweeps=swept("ablation"),
     output:
         table=report(
-            "results/tables/ablation.csv",
+            "study/results/tables/ablation.csv",
             caption="../report/ablation.rst",
             category="Tables",
             labels={"table": "ablation"},
@@ -91,7 +91,7 @@ rule plot_estimators:
         frame="<results>/<photos>/ground.json",
     output:
         plot=report(
-            "results/figures/estimators_{scene}.png",
+            "study/results/figures/estimators_{scene}.png",
             caption="../report/estimators.rst",
             category="Figures",
             labels={"figure": "estimators", "scene": "{scene}"},

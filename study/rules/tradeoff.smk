@@ -1,6 +1,6 @@
 """Speed against accuracy: each setting of the config's `study.tradeoff` turned by itself.
 
-In: what each experiment left, and its jobs' benchmarks. Out: results/tradeoff/{tradeoff,pareto}.csv, {pareto,knobs}.png;
+In: what each experiment left, and its jobs' benchmarks. Out: study/results/tradeoff/{tradeoff,pareto}.csv, {pareto,knobs}.png;
 study/docs/data/tradeoff.csv, where runs add up; study/docs/results/tradeoff.md. Seconds differ from machine to machine:
 one that is otherwise idle is to run all of it. `snakemake tradeoff`.
 """
@@ -44,8 +44,8 @@ rule gather_tradeoff:
     input:
         measured=lambda wildcards: files_of(tradeoff_experiments()),
     output:
-        table="results/tradeoff/tradeoff.csv",
-        pareto="results/tradeoff/pareto.csv",
+        table="study/results/tradeoff/tradeoff.csv",
+        pareto="study/results/tradeoff/pareto.csv",
         kept=update("study/docs/data/tradeoff.csv"),
     log:
         "<logs>/tradeoff/gather_tradeoff.log",
@@ -64,8 +64,8 @@ rule plot_tradeoff:
         table=rules.gather_tradeoff.output.table,
         pareto=rules.gather_tradeoff.output.pareto,
     output:
-        pareto=report("results/tradeoff/pareto.png", caption="../report/tradeoff.rst", category="Trade-off"),
-        knobs=report("results/tradeoff/knobs.png", caption="../report/tradeoff.rst", category="Trade-off"),
+        pareto=report("study/results/tradeoff/pareto.png", caption="../report/tradeoff.rst", category="Trade-off"),
+        knobs=report("study/results/tradeoff/knobs.png", caption="../report/tradeoff.rst", category="Trade-off"),
     log:
         "<logs>/tradeoff/plot_tradeoff.log",
     benchmark:

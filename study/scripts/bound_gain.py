@@ -1,5 +1,6 @@
 """Rule bound_gain: policies, and the greedy choice by true gain, on the same pool of photos."""
 
+from dav_gswt import csv_tables
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
@@ -8,7 +9,6 @@ from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings, select_settings
-from dav_gswt_study import csv_tables
 from dav_gswt_study.views import gain_bound
 
 with logging_to(snakemake.log[0]):

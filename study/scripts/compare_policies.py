@@ -1,7 +1,7 @@
 """Rule compare_policies: from curves to tables and a figure."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables
 from dav_gswt_study.comparison import curves, markdown, plots, tables
 from dav_gswt_study.markdown import render_template, write_page
 

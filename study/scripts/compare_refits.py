@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
+from dav_gswt import csv_tables
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings, select_settings
-from dav_gswt_study import csv_tables, refits
+from dav_gswt_study import refits
 
 with logging_to(snakemake.log[0]):
     paths, asked = snakemake.input, snakemake.params.refits

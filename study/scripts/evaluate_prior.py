@@ -1,9 +1,9 @@
 """Rule evaluate_prior: the accuracy of the prior on held-out worlds, compared with cheaper estimates."""
 
+from dav_gswt import csv_tables
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt_study import csv_tables
 from dav_gswt_study.prior import evaluation, plots
 from dav_gswt_study.prior.training import example_files
 

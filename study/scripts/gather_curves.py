@@ -1,7 +1,7 @@
 """Rule gather_curves: the cells' rounds, row by row."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables
 from dav_gswt_study.comparison import curves
 
 with logging_to(snakemake.log[0]):

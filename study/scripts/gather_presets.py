@@ -1,8 +1,9 @@
 """Rule gather_preset_costs: what presets cost and are worth, as a table and as a page."""
 
+from dav_gswt import csv_tables
 from dav_gswt.cli.machine_speed import measure_speed
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables, markdown
+from dav_gswt_study import markdown
 from dav_gswt_study.tradeoff import preset_costs
 
 with logging_to(snakemake.log[0]):

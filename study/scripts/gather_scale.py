@@ -1,8 +1,9 @@
 """Rule gather_scale: the curves of all cells, their exponents and a figure."""
 
+from dav_gswt import csv_tables
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables, markdown
+from dav_gswt_study import markdown
 from dav_gswt_study.scale import growth, page
 
 with logging_to(snakemake.log[0]):

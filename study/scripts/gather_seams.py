@@ -1,7 +1,7 @@
 """Rule gather_seams: crops of all experiments in one table, its summaries, and a figure."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables
 from dav_gswt_study.seams import plots, summary, tables
 
 with logging_to(snakemake.log[0]):

@@ -1,7 +1,7 @@
 """Rule gather_tradeoff: all settings as one table, and the Pareto front of those measured by test views."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables
 from dav_gswt_study.tradeoff import tables
 
 with logging_to(snakemake.log[0]):

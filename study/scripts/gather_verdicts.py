@@ -1,8 +1,8 @@
 """Rule gather_verdicts: the verdict on each scene and on each of its materials."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
 from dav_gswt.materials import store
-from dav_gswt_study import csv_tables
 
 with logging_to(snakemake.log[0]):
     rows = []

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from dav_gswt import csv_tables
 from dav_gswt.bundle import store
 from dav_gswt.logs import logging_to
 from dav_gswt.terrain import endless
-from dav_gswt_study import csv_tables
 from dav_gswt_study.terrain import flicker
 
 with logging_to(snakemake.log[0]):

@@ -1,8 +1,8 @@
 """Rule measure_materials: materials and objects of a synthetic scene against its true labels."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.synthetic.labels import read_label_map
-from dav_gswt_study import csv_tables
 from dav_gswt_study.materials import accuracy
 
 with logging_to(snakemake.log[0]):

@@ -3,13 +3,13 @@
 from dataclasses import asdict
 from pathlib import Path
 
+from dav_gswt import csv_tables
 from dav_gswt.bundle import store
 from dav_gswt.field import read_field
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.reconstruction import ground
 from dav_gswt.terrain import endless
-from dav_gswt_study import csv_tables
 from dav_gswt_study.materials import accuracy, transitions
 
 with logging_to(snakemake.log[0]):

@@ -1,7 +1,7 @@
 """Rule plot_frames: milliseconds of a frame over Gaussians in view."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables
 from dav_gswt_study.terrain import frames
 
 with logging_to(snakemake.log[0]):

@@ -1,10 +1,11 @@
 """Rule profile_rasterizer: milliseconds of the rasterizer's stages."""
 
+from dav_gswt import csv_tables
 from dav_gswt.field import read_field
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import describe_machine, record_provenance
-from dav_gswt_study import csv_tables, markdown, raster_profile
+from dav_gswt_study import markdown, raster_profile
 
 with logging_to(snakemake.log[0]):
     paths, out = snakemake.input, snakemake.output

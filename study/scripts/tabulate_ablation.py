@@ -1,7 +1,7 @@
 """Rule tabulate_ablation: estimators, policies and tilings, each minus the baseline of its sweep."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables
 from dav_gswt_study.tables import ablation, spread
 
 with logging_to(snakemake.log[0]):

@@ -1,7 +1,7 @@
 """Rule tabulate_sensitivity: one setting varied, the others fixed."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables
 from dav_gswt_study.tables import sensitivity, spread
 
 with logging_to(snakemake.log[0]):

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from dav_gswt import csv_tables
 from dav_gswt.files import copy_file
 from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables
 from dav_gswt_study.tables import results
 
 with logging_to(snakemake.log[0]):

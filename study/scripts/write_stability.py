@@ -1,8 +1,8 @@
 """Rule write_stability: the page about numerical stability, and its figure."""
 
+from dav_gswt import csv_tables
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables
 from dav_gswt_study.stability import page, plots
 
 with logging_to(snakemake.log[0]):

@@ -3,16 +3,15 @@
 A cell is a scene, a seed (of the start photos), a policy with its parameters, and k.
 """
 
-import csv
 from pathlib import Path
 
+from dav_gswt import csv_tables
 from dav_gswt.files import read_json
+from dav_gswt.sweeps import QUALITY as MEASURES
+from dav_gswt.sweeps import describe_origin, read_benchmark, select_metrics, sum_or_none
 from dav_gswt.views import marginal_gain
-from dav_gswt_study import csv_tables
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")
-MEASURES = ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")
-ASIDE = ("oblique", "walker")  # groups of test views away from where photos may be taken
 EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # predicted before a round: `marginal_gain`
 
 
@@ -31,13 +30,12 @@ def read_cell(cell: dict) -> list[dict]:
         row |= _predict_gain(found, fits, metrics["photos"])
         if t:
             fits.append(metrics["fit"])
-        row |= {"seconds": _sum_seconds(cell["times"][t - 1]) if t else 0.0}
+        row |= {
+            "seconds": sum_or_none(run and run[0] for run in map(read_benchmark, cell["times"][t - 1])) if t else 0.0
+        }
         row |= {"evaluations": _count_evaluations(cell["facts"][t - 1], cell["samples"]) if t else 0}
         provenance = metrics["provenance"]
-        renderer = " ".join(str(value) for value in provenance["renderer"].values())
-        found.append(
-            row | {"version": provenance["version"], "renderer": renderer, "field": provenance["inputs"]["field"][:12]}
-        )
+        found.append(row | describe_origin(provenance) | {"field": provenance["inputs"]["field"][:12]})
     return found
 
 
@@ -45,16 +43,6 @@ def read_curves(path: Path | str) -> list[dict]:
     """Read the table of curves."""
     integers = ("seed", "k", "round", "photos", "evaluations")
     return csv_tables.read_table(path, numbers=(*MEASURES, *EXPECTED, "seconds"), integers=integers)
-
-
-def select_metrics(metrics: dict, psnr: str) -> dict:
-    """MEASURES of a metrics.json, PSNR by its key: over the test views from where photos may be taken, if they are a
-    group of their own, else over all."""
-    groups = metrics["groups"]
-    mine = next((groups[name] for name in groups if name not in ASIDE), metrics)
-    found = {"psnr": mine[psnr], "ssim": mine["ssim"], "lpips": mine["lpips"]}
-    found |= {"worst_psnr": mine["worst_decile"][psnr]}
-    return found | {"walker_psnr": groups["walker"][psnr] if "walker" in groups else None}
 
 
 def _predict_gain(before: list[dict], fits: list[dict], photos: int) -> dict:
@@ -66,17 +54,6 @@ def _predict_gain(before: list[dict], fits: list[dict], photos: int) -> dict:
     )
     values = (found.closes, found.gain, found.low, found.high) if found else (None,) * len(EXPECTED)
     return dict(zip(EXPECTED, values, strict=True))
-
-
-def _sum_seconds(files: list[str]) -> float | None:
-    """Of a round's jobs together; None where one left no benchmark."""
-    if not all(Path(file).is_file() for file in files):
-        return None
-    total = 0.0
-    for file in files:
-        with Path(file).open(newline="", encoding="utf-8") as text:
-            total += float(next(csv.DictReader(text, delimiter="\t"))["s"])
-    return total
 
 
 def _count_evaluations(facts: str, samples: int) -> int:

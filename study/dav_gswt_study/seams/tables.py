@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from dav_gswt import csv_tables
 from dav_gswt.files import read_json
-from dav_gswt_study import csv_tables
 from dav_gswt_study.seams.summary import CELL
 
 KEYS = (

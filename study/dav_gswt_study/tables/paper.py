@@ -7,7 +7,7 @@ says which.
 import re
 from pathlib import Path
 
-from dav_gswt_study import csv_tables
+from dav_gswt import csv_tables
 
 PRINTED = Path(__file__).with_name("paper.csv")
 THOUSAND = 1e3

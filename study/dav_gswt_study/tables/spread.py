@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt_study import csv_tables
+from dav_gswt import csv_tables
 from dav_gswt_study.sweeps import tables as sweep
 
 VIEWER = (

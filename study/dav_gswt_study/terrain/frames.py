@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from fixtures import browser
 
+from dav_gswt import csv_tables
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.images import figures
 from dav_gswt.logs import progress
@@ -20,7 +21,6 @@ from dav_gswt.terrain import endless, heights, stills, visibility
 from dav_gswt.terrain.page import write_page
 from dav_gswt.terrain.stills import Shot
 from dav_gswt.terrain.timing import FrameTiming
-from dav_gswt_study import csv_tables
 from dav_gswt_study.tables import spread
 
 PARTS = ("render", "sort", "update")

@@ -12,10 +12,8 @@ from dav_gswt.cli.machine_speed import MachineSpeed
 from dav_gswt.files import read_json
 from dav_gswt.images.image_files import list_photos
 from dav_gswt.provenance import describe_machine
-from dav_gswt_study.comparison.curves import select_metrics
+from dav_gswt.sweeps import MEGA, describe_origin, read_benchmark, select_metrics, sum_or_none
 from dav_gswt_study.markdown import format_number, format_table
-from dav_gswt_study.statistics import sum_or_none
-from dav_gswt_study.sweeps.tables import MEGA, describe_origin, read_benchmark
 
 PARTS = {"fits": "fits", "views": "scores and choice of views", "tiles": "materials, levels, tiles, bundle"}
 NUMBERS = ("photos", "gaussians", "psnr", "ssim", "lpips", *(f"{part}_s" for part in PARTS), "seconds", "peak_mb")

@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
+from dav_gswt import csv_tables
 from dav_gswt.images import image_files
 from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.provenance import describe_machine
-from dav_gswt_study import csv_tables
-from dav_gswt_study.statistics import subtract_or_none, sum_or_none
+from dav_gswt.sweeps import sum_or_none
+from dav_gswt_study.statistics import subtract_or_none
 from dav_gswt_study.sweeps import tables as sweeps
 from dav_gswt_study.sweeps.grid import CELL
 from dav_gswt_study.tradeoff.front import find_pareto_front, find_rivals
@@ -28,7 +29,7 @@ def tabulate_settings(cells: list[dict]) -> list[dict]:
     own_seconds: of those that the knob can change: all of them where views tell its accuracy, else the jobs on tiles.
     loss: of PSNR in dB (views), of Seam-LPIPS over its floor (seams), or the root mean square difference of the stills
     in grey levels (stills); 0 for what is taken for the most accurate, below 0 where a setting is better than it.
-    stills_psnr: empty where equal. cells: what `sweeps.tables.tabulate_cell` reads, with `knob`, `setting`, `most`,
+    stills_psnr: empty where equal. cells: what `tabulate_experiment` reads, with `knob`, `setting`, `most`,
     `base`, `measure` and the paths of `stills`.
     """
     found, best = [], {}
@@ -44,7 +45,11 @@ def tabulate_settings(cells: list[dict]) -> list[dict]:
 
 def measure_cell(cell: dict) -> dict:
     """Measures and cost of an experiment: the columns of a sweep's row, seconds and own_seconds."""
-    row = {key: value for key, value in sweeps.tabulate_cell(cell).items() if key not in ("sweep", "samples", "steps")}
+    row = {
+        key: value
+        for key, value in sweeps.tabulate_experiment(cell).items()
+        if key not in ("sweep", "samples", "steps")
+    }
     tiles = sum_or_none(row[key] for key in TILE_JOBS)
     seconds = sum_or_none([row["recon_s"], tiles])
     return row | {"seconds": seconds, "own_seconds": seconds if cell.get("measure") == "views" else tiles}

@@ -2,7 +2,8 @@ import json
 
 import pytest
 
-from dav_gswt_study import csv_tables
+from dav_gswt import csv_tables
+from dav_gswt.sweeps import TILES, TIMES
 from dav_gswt_study.seams import measure
 from dav_gswt_study.sweeps import tables
 
@@ -43,28 +44,13 @@ def crops(folder):
 
 def test_a_row_holds_what_was_measured_and_where_it_comes_from_and_photos_have_their_exposure_fitted(tmp_path):
     files = {"metrics": metrics(tmp_path), "manifest": manifest(tmp_path)} | crops(tmp_path)
-    row = tables.tabulate_cell(CELL | {"files": files, "times": {}})
+    row = tables.tabulate_experiment(CELL | {"files": files, "times": {}})
     assert (row["psnr"], row["worst_psnr"], row["photos"], row["psnr_is"]) == (20, 15, 16, "raw")
     assert (row["uncertainty"], row["deep"], row["levels"], row["splats"]) == (0.5, 0.5, 2, 17)
     assert (row["orders"], row["bundle_mb"]) == (3 + 1 + 2 + 1, 0.85)
     assert row["seam_lpips"] == pytest.approx(0.2) and row["seam_density"] == 0.4 and row["seam_psnr"] == 30
     assert (row["field"], row["tiles"], row["renderer"]) == (12 * "f", 12 * "t", "cpu x")
 
-    row = tables.tabulate_cell(CELL | {"corrected": True, "files": {"metrics": metrics(tmp_path)}, "times": {}})
+    row = tables.tabulate_experiment(CELL | {"corrected": True, "files": {"metrics": metrics(tmp_path)}, "times": {}})
     assert (row["psnr"], row["worst_psnr"], row["psnr_is"]) == (21, 16, "colour-corrected")
-    assert not [row[key] for key in (*tables.TILES, *tables.SEAMS, *tables.TIMES) if row[key] is not None]
-
-
-def test_seconds_are_those_of_a_round_and_of_all_that_leads_to_the_field(tmp_path):
-    jobs = {"coarse": [(10, 300)], "score": [(4, 700), (6, "NA")], "select": [(1, 10), (1, 10)], "capture": [(99, 50)]}
-    jobs |= {"update": [(5, 400), (7, 400)], "cut": [(3, 200)]}
-    paths = {job: [str(tmp_path / f"{job}{k}.tsv") for k in range(len(runs))] for job, runs in jobs.items()}
-    for job, runs in jobs.items():
-        for path, (seconds, memory) in zip(paths[job], runs, strict=True):
-            (tmp_path / path).write_text(f"s\th:m:s\tmax_rss\n{seconds}\t0:00\t{memory}\n")
-    found = tables.sum_times(paths)
-    assert (found["score_s"], found["select_s"], found["update_s"], found["cut_s"]) == (5, 1, 6, 3)
-    assert (found["recon_s"], found["peak_mb"], found["bundle_s"]) == (10 + 10 + 2 + 12, 700, None)
-    found = tables.sum_times({"coarse": paths["coarse"], "score": [str(tmp_path / "gone.tsv")]})
-    assert (found["coarse_s"], found["score_s"], found["recon_s"], found["peak_mb"]) == (10, None, None, 300)
-    assert tables.sum_times({"coarse": [], "score": []})["recon_s"] is None
+    assert not [row[key] for key in (*TILES, *tables.SEAMS, *TIMES) if row[key] is not None]

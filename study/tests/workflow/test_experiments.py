@@ -41,17 +41,17 @@ def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, 
     sweep |= {"measure": {"views": [0], "tiles": [0], "stills": [0]}}
     figures = {"scenes": ["desert"], "seed": 0, "estimators": ["w2"], "policy": "farthest", "rounds": 1}
     tables = {"timing": "few", "sensitivity": ["few"], "ablation": ["few"], "also": [], "figures": figures}
-    made = [f"results/tables/{name}.csv" for name in ("timing", "sensitivity", "ablation")]
+    made = [f"study/results/tables/{name}.csv" for name in ("timing", "sensitivity", "ablation")]
     uncertainty = str(tiny.bundle.relative_to(tiny.folder) / "uncertainty.png")
     configs = write_study(tmp_path, sweeps={"few": sweep}, tables=tables)
-    done = snakemake(copied, "--cores", "2", "results/sweeps/few.png", *made, uncertainty, configs=configs)
+    done = snakemake(copied, "--cores", "2", "study/results/sweeps/few.png", *made, uncertainty, configs=configs)
     assert "8 of 8 steps (100%) done" in done.stdout  # bundle, stills, gather, plot, three tables, uncertainty
-    rows = read_rows(copied / "results/sweeps/few.csv")
+    rows = read_rows(copied / "study/results/sweeps/few.csv")
     assert [(row["tau"], row["scene"], row["photos"]) for row in rows] == [(t, "desert", "7") for t in ("0.3", "0.6")]
     assert all(float(row[key]) > 0 for row in rows for key in ("psnr", "bundle_mb", "orders", "recon_s", "stills_s"))
     assert rows[0]["psnr"] == rows[1]["psnr"] and rows[0]["seam_lpips"] == ""
     assert (copied / "study/docs/data/sweep_few.csv").read_text().count("\n") == 3
-    for path in ("results/sweeps/few.png", uncertainty):
+    for path in ("study/results/sweeps/few.png", uncertainty):
         assert image_files.read_size(copied / path)[0] > 600
 
 
@@ -62,7 +62,7 @@ def test_a_finished_run_is_traded_off(snakemake, copied, tmp_path):
     page = "study/docs/results/tradeoff.md"
     done = snakemake(copied, "--cores", "2", "--scheduler", "greedy", page, configs=configs)
     assert "8 of 8 steps (100%) done" in done.stdout  # metrics, two bundles and their stills, table, plot, page
-    rows = read_rows(copied / "results/tradeoff/tradeoff.csv")
+    rows = read_rows(copied / "study/results/tradeoff/tradeoff.csv")
     assert [row["setting"] for row in rows] == ["draft", "0", "0.6", "1"]
     assert all(float(row[key]) > 0 for row in rows for key in ("seconds", "own_seconds", "psnr", "bundle_mb"))
     assert "`draft` is the best for its time" in (copied / page).read_text()
@@ -79,7 +79,7 @@ def test_a_finished_run_has_figures_of_its_views(snakemake, copied):
 
 def test_a_kit_is_made_answered_and_analysed(snakemake, copied):
     snakemake(copied, "--cores", "2", "perceptual_kit", configs=CONFIGS)
-    home = copied / "results/forced_choice/kit"
+    home = copied / "study/results/forced_choice/kit"
     key = read_json(home / "key.json")
     assert (home / "page/index.html").is_file() and len(key["items"]) == 3  # two crops, and a check
     (copied / "answers").mkdir()
@@ -87,7 +87,7 @@ def test_a_kit_is_made_answered_and_analysed(snakemake, copied):
         told = answer_files.answers(key, number, lambda item, number=number: item["check"] or number == 0)
         (copied / f"answers/2afc_{told['participant']}.json").write_text(json.dumps(told))
     snakemake(copied, "--cores", "1", "perceptual_results", configs=CONFIGS)
-    every, desert = read_rows(copied / "results/tables/forced_choice.csv")
+    every, desert = read_rows(copied / "study/results/tables/forced_choice.csv")
     assert (every["scene"], every["participants"], every["share"]) == ("every", "4", "0.25")
     assert float(every["low"]) < float(every["binomial_low"]) and desert["share"] == "0.25"
     (copied / "answers/zzz.json").write_text('{"format": "davgswt-2afc"}')
@@ -97,7 +97,7 @@ def test_a_kit_is_made_answered_and_analysed(snakemake, copied):
 
 def test_what_the_page_s_shortcuts_cost_is_measured_and_drawn(snakemake, copied):
     snakemake(copied, "--cores", "2", "presort_table", configs=CONFIGS)
-    rows = read_rows(copied / "results/tables/presort.csv")
+    rows = read_rows(copied / "study/results/tables/presort.csv")
     assert len(rows) == 12 and {r["scene"] for r in rows} == {"desert"}
     assert all(float(r["psnr"] or "inf") > 25 for r in rows if r["shortcut"] != "levels")
 
@@ -105,26 +105,26 @@ def test_what_the_page_s_shortcuts_cost_is_measured_and_drawn(snakemake, copied)
 def test_frames_of_the_library_and_of_the_page_are_timed(chromium, snakemake, copied):
     """The budgets that were asked for, and what the study's tables join; no time is asserted but that there is one."""
     snakemake(copied, "--cores", "2", "frame_times", configs=CONFIGS)
-    rows = read_rows(copied / "results/tables/frames.csv")
+    rows = read_rows(copied / "study/results/tables/frames.csv")
     asked = [(renderer, budget) for renderer in ("library", "page") for budget in ("2000", "1000")]
     assert [(r["renderer"], r["budget"]) for r in rows] == asked
     assert all(float(r["splats"]) > 0 and float(r["render_ms"]) > 0 for r in rows)
     # the page also brings the end of the ground nearer; the library stops at the coarsest level, here of two
     assert all(float(r["splats"]) <= float(r["budget"]) for r in rows if r["renderer"] == "page")
-    (joined,) = spread.read_viewer(copied / "results/tables/viewer.csv")
+    (joined,) = spread.read_viewer(copied / "study/results/tables/viewer.csv")
     assert (joined["scene"], joined["tau"]) == ("desert", "0.6") and 0 < joined["update_share"] <= 1
 
 
 def test_every_level_of_every_tile_is_measured(tiny, snakemake, copied):
     snakemake(copied, "--cores", "2", "lod_table", configs=CONFIGS)
-    rows = read_rows(copied / "results/tables/lod.csv")
+    rows = read_rows(copied / "study/results/tables/lod.csv")
     levels = len(read_json(tiny.bundle / "davgswt.json")["levels"])
     assert {(int(r["tile"]), int(r["level"])) for r in rows} == {(t, lv) for t in range(16) for lv in range(levels)}
     assert all((r["oblique_db"] == "") == (r["level"] == "0") for r in rows)
 
 
 def test_a_run_that_cannot_be_done_leaves_its_message(snakemake, tmp_path):
-    snakemake(tmp_path, "--cores", "1", "results/stability/two-photos")
-    found = json.loads((tmp_path / "results/stability/two-photos/outcome.json").read_text())
+    snakemake(tmp_path, "--cores", "1", "study/results/stability/two-photos")
+    found = json.loads((tmp_path / "study/results/stability/two-photos/outcome.json").read_text())
     assert found["exit_code"] == 1 and not found["traceback"]
     assert found["message"].startswith("config: scenes.desert.photos: input should be greater than or equal to 3")

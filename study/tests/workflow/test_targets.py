@@ -34,8 +34,8 @@ def test_a_sweep_runs_shared_stages_once(planned, tmp_path, vary, jobs):
     fixed |= {} if "rounds" in vary else {"rounds": 1}
     sweep = {"scenes": ["desert"], "vary": vary, "fixed": fixed, "measure": {"views": [0]}}
     (tmp_path / "few.yaml").write_text(yaml.safe_dump({"study": {"sweeps": {"few": sweep}}}))
-    plan = planned(tmp_path, "results/sweeps/few.csv", configs=(USUAL, TINY, tmp_path / "few.yaml"))
-    wanted = jobs | dict(render_photos=1, fit_coarse=1, gather_sweep=1, make_levels=0)
+    plan = planned(tmp_path, "study/results/sweeps/few.csv", configs=(USUAL, TINY, tmp_path / "few.yaml"))
+    wanted = jobs | dict(render_photos=1, fit_coarse=1, gather_comparison=1, make_levels=0)
     assert {rule: plan[rule] for rule in wanted} == wanted
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from fixtures.configs import ROOT
 
+from dav_gswt import csv_tables
 from dav_gswt.cli import advise, main
 from dav_gswt.cli.advise import Choice, Limits, choose
 from dav_gswt.cli.estimate import describe_work, estimate_seconds
@@ -15,7 +16,6 @@ from dav_gswt.cli.finished_run import find_finished_run
 from dav_gswt.cli.forecast import FRONT, Forecast, Measured
 from dav_gswt.cli.machine_speed import MachineSpeed
 from dav_gswt.images.image_files import write_png
-from dav_gswt.study import csv_tables
 
 SCENE = "{kind: photos, folder: photos, size: 64, start: 2, agent: replay, preset: standard, tiling: auto}"
 PRESETS = {"draft": (28.0, 0.2), "standard": (30.0, 0.1), "reference": (30.4, 0.08)}  # PSNR, LPIPS

@@ -13,8 +13,7 @@ from dav_gswt.views.policy_names import POLICY_NAME, PRIOR_POLICIES, ZERO_SETTIN
 
 RESULTS = "results"
 # Directories beside the scenes' own; no scene may have such a name.
-RESERVED = ("logs", "benchmarks", "snapshots", "weights", "prior", "sweeps", "tables", "figures", "tradeoff")
-RESERVED = (*RESERVED, "stability", "forced_choice", "gallery")
+RESERVED = ("logs", "benchmarks", "snapshots", "weights", "sweeps", "tables", "gallery")
 SNAPSHOTS = f"{RESULTS}/snapshots"  # of running fits: outside the outputs, so that a killed fit can go on
 LPIPS_WEIGHTS = f"{RESULTS}/weights/lpips_alexnet.safetensors"
 MOBILESAM = f"{RESULTS}/weights/mobilesam"  # a folder
@@ -206,16 +205,3 @@ def describe_tree() -> str:
     """The tree as text, for results/README.md."""
     shown = [(f"{RESULTS}/{stage_template(stage)}/", contents) for stage, contents in CONTENTS.items()]
     return "\n".join(f"{path}\n    {contents}" for path, contents in shown)
-
-
-# Old top-level keys of the config that the study has now: `study.` and the new name.
-STUDY_TABLES = {
-    "lod": "lod",
-    "frames": "frames",
-    "calibration": "calibration",
-    "benchmark": "view_benchmark",
-    "seam_study": "seams",
-    "perceptual_study": "forced_choice",
-    "sweeps": "sweeps",
-    "tradeoff": "tradeoff",
-}

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
 from dav_gswt.config.exports import Export
@@ -28,6 +28,7 @@ else:
     Policy = Literal[POLICY_NAMES]
 Lpips = Literal["installed", "none"] | Text
 Segmenter = Literal["none", "fetch"] | Text
+Swept = Literal["k", "p_drop", "lam", "tau", "rounds"]
 
 
 class Config(ConfigModel):
@@ -87,6 +88,7 @@ class Config(ConfigModel):
     scenes: dict[Name, Scene] = key("what there is to make a terrain of", {})
     priors: dict[Name, PriorSettings] = key("diffusion priors", {})
     presets: dict[Name, Preset] = key("speed against accuracy", renamed="qualities", min_length=1)
+    sweeps: dict[Swept, list[int | float]] = key("`snakemake sweeps`: values of settings, each varied by itself", {})
     tilings: dict[Name, Tiling] = key("how tiles are cut", renamed="seams", min_length=1)
 
     @model_validator(mode="after")
@@ -100,6 +102,19 @@ class Config(ConfigModel):
             _require_chooser(name, preset, self.presets)
         if "none" in self.priors:
             raise ValueError("priors.none: is the name of no prior; give yours another")
+        return self
+
+    @model_validator(mode="after")
+    def _check_swept_values(self) -> "Config":
+        """Each value of a sweep is one that the setting itself can have."""
+        for name, values in self.sweeps.items():
+            field = type(self).model_fields[name]
+            allowed = TypeAdapter(Annotated[field.annotation, *field.metadata])
+            for value in values:
+                try:
+                    allowed.validate_python(value, strict=True)
+                except ValidationError as error:
+                    raise ValueError(f"sweeps.{name}: {value}: {error.errors()[0]['msg'].lower()}") from None
         return self
 
     @model_validator(mode="after")

@@ -1,6 +1,6 @@
 import pytest
 
-from dav_gswt_study import csv_tables
+from dav_gswt import csv_tables
 
 
 def test_a_table_holds_five_digits_and_gives_back_numbers_texts_and_missing_values(tmp_path):

@@ -1,4 +1,4 @@
-"""Rule plot_sweep: measures of a sweep over the setting that it varies."""
+"""Rule plot_comparison: measures of a sweep over the setting that it varies."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt_study.sweeps import plots, tables

@@ -1,7 +1,7 @@
-"""Rule tabulate_timing: time of each stage, and of a frame of the viewer."""
+"""Rule compare_timing: time of each stage, and of a frame of the viewer."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
-from dav_gswt_study import csv_tables
 from dav_gswt_study.tables import spread, timing
 
 with logging_to(snakemake.log[0]):

@@ -1,13 +1,12 @@
-"""Read, write and merge the CSV tables of studies.
+"""Read, write and merge CSV tables.
 
 A table is a list of rows, a row a dict from column to value. Files keep one format: floats with five significant
 digits, an empty field for a value that is not known, lines that end in a newline.
 """
 
+import csv
 from collections.abc import Collection, Iterable
 from pathlib import Path
-
-import pandas as pd
 
 from dav_gswt.files import atomic_file
 
@@ -25,8 +24,9 @@ def write_table(path: Path | str, rows: Iterable[dict]) -> None:
         columns = list(rows[0])
         if extra := {name for row in rows for name in row} - set(columns):
             raise ValueError(f"{path}: the first row has no column {', '.join(sorted(extra))}")
-        frame = pd.DataFrame([[_format(row.get(name)) for name in columns] for row in rows], columns=columns, dtype=str)
-        frame.to_csv(part, index=False, lineterminator="\n")
+        with part.open("w", encoding="utf-8", newline="") as text:
+            writer = csv.writer(text, lineterminator="\n")
+            writer.writerows([columns, *([_format(row.get(name)) for name in columns] for row in rows)])
 
 
 def read_table(
@@ -46,13 +46,12 @@ def read_table(
         return []
     if path.stat().st_size == 0:
         return []
-    frame = pd.read_csv(path, dtype=str, keep_default_na=False, na_filter=False, encoding="utf-8")
+    with path.open(encoding="utf-8", newline="") as text:
+        columns, *rows = csv.reader(text)
     if texts is not None:
-        numbers = [*numbers, *frame.columns.difference([*texts, *integers])]
+        numbers = [*numbers, *(name for name in columns if name not in (*texts, *integers))]
     kinds = dict.fromkeys(numbers, float) | dict.fromkeys(integers, int)
-    columns = [str(name) for name in frame.columns]
-    rows = frame.itertuples(index=False, name=None)
-    return [{n: _parse(value, kinds.get(n)) for n, value in zip(columns, row, strict=True)} for row in rows]
+    return [{n: _parse(value, kinds.get(n)) for n, value in zip(columns, row, strict=True)} for row in rows if row]
 
 
 def merge_rows(before: list[dict], new: list[dict], key: Collection[str]) -> list[dict]:
