@@ -1,7 +1,7 @@
 # Targets of the study, which the project's Makefile includes.
 OPENSPLAT ?= opensplat
 STUDY := PYTHONPATH=study:tests $(BIN)/python
-.PHONY: test-study lint-study compare claims prior
+.PHONY: test-study lint-study bench-study compare claims prior
 
 # about 15 minutes: the tests of the study
 test-study: .venv/installed-test
@@ -26,3 +26,6 @@ claims: .venv/installed
 # hours: the weights that come with the project were made so
 prior: .venv/installed
 	@$(BIN)/snakemake -s study/Snakefile --cores $(CORES) -- study/results/prior/terrain.safetensors
+
+bench-study: .venv/installed-test
+	@for bench in study/benchmarks/*.py; do PYTHONPATH=study:benchmarks:tests:tests/browser $(BIN)/python $$bench || exit 1; done

@@ -12,7 +12,7 @@ from dav_gswt.config.load import check_config, check_model
 from dav_gswt.config.model import Policy
 from dav_gswt.config.settings import Flight, Heights
 from dav_gswt.errors import InputError
-from dav_gswt_study.config_fits import Comparison, GainBound, Names, PresetCosts, Refits, Scale, Seeds
+from dav_gswt_study.config_fits import Comparison, Names, PresetCosts, Seeds
 from dav_gswt_study.seams import replicates
 from dav_gswt_study.sweeps import grid
 from dav_gswt_study.tables import checks
@@ -291,10 +291,7 @@ class StudyConfig(ConfigModel):
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
     view_benchmark: ViewBenchmark | None = key("policies", None, renamed="benchmark")
-    refits: dict[Name, Refits] = key("by scene: photos in rounds against photos at once", {})
-    gain_bound: dict[Name, GainBound] = key("by scene: policies beside the best choice there is", {})
     compare: Comparison | None = key("another program's fit beside ours", None)
-    scale: Scale | None = key("how costs grow", None)
     seams: Seams | None = key("seams and repetition", None, renamed="seam_study")
     forced_choice: ForcedChoice | None = key("the study with people", None, renamed="perceptual_study")
     sweeps: dict[Name, Sweep] = key("by name", {})
@@ -317,10 +314,6 @@ def expand_study(config: dict, study: dict) -> dict:
         _require_names("study.gallery.walk", [study["gallery"]["walk"]], config["scenes"], "scenes")
     if "compare" in study:
         _require_names("study.compare.scene", [study["compare"]["scene"]], config["scenes"], "scenes")
-    if "scale" in study:
-        _require_names("study.scale.scene", [study["scale"]["scene"]], config["scenes"], "scenes")
-        for name in ("field", "preset"):
-            _require_names(f"study.scale.{name}", [study["scale"][name]], config["presets"], "presets")
     if "preset_costs" in study:
         _require_names("study.preset_costs.scenes", study["preset_costs"]["scenes"], config["scenes"], "scenes")
         _require_names("study.preset_costs.presets", study["preset_costs"]["presets"], config["presets"], "presets")

@@ -11,46 +11,6 @@ Seeds = Annotated[list[Seed], Field(min_length=1)]
 Names = Annotated[list[Name], Field(min_length=1)]
 
 
-class Refits(Preset):
-    """`snakemake refits`: photos taken in rounds against one fit to all of them, with the same number of steps."""
-
-    photos: int = key("of the last round, the start included", ge=3, le=100_000)
-    photos_a_round: list[Annotated[int, Field(ge=1, le=1000)]] = key("sizes of rounds that are compared", min_length=1)
-    first_rates: list[Annotated[float, Field(gt=0, le=1)]] = key(
-        "learning rates at the first step of a refit, as shares of a first fit's", min_length=1
-    )
-    seeds: Seeds = key("of fits; the start is that of the first one")
-
-
-class GainBound(Preset):
-    """`snakemake gain_bound`: policies beside the greedy choice of the photo whose refit truly gains most."""
-
-    k: int = key("photos a round", ge=1, le=1000)
-    rounds: int = key("rounds", ge=1, le=100)
-    seeds: Seeds = key("of fits; the start is that of the first one")
-
-
-Amounts = Annotated[list[Annotated[int, Field(ge=1, le=100_000_000)]], Field(min_length=3)]
-
-
-class Scale(ConfigModel):
-    """`snakemake scale`: how seconds and memory grow."""
-
-    scene: Name = key("whose first field photos are rendered from")
-    field: Name = key("an entry of `presets`, of that field")
-    preset: Name = key("an entry of `presets`, of the fits that are measured")
-    photos: Amounts = key("numbers of photos of a fit")
-    size: int = key("of these photos", unit="pixels a side", ge=32, le=16384)
-    pixels: Amounts = key("sizes of photos of a fit, pixels a side")
-    photos_of_pixels: int = key("number of these photos", ge=3, le=1000)
-    steps_of_pixels: int = key("optimiser steps of their fits: a preset's would take long", ge=1, le=100_000)
-    limits: Amounts = key("most Gaussians of a fit, by as many photos and steps")
-    pixels_of_limits: int = key("size of the photos of these fits", unit="pixels a side", ge=32, le=16384)
-    gaussians: Amounts = key("numbers of Gaussians that are rendered")
-    candidates: Amounts = key("numbers of candidates that are scored")
-    tiles: Amounts = key("numbers of tiles in view")
-
-
 class Comparison(Preset):
     """`make compare OPENSPLAT=<program>`: other programs' fits beside ours, of the same photos."""
 

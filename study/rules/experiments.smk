@@ -331,9 +331,3 @@ def figure_rounds(wildcards):
 def in_figure_rounds(file):
     """An input function: a file as each round of the evolution figure left it."""
     return lambda wildcards: [f"{round_folder(t)}/{file}" for t in figure_rounds(wildcards)]
-
-
-def first_start(wildcards, table):
-    """The view split of a scene of a study's table, by the first of its seeds."""
-    seed = STUDY[table][wildcards.scene]["seeds"][0]
-    return str(paths.stage_folder("start", {"scene": wildcards.scene, "seed": seed}) / "views.json")

@@ -6,6 +6,12 @@ OPENSPLAT=/path/to/opensplat` makes them.
 """
 
 
+def compared_photos(wildcards):
+    """The photo set that all programs fit."""
+    folder = paths.stage_folder("photos", {"scene": STUDY["compare"]["scene"]})
+    return {"frame": str(folder / "ground.json"), "images": str(folder / "images"), "model": str(folder / "sparse")}
+
+
 rule compare_fitters:
     """Fit the same photos by each program, one after the other, and look at the test photos meanwhile."""
     input:

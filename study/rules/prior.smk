@@ -1,16 +1,13 @@
-"""The project's own prior: its training, and how good it is on worlds that it was not trained on.
+"""Training of the project's own prior.
 
 In: nothing of a scene. Out: study/results/prior/examples/part{part}.npz, what it learns from (part p holds views of the synthetic worlds 20 p to
-20 p + 19); study/results/prior/terrain.safetensors, its weights, which `make prior` trains: hours; study/docs/data/prior_trial.csv and
-figures/prior_samples.png, of the weights that come with the library.
+20 p + 19); study/results/prior/terrain.safetensors, its weights, which `make prior` trains: hours.
 """
 
 WORLDS_A_PART, VIEWS_A_WORLD = 20, 16
-PARTS = 32  # of examples that the prior is trained on; later ones are for evaluation
+PARTS = 32  # of examples that the prior is trained on
 CODER = dict(steps=6000, batch=16, rate=2e-3, seed=0)
 DENOISER = dict(steps=8000, batch=24, rate=6e-4, seed=1)
-HELD_OUT = range(40, 44)  # parts of worlds that nothing was trained on
-TRIAL = dict(m=5, p_drop=0.15, steps=8, seed=0)  # as the config asks the prior
 
 
 rule make_examples:
@@ -56,32 +53,3 @@ rule train_prior:
         source=code_of_study("train_prior"),
     script:
         "../scripts/train_prior.py"
-
-
-rule evaluate_prior:
-    """How near the prior comes to the truth, and what its uncertainty is worth, on worlds that it was not trained on.
-
-    Columns on LPIPS are empty with `lpips: none`.
-    """
-    input:
-        weights=lambda wildcards: terrain_weights("terrain"),
-        examples=expand("study/results/prior/examples/part{part}.npz", part=HELD_OUT),
-        lpips=lambda wildcards: list(lpips_weights(wildcards).values()),
-    output:
-        table="study/docs/data/prior_trial.csv",
-        samples="study/docs/figures/prior_samples.png",
-    log:
-        "<logs>/prior/evaluate_prior.log",
-    benchmark:
-        "<benchmarks>/prior/evaluate_prior.tsv"
-    threads: 2
-    resources:
-        mem_mb=per_attempt(4000),
-        runtime=per_attempt("2h"),
-    params:
-        setting=TRIAL,
-        views=320,  # of those held out, evenly
-        shown=8,
-        source=code_of_study("evaluate_prior"),
-    script:
-        "../scripts/evaluate_prior.py"

@@ -62,40 +62,5 @@ rule view_benchmark:
         lambda wildcards: expand(list(rules.compare_policies.output), table=STUDY["view_benchmark"]["table"]),
 
 
-rule bound_gain:
-    """Let policies and the greedy choice by true gain choose from the same pool."""
-    input:
-        unpack(lpips_weights),
-        views=lambda wildcards: first_start(wildcards, "gain_bound"),
-        frame="<results>/<photos>/ground.json",
-        images="<results>/<photos>/images",
-        model="<results>/<photos>/sparse",
-    output:
-        table="study/docs/data/gain_bound_{scene}.csv",
-    log:
-        "<logs>/benchmark/bound_gain_{scene}.log",
-    benchmark:
-        "<benchmarks>/benchmark/bound_gain_{scene}.tsv"
-    wildcard_constraints:
-        scene="|".join(STUDY["gain_bound"]) or NEVER,
-    threads: 2
-    resources:
-        mem_mb=per_attempt(3000),
-        runtime=per_attempt("120m"),
-    params:
-        bound=lambda wildcards: STUDY["gain_bound"][wildcards.scene],
-        whole=lambda wildcards: config["scenes"][wildcards.scene].get("whole", False),
-        source=code_of_study("bound_gain"),
-    script:
-        "../scripts/bound_gain.py"
-
-
-rule gain_bound:
-    """The bound of view selection on every scene of the config's `study.gain_bound`."""
-    input:
-        expand("study/docs/data/gain_bound_{scene}.csv", scene=STUDY["gain_bound"]),
-
-
 localrules:
     view_benchmark,
-    gain_bound,

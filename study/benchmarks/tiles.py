@@ -18,11 +18,11 @@ from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.lod import build as levels
 from dav_gswt.reconstruction import discs, top_view, underlay
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.study.refine import build as refine
-from dav_gswt.study.refine import repair
 from dav_gswt.tiles import build as tiles
 from dav_gswt.tiles.layout import Exemplar
 from dav_gswt.views import prior_sampling
+from dav_gswt_study.refine import build as refine
+from dav_gswt_study.refine import repair
 
 CELLS, SPACING, ALL = 384, 0.05, 200_000
 STEPS = 60  # of each level's fit: preset `draft`

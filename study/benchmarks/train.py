@@ -11,7 +11,7 @@ import numpy as np
 from record import report_figures
 
 from dav_gswt.reconstruction.fit_settings import CoarseSettings
-from dav_gswt.study import fit_profile
+from dav_gswt_study import fit_profile
 
 COPR = CoarseSettings(size=256, spacing=1.5, max_gaussians=350_000, steps=1000)
 HIGH = CoarseSettings(size=384, spacing=1.25, max_gaussians=150_000, steps=400)
@@ -26,6 +26,8 @@ def photos(scene: str) -> Path:
             sys.executable,
             "-m",
             "snakemake",
+            "--snakefile",
+            "study/Snakefile",
             "--cores",
             "2",
             "--quiet",

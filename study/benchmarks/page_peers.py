@@ -5,8 +5,8 @@ eye back and forth by some thousandths of a degree and is timed until a pixel ca
 software, where ratios carry over and milliseconds do not, or with `--gpu` on a graphics card, at 1920 x 1080. Prints a
 table, asserts nothing.
 
-`python benchmarks/page_peers.py BUNDLE [--gpu] [RENDERER ...]`: by default all; they come by `npm ci` in
-benchmarks/peers. In software Spark takes seconds for a frame, so a quarter of an hour for all; without it two minutes.
+`python study/benchmarks/page_peers.py BUNDLE [--gpu] [RENDERER ...]`: by default all; they come by `npm ci` in
+study/benchmarks/peers. In software Spark takes seconds for a frame, so a quarter of an hour for all; without it two minutes.
 """
 
 import functools
@@ -20,7 +20,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from dav_gswt.study.terrain.frames import VISIT
 from fixtures.browser import FLAGS, chromium_path, served
 from fixtures.page_visit import VIEWER
 from record import report_figures
@@ -34,6 +33,7 @@ from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.object_placement import group_by_cell
 from dav_gswt.terrain.page import write_page
 from dav_gswt.terrain.placement import place_cell
+from dav_gswt_study.terrain.frames import VISIT
 
 GPU = "--gpu" in sys.argv
 GPU_FLAGS = [  # Chromium's way to a graphics card without a screen
@@ -45,7 +45,7 @@ GPU_FLAGS = [  # Chromium's way to a graphics card without a screen
     "--no-first-run",
 ]
 PEERS = Path(__file__).parent / "peers"
-SCHEMA = Path(__file__).parents[1] / "workflow/schemas/davgswt.schema.json"
+SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
 WIDTH, HEIGHT = (1920, 1080) if GPU else (640, 360)  # pixels
 FIELD = 60.0  # degrees across
 # Gaussians in view; the most is more than the views need, so that all renderers show the same ones
@@ -94,7 +94,9 @@ READ_PEER = """async ({ ahead }) => {
 def main() -> int:
     given = [word for word in sys.argv[1:] if word != "--gpu"]
     if not given or not (PEERS / "node_modules").is_dir() or chromium_path() is None:
-        print("page_peers: needs the folder of a bundle, Chromium, and `npm ci` in benchmarks/peers; nothing measured")
+        print(
+            "page_peers: needs the folder of a bundle, Chromium, and `npm ci` in study/benchmarks/peers; nothing measured"
+        )
         return 0
     folder, others = Path(given[0]), tuple(given[1:]) or OTHERS
     if unknown := set(others) - set(OTHERS):

@@ -13,11 +13,11 @@ from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import lpips
 from dav_gswt.prior import conditions
-from dav_gswt.study.prior.training import examples
-from dav_gswt.study.prior.training.worlds import FLYING_HEIGHT, make_world
 from dav_gswt.views import prior_sampling, uncertainty
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.uncertainty.staging import TOP
+from dav_gswt_study.prior.training import examples
+from dav_gswt_study.prior.training.worlds import FLYING_HEIGHT, make_world
 
 REPEATS = 7
 LATENTS = 1000, 5, 4, 64, 64  # poses, samples, channels, rows, columns
