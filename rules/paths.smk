@@ -54,7 +54,5 @@ def constraints(config):
         "inpainter": inpainters,
         "inpainted": rf"(?:/inpainted_(?:{inpainters}))?",
         "sweep": paths.NAME,
-        "axes": "ply(?:_z-up)?",
-        "kind": "spz|sog",
         "size": POSITIVE,
     }

@@ -102,7 +102,7 @@ _AREA = ("columns", "rows", "centre", "corner", "radius")
 
 # of the table `export`, by rule
 EXPORT_KEYS: dict[str, tuple[str, ...]] = {
-    "export_terrain": (*_AREA, "level", "formats", "axes", "spz_version", "tile_compression", "max_gb"),
+    "export_terrain": (*_AREA, "level", "formats", "axes", "max_gb"),
     "export_ground": (*_AREA, "surface", "mesh_error"),
 }
 

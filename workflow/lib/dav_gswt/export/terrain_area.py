@@ -1,6 +1,6 @@
-"""Which cells a finite terrain has, and whether its files can be made: said before any work starts."""
+"""Which cells a finite terrain has, and whether its files can be made: checked before any work starts."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +10,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.errors import InputError
-from dav_gswt.export import glb, glb_splats, glb_spz, ply, spool, spz, usd
+from dav_gswt.export.formats import Exporter
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.finite import Area, Disc, count_cells, keep_level
@@ -21,32 +21,11 @@ FARTHEST = 2**30  # tile sides
 
 
 @dataclass(frozen=True)
-class FileLimit:
-    """What a Gaussian takes in a file at most, in bytes, and how many Gaussians a file holds; None: any number."""
-
-    bytes: int
-    gaussians: int | None = None
-
-
-LIMITS = {
-    "ply": FileLimit(ply.BYTES),
-    "spz": FileLimit(max(spz.RAW_BYTES.values()), spz.MAX_GAUSSIANS),
-    "glb": FileLimit(glb_splats.BYTES, (glb.MAX_BYTES - glb_splats.HEADER_BYTES) // glb_splats.BYTES),
-    "sog": FileLimit(ply.BYTES),  # made from a PLY
-    "streamed_sog": FileLimit(2 * ply.BYTES),  # made from one of each level; coarser ones are smaller
-    "usd": FileLimit(usd.BYTES),
-    "3dtiles": FileLimit(2 * spz.RAW_BYTES[glb_spz.SPZ_VERSION]),  # all levels
-}
-PLAIN_TILES = FileLimit(2 * glb_splats.BYTES)  # of 3dtiles without compression
-ALL_LEVELS = {"streamed_sog", "3dtiles"}  # whatever level is asked for
-
-
-@dataclass(frozen=True)
 class TerrainExport:
     """What the config's `export` asks for: cells, their level (None: by the distance from the eye), and the eye.
 
     Attributes:
-        origin: world position that the files' coordinates count from: the middle of the area on the plane z = 0.
+        origin: world position from which the files' coordinates count: the middle of the area on the plane z = 0.
     """
 
     area: Area
@@ -55,15 +34,19 @@ class TerrainExport:
     origin: Float[Array, "3"]
 
     def select(self, terrain: EndlessTerrain) -> EndlessTerrain:
-        """The terrain that shows the level that is asked for."""
+        """The terrain at the requested level."""
         return terrain if self.level is None else keep_level(terrain, self.level)
 
 
 def choose_area(settings: Mapping[str, Any]) -> tuple[Area, tuple[float, float]]:
-    """The cells that the config's `export` names, and the point that they lie about, in tile sides."""
+    """The cells that the config's `export` names, and the point in their middle, in tile sides."""
     x, y = settings.get("centre", (0.0, 0.0))
     if "radius" in settings:
-        return surround(Disc(x, y, settings["radius"])), (x, y)
+        disc = Disc(x, y, settings["radius"])
+        (west, east), (south, north) = (
+            (int(np.floor(at - disc.radius)), int(np.ceil(at + disc.radius))) for at in (x, y)
+        )
+        return Area(west, south, east - west, north - south, disc), (x, y)
     columns, rows = settings["columns"], settings["rows"]
     if "corner" in settings:
         west, south = settings["corner"]
@@ -72,16 +55,8 @@ def choose_area(settings: Mapping[str, Any]) -> tuple[Area, tuple[float, float]]
     return Area(west, south, columns, rows), (x, y)
 
 
-def surround(disc: Disc) -> Area:
-    """The cells that a disc touches."""
-    (west, east), (south, north) = (
-        (int(np.floor(at - disc.radius)), int(np.ceil(at + disc.radius))) for at in (disc.x, disc.y)
-    )
-    return Area(west, south, east - west, north - south, disc)
-
-
 def find_metres(manifest: Manifest, reference: Georeference | None) -> float | None:
-    """Metres of a unit, where they are known."""
+    """Metres per unit, if they are known."""
     if reference:
         return reference.metres_per_unit
     return 1.0 if manifest.unit == "metre" else None
@@ -90,8 +65,8 @@ def find_metres(manifest: Manifest, reference: Georeference | None) -> float | N
 def resolve_lengths(settings: Mapping[str, Any], side: float, metres: float | None) -> dict[str, Any]:
     """The config's `export` with `radius` and `centre` in tile sides.
 
-    Args:   side: of a tile, in units. metres: of a unit, if they are known.
-    Raises: InputError: metres of a terrain without a scale, or more cells than an area may have.
+    Args:   side: of a tile, in units. metres: per unit, if they are known.
+    Raises: InputError: metres for a terrain without a scale, or more cells than an area may have.
     """
 
     def resolve(name: str, value: float | str) -> float:
@@ -111,8 +86,7 @@ def resolve_lengths(settings: Mapping[str, Any], side: float, metres: float | No
         found["radius"] = resolve("radius", found["radius"])
         if not 0 < found["radius"] <= MAX_CELLS / 2:
             raise InputError(f"export.radius: {found['radius']:g} tile sides; more than 0 and at most {MAX_CELLS // 2}")
-        area, _ = choose_area(found)
-        if not len(area):  # the distance to the cells beside it rounds to the radius
+        if not len(choose_area(found)[0]):  # the distance to the neighbouring cells rounds to the radius
             raise InputError(f"export.radius: {found['radius']:g} tile sides touch no cell; make it larger")
     return found
 
@@ -129,75 +103,35 @@ def plan_export(terrain: EndlessTerrain, settings: Mapping[str, Any], eye_floor:
 
 
 def find_origin(terrain: EndlessTerrain, area: Area) -> Float[Array, "3"]:
-    """The world position that the coordinates of an area's files count from: its middle, on the plane z = 0."""
+    """The world position from which the coordinates of an area's files count: its middle, on the plane z = 0."""
     return np.array([area.west + area.columns / 2, area.south + area.rows / 2, 0.0]) * terrain.side
 
 
-def choose_limits(settings: Mapping[str, Any]) -> dict[str, FileLimit]:
-    """The limits of the formats that the config's `export` names."""
-    plain = {"3dtiles": PLAIN_TILES} if settings["tile_compression"] == "none" else {}
-    return {name: (LIMITS | plain)[name] for name in settings["formats"]}
-
-
 def check_size(
-    terrain: EndlessTerrain, wanted: TerrainExport, limits: Mapping[str, FileLimit], max_gb: float
-) -> dict[str, int]:
-    """The number of Gaussians at most, by format: of the finest level where a format has all levels.
-
-    Raises: InputError: more than a file may have, with the area that fits.
-    """
-    fine, counts, known = replace(wanted, level=0), {}, {}
-    for name, limit in limits.items():
-        limited = fine if name in ALL_LEVELS else wanted
-        if limited.level not in known:
-            known[limited.level] = _count(terrain, limited, wanted.area)
-        count = counts[name] = known[limited.level]
-        most = int(max_gb * 1e9) // limit.bytes
-        bound = min(most, limit.gaussians or most)
+    terrain: EndlessTerrain, wanted: TerrainExport, exporters: Mapping[str, Exporter], max_gb: float
+) -> None:
+    """Raises: InputError: a format's files would have more Gaussians than they may have."""
+    levels = {each.all_levels: replace(wanted, level=0) if each.all_levels else wanted for each in exporters.values()}
+    counts = {
+        fine: int(count_cells(limited.select(terrain), limited.area, limited.eye).sum())
+        for fine, limited in levels.items()
+    }
+    for name, each in exporters.items():
+        count, most = counts[each.all_levels], int(max_gb * 1e9) // each.bytes
+        bound = min(most, each.gaussians or most)
         if count > bound:
             why = f"export.max_gb: {max_gb:g} allows" if bound == most else f"the format {name} holds"
-            size = f"{_describe(wanted.area)} up to {count} Gaussians, {why} {bound}"
-            raise InputError(f"export: {name}: {size}; {_suggest(terrain, limited, bound)}")
-    return counts
+            size = f"{describe_area(wanted.area)} up to {count} Gaussians, {why} {bound}"
+            hint = suggest_size(wanted.area, count, bound)
+            raise InputError(f"export: {name}: {size}; {hint}, a coarser export.level, or a larger export.max_gb")
 
 
-def _suggest(terrain: EndlessTerrain, wanted: TerrainExport, bound: int) -> str:
-    fits = suggest_area(wanted.area, lambda area: _count(terrain, wanted, area), bound)
-    if fits is None:
-        return "not one cell fits: set export.level to a coarser one, or raise export.max_gb"
-    if fits.disc:
-        return f"{fits.disc.radius:g} tiles fit: set export.radius, a coarser export.level, or max_gb"
-    return f"{fits.columns} x {fits.rows} fit: set export.columns and export.rows, a coarser export.level, or max_gb"
-
-
-def _describe(area: Area) -> str:
+def describe_area(area: Area) -> str:
+    """The beginning of a message about an area that is too large."""
     return f"a radius of {area.disc.radius:g} tiles has" if area.disc else f"{area.columns} x {area.rows} cells have"
 
 
-def suggest_area(area: Area, count: Callable[[Area], int], bound: int) -> Area | None:
-    """The largest area about the same middle, of the same shape, whose count is within a bound; None: not one cell."""
-    low, high = 0, max(area.columns, area.rows)
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if count(_shrink(area, middle)) <= bound else (low, middle)
-    return _shrink(area, low) if low else None
-
-
-def _shrink(area: Area, longer: int) -> Area:
-    """A smaller area about the middle of one, whose longer side has so many cells, or whose disc is about as wide."""
-    if area.disc:
-        return surround(replace(area.disc, radius=longer / 2))
-    share = longer / max(area.columns, area.rows)
-    columns, rows = (max(1, int(n * share)) for n in (area.columns, area.rows))
-    return Area(area.west + (area.columns - columns) // 2, area.south + (area.rows - rows) // 2, columns, rows)
-
-
-def _count(terrain: EndlessTerrain, wanted: TerrainExport, area: Area) -> int:
-    return int(count_cells(wanted.select(terrain), area, wanted.eye).sum())
-
-
-def describe_size(counts: Mapping[str, int], limits: Mapping[str, FileLimit]) -> str:
-    """What an export takes, for the log."""
-    each = [(f"{name} (finest level)" if name in ALL_LEVELS else name, counts[name], limits[name]) for name in limits]
-    files = ", ".join(f"{name} {count} Gaussians, {count * limit.bytes / 1e6:.0f} MB" for name, count, limit in each)
-    return f"at most: {files}; {max(counts.values()) * spool.BYTES / 1e6:.0f} MB of disk on the way"
+def suggest_size(area: Area, count: int, bound: int) -> str:
+    """How much smaller an area should be, by the square root of the ratio."""
+    keys = "export.radius" if area.disc else "export.columns and export.rows"
+    return f"set {keys} to about {(bound / count) ** 0.5:.0%} of that"
