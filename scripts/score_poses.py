@@ -1,6 +1,6 @@
 """Rules score_coarse and score_round: how uncertain is the field at each candidate pose?"""
 
-from dav_gswt.capture.attainable import filter_attainable
+from dav_gswt.capture.capturing import filter_attainable
 from dav_gswt.field import read_field
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files

@@ -8,8 +8,7 @@ import logging
 from datetime import UTC, datetime
 from pathlib import Path
 
-from dav_gswt.capture.interface import RequestedPose, view_distance
-from dav_gswt.capture.site import Site
+from dav_gswt.capture.capturing import RequestedPose, Site, view_distance
 from dav_gswt.files import digest_files
 from dav_gswt.images import image_files
 from dav_gswt.photos.exif import read_capture_time
@@ -18,6 +17,7 @@ from dav_gswt.photos.sfm.localization import localize_photos
 _log = logging.getLogger(__name__)
 
 NEAR = 0.6  # greatest `view_distance` of a photo from its pose: beyond, it shows something else
+NAMED = 6  # poses that a message names
 
 
 def make_drop_folder(site: Site) -> Path:
@@ -30,8 +30,8 @@ def make_drop_folder(site: Site) -> Path:
 def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str) -> list[RequestedPose]:
     """Copy dropped photos into the store, nearest first. Returns the poses that still lack photos.
 
-    A photo that is stored for a pose of this round or of an earlier one (`Site.requested`) is in use and left alone;
-    one that was stored for a pose that is no longer asked for is localised again. Of equal files the first counts.
+    A photo that is stored for a pose of this round or of an earlier one (`Site.requested`) is in use and skipped. A
+    photo stored for a pose that is no longer requested is localised again. Of equal files the first counts.
     """
     paths = _list_new_photos(site, requested)
     found = [(p, camera) for p, camera in zip(paths, localize_photos(site.photos, paths), strict=True) if camera]
@@ -66,6 +66,17 @@ def _list_new_photos(site: Site, requested: list[RequestedPose]) -> list[Path]:
         elif digest not in used:
             new[digest] = path
     return list(new.values())
+
+
+def describe_missing(site: Site, missing: list[RequestedPose]) -> str:
+    """Say how many photos of which poses are missing, and what to do with the photos."""
+    photos = sum(site.missing_photos(camera) for _, camera in missing)
+    names = ", ".join(pose.name for pose, _ in missing[:NAMED]) + (", ..." if len(missing) > NAMED else "")
+    count = "1 photo is" if photos == 1 else f"{photos} photos are"
+    return (
+        f"{count} missing, of {len(missing)} {'pose' if len(missing) == 1 else 'poses'} ({names}). Put the photos into "
+        f"{make_drop_folder(site)} and run the same command again: photos that are already there are kept"
+    )
 
 
 def _read_time(path: Path) -> str:
