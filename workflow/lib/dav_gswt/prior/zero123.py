@@ -23,7 +23,6 @@ from numpy import ndarray as Array
 from torch import Tensor
 from torch.nn import functional
 
-from dav_gswt.images import image_files
 from dav_gswt.prior import sampler, zero123_weights
 from dav_gswt.prior.interface import Condition, DecodedViews
 from dav_gswt.prior.sampler import Sampling
@@ -88,7 +87,7 @@ class Zero123:
     def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
         """See `Prior`: the render over white, the background of its pictures."""
         over_white = np.clip(condition.colour + (1 - condition.alpha)[..., None], 0, 1)
-        vae, parts = self.networks.vae, resize_photos(over_white).to(self.device).split(VAE_BATCH)
+        vae, parts = self.networks.vae, _to_tensor(over_white).to(self.device).split(VAE_BATCH)
         with torch.inference_mode():
             modes = [vae.encode(2 * part - 1).latent_dist.mode().cpu() for part in parts]
         return (torch.cat(modes) * vae.config.scaling_factor).numpy()
@@ -108,7 +107,7 @@ class Zero123:
 
     def _encode_condition(self, condition: Condition) -> tuple[Tensor, Tensor]:
         """The latents of the photos, and one token each."""
-        photo = resize_photos(condition.photo).to(self.device)
+        photo = _to_tensor(condition.photo).to(self.device)
         pose = (torch.from_numpy(condition.relative) * torch.tensor(POSE_FACTORS)).to(self.device)
         vae, clip = self.networks.vae, self.networks.image_encoder
         with torch.inference_mode():
@@ -131,15 +130,8 @@ class Zero123:
         return without + self.guidance * (conditional - without)
 
 
-def resize_photos(photo: Float32[Array, "b s s 3"]) -> Float[Tensor, "b 3 size size"]:
-    """Photos at the size of the VAE: area means of larger photos, bicubic interpolation of smaller ones."""
-    side = photo.shape[1]
-    if side > SIZE:
-        photo = np.stack([image_files.shrink_image(one, SIZE, SIZE) for one in photo])
-    planes = torch.from_numpy(np.ascontiguousarray(photo.transpose(0, 3, 1, 2)))
-    if side < SIZE:
-        planes = functional.interpolate(planes, (SIZE, SIZE), mode="bicubic", align_corners=False)
-    return planes.clamp(0, 1)
+def _to_tensor(pictures: Float32[Array, "b s s 3"]) -> Float[Tensor, "b 3 s s"]:
+    return torch.from_numpy(np.ascontiguousarray(pictures.transpose(0, 3, 1, 2)))
 
 
 def preprocess_for_clip(photo: Float[Tensor, "b 3 h w"], side: int) -> Float[Tensor, "b 3 side side"]:

@@ -14,12 +14,11 @@ import torch
 from diffusers.models.autoencoders.autoencoder_kl import AutoencoderKL
 from diffusers.models.unets.unet_2d_condition import UNet2DConditionModel
 from diffusers.schedulers.scheduling_ddim import DDIMScheduler
-from safetensors import SafetensorError, safe_open
 from torch import nn
 
-from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.files import UNREADABLE, read_json
-from dav_gswt.prior import dropout
+from dav_gswt.errors import InputError
+from dav_gswt.files import read_json
+from dav_gswt.prior import dropout, weights
 from dav_gswt.prior.dropout import HeldDropout
 
 Network = Any  # of diffusers or transformers, whose annotations are wrong: a config is no dict, an output no tuple
@@ -30,16 +29,9 @@ MOST_BYTES = 8 * 2**30  # of all weights; the published ones are 5 GiB in single
 PROJECTIONS = {"cc_projection": "projection.", "clip_camera_projection": "proj."}  # folder: prefix of its weights
 STEMS = "diffusion_pytorch_model", "model", "pytorch_model"
 VARIANTS = "", ".fp16", ".fp16_ema"  # in order of preference
-FLOAT_TYPES = {"F64", "F32", "F16", "BF16"}  # as safetensors names them
 POSE = 4  # numbers of a relative pose
 CHANNELS = 4  # of a latent
-BLOCKS = 4  # of the VAE: 2 ** (BLOCKS - 1) pixels per latent
-SCHEDULE = (
-    "num_train_timesteps",
-    "beta_start",
-    "beta_end",
-    "beta_schedule",
-)  # all required
+SCHEDULE = "num_train_timesteps", "beta_start", "beta_end", "beta_schedule"  # all required
 LEGACY_NAMES = {"query": "to_q", "key": "to_k", "value": "to_v", "proj_attn": "to_out.0"}  # of old diffusers
 
 
@@ -73,14 +65,14 @@ def load_networks(folder: Path | str) -> Zero123Networks:
     unet = _build_network(folder / "unet", UNet2DConditionModel.from_config)
     vae = _build_network(folder / "vae", AutoencoderKL.from_config)
     clip = _build_network(folder / "image_encoder", _clip_factory())
-    _check_configs(folder, unet, vae, clip)
     with torch.device("meta"):
         projection = nn.Linear(clip.config.projection_dim + POSE, unet.config.cross_attention_dim)
     prefix = PROJECTIONS[projection_folder]
-    _fill_weights(projection, files[projection_folder], lambda name: name.removeprefix(prefix))
-    _fill_weights(unet, files["unet"])
-    _fill_weights(vae, files["vae"], _modernize_name)
-    _fill_weights(clip, files["image_encoder"])
+    weights.fill_weights(projection, files[projection_folder], lambda name: name.removeprefix(prefix), HELP)
+    for name, network in (("unet", unet), ("vae", vae), ("image_encoder", clip)):
+        weights.fill_weights(network, files[name], _modernize_name if name == "vae" else str, HELP)
+    for network in (projection, unet, vae, clip):
+        network.eval().requires_grad_(False)
     embeddings = clip.vision_model.embeddings  # its one buffer is not among the weights
     embeddings.position_ids = torch.arange(embeddings.position_ids.shape[-1])[None]
     schedule = _read_schedule(folder / "scheduler" / "scheduler_config.json")
@@ -135,21 +127,6 @@ def _build_network(folder: Path, make: Callable[[dict[str, Any]], Network]) -> N
         raise InputError(f"{path}: describes no such network ({error}); copy it again") from error
 
 
-def _check_configs(folder: Path, unet: Network, vae: Network, clip: Network) -> None:
-    expected = [
-        ("unet", "in_channels", unet.config.in_channels, 2 * CHANNELS),
-        ("unet", "out_channels", unet.config.out_channels, CHANNELS),
-        ("unet", "cross_attention_dim", unet.config.cross_attention_dim, clip.config.projection_dim),
-        ("vae", "in_channels", vae.config.in_channels, 3),
-        ("vae", "latent_channels", vae.config.latent_channels, CHANNELS),
-        ("vae", "number of block_out_channels", len(vae.config.block_out_channels), BLOCKS),
-        ("image_encoder", "num_channels", clip.config.num_channels, 3),
-    ]
-    for part, key, found, value in expected:
-        if found != value:
-            raise InputError(f"{folder / part / 'config.json'}: {key} is {found}, not {value}: another model; {HELP}")
-
-
 def _read_schedule(path: Path) -> Any:
     """DDIM on the published schedule, whatever sampler the config names."""
     config = _read_config(path)
@@ -166,44 +143,3 @@ def _modernize_name(name: str) -> str:
     if ".attentions." not in name:
         return name
     return ".".join(LEGACY_NAMES.get(part, part) for part in name.split("."))
-
-
-def _fill_weights(network: nn.Module, path: Path, rename: Callable[[str], str] = str) -> None:
-    """Load a file's weights into a network that has none; names and shapes are compared before a tensor is read.
-
-    rename: from a weight's name in the file to that in the network.
-    """
-    expected = network.state_dict()
-    try:
-        with safe_open(str(path), "pt") as file:
-            names = _match_names(path, set(expected), list(file.keys()), rename)
-            for name, value in expected.items():
-                _check_tensor(path, names[name], file.get_slice(names[name]), tuple(value.shape))
-            values = {name: file.get_tensor(names[name]).float() for name in expected}
-    except (SafetensorError, *UNREADABLE) as error:
-        raise InputError(f"{path}: not readable as safetensors ({summarize_error(error)}); copy it again") from error
-    if bad := [names[name] for name, value in values.items() if not torch.isfinite(value).all()]:
-        raise InputError(f"{path}: {bad[0]} holds numbers that are not finite; copy it again")
-    network.load_state_dict(values, assign=True)
-    network.eval().requires_grad_(False)
-
-
-def _match_names(path: Path, expected: set[str], found: list[str], rename: Callable[[str], str]) -> dict[str, str]:
-    """The name in the file of every weight of the network."""
-    names = {}
-    for name in sorted(found):
-        if name.endswith("position_ids"):  # older transformers kept this constant among the weights
-            continue
-        if rename(name) not in expected or rename(name) in names:
-            raise InputError(f"{path}: {name[:80]!r} is not of this network; {HELP}")
-        names[rename(name)] = name
-    if missing := sorted(expected - set(names)):
-        raise InputError(f"{path}: {missing[0]} is missing; these are the weights of another network; {HELP}")
-    return names
-
-
-def _check_tensor(path: Path, name: str, header: Any, shape: tuple[int, ...]) -> None:
-    if (found := tuple(header.get_shape())) != shape:
-        raise InputError(f"{path}: {name} has the shape {found}, not {shape}; {HELP}")
-    if (dtype := header.get_dtype()) not in FLOAT_TYPES:
-        raise InputError(f"{path}: {name} has the type {dtype}, not floating-point numbers; {HELP}")
