@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from fixtures.frames import scene_frame
 
-from dav_gswt.capture import drone, drop_folder, qgc_plan, route
-from dav_gswt.capture.site import Site
+from dav_gswt.capture import drone, drop_folder, route
+from dav_gswt.capture.capturing import Site
 from dav_gswt.capture.store import PhotoStore
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts, cameras
@@ -91,7 +91,7 @@ def test_photos_are_taken_from_the_poses_with_their_views(items, requested):
 def test_looking_straight_down_the_nose_points_to_the_top_of_the_picture():
     rotation, translation = cameras.look_at([0, 0, 5.0], [0, 0, 0.0])  # the picture's top is the world's +y
     camera = cameras.Camera(rotation, translation, 50.0, 50.0, 32.0, 24.0, 64, 48)
-    assert qgc_plan.heading_and_pitch(camera, PLACE) == pytest.approx((30.0, -90.0))
+    assert drone.heading_and_pitch(camera, PLACE) == pytest.approx((30.0, -90.0))
 
 
 def test_sideways_ways_stay_above_the_clearance(items):
@@ -105,10 +105,10 @@ def test_sideways_ways_stay_above_the_clearance(items):
 
 def test_detours_are_only_made_where_they_are_needed():
     a, low, high = np.array([0, 0, 9.0]), np.array([4, 0, 2.0]), np.array([4, 0, 12.0])
-    assert qgc_plan.plan_detour(a, high, 5.0) == []
-    assert qgc_plan.plan_detour(low, high, 5.0) == []  # straight up
-    np.testing.assert_array_equal(qgc_plan.plan_detour(a, low, 5.0), [[4, 0, 5]])
-    np.testing.assert_array_equal(qgc_plan.plan_detour(low, low + [1, 0, 0], 5.0), [[4, 0, 5], [5, 0, 5]])
+    assert drone.plan_detour(a, high, 5.0) == []
+    assert drone.plan_detour(low, high, 5.0) == []  # straight up
+    np.testing.assert_array_equal(drone.plan_detour(a, low, 5.0), [[4, 0, 5]])
+    np.testing.assert_array_equal(drone.plan_detour(low, low + [1, 0, 0], 5.0), [[4, 0, 5], [5, 0, 5]])
 
 
 def test_the_message_says_what_to_fly_what_is_missing_and_where_to_put_it(site, requested, monkeypatch):
@@ -118,7 +118,7 @@ def test_the_message_says_what_to_fly_what_is_missing_and_where_to_put_it(site, 
         assert part in str(said.value)
     # (0, -10, 5), (0, 0, 20), (9.85, 1.74, 17.32) and back: 18.03 + 10.35 + 19.66 m; at each stop 4 s and 2 photos
     assert "48 m, about 1 min, up to 20 m above the ground" in str(said.value)
-    flown = qgc_plan.plan_flight(requested_views(requested[:2]), PLACE, np.array([0, -0.5]), qgc_plan.FlightRules(), 2)
+    flown = drone.plan_flight(requested_views(requested[:2]), PLACE, np.array([0, -0.5]), drone.FlightRules(), 2)
     assert flown.duration == pytest.approx(48.04 / 3 + 2 * (4 + 2), abs=0.01)
     (site.store.folder / "mission.plan").unlink()
     monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, requested, agent: [])

@@ -59,13 +59,6 @@ def test_a_view_does_not_depend_on_the_others_and_dropout_alone_makes_samples_di
     assert all_of_them.shape == (3, 2, *LATENT) and (all_of_them.var(axis=1).mean((1, 2, 3)) > 0).all()
 
 
-def test_a_repair_starts_from_the_render(prior):
-    given = condition()
-    np.testing.assert_array_equal(prior.repair(given, 0.0, 2, 0), prior.encode_render(given))
-    away = np.abs(prior.repair(given, 0.05, 2, 0) - prior.encode_render(given)).mean()
-    assert 0 < away < np.abs(prior.repair(given, 1.0, 2, 0) - prior.encode_render(given)).mean()
-
-
 def test_without_valid_pixels_the_render_has_no_influence(prior):
     one, two = condition(), replace(condition(seed=1), photo=condition().photo, relative=condition().relative)
     nothing = np.zeros((3, *LATENT[1:]), bool)

@@ -8,8 +8,8 @@ import gzip
 import shutil
 import subprocess
 from collections.abc import Callable
+from io import BufferedIOBase
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
@@ -80,7 +80,7 @@ def write_spz(spool: Spool, path: Path | str, rotation: Float[Array, "3 3"], ver
         pack_spz(spool, file, rotation, version)
 
 
-def pack_spz(spool: Spool, file: IO[bytes], rotation: Float[Array, "3 3"], version: int) -> None:
+def pack_spz(spool: Spool, file: BufferedIOBase, rotation: Float[Array, "3 3"], version: int) -> None:
     """Write an SPZ to an open file. Raises: ValueError: another version, or none or too many Gaussians."""
     if version not in (2, 3) or not 0 < len(spool) <= MAX_GAUSSIANS:
         raise ValueError(f"SPZ of version {version} with {len(spool)} Gaussians is not written")
