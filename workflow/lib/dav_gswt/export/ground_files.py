@@ -5,7 +5,6 @@ https://mujoco.readthedocs.io/en/stable/XMLreference.html#asset-hfield.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -14,7 +13,6 @@ import numpy as np
 import tifffile
 from jaxtyping import Float
 from numpy import ndarray as Array
-from pyproj import Transformer
 
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.export.axes import Y_UP, turn_points
@@ -38,30 +36,9 @@ from dav_gswt.terrain.finite import Area, require_plane
 from dav_gswt.tiles.build import TileSet
 
 WHITE = 65535
-# tags of GeoTIFF 1.1 (OGC 19-008r4), and GDAL's own for what a pixel's value means
-TRANSFORMATION, GEO_KEYS, GDAL_METADATA = 34264, 34735, 42112
-MODEL_TYPE, RASTER_TYPE, PROJECTED_CRS, PROJECTED, PIXEL_IS_AREA = 1024, 1025, 3072, 1, 1
 FLOOR = 0.5  # thickness of MuJoCo's ground below the lowest point, in tile sides: nothing thin falls through
 
 Mesh = tuple[str, Array, Array, dict[str, Any]]  # name, vertices, triangles, extras
-
-
-@dataclass(frozen=True)
-class MapPlace:
-    """Where a height field lies on a map: a projected coordinate system, and pixel corners in it.
-
-    Attributes:
-        epsg: a zone of UTM on WGS 84.
-        matrix: takes (column, row, 1) to easting and northing in metres; pixel (0, 0) covers [0, 1] x [0, 1].
-        error: most that the map's projection bends off the matrix within the field, in metres.
-        scale, offset: elevation above sea level in metres = scale * height + offset.
-    """
-
-    epsg: int
-    matrix: Float[Array, "2 3"]
-    error: float
-    scale: float
-    offset: float
 
 
 def export_ground(
@@ -88,7 +65,6 @@ def export_ground(
     x, y = surface.west + column * surface.step, surface.south + row * surface.step
     vertices = np.stack([x, y, surface.heights[row, column]], 1) - origin
     hulls = list(collect_hulls(terrain, area, origin))
-    place = place_on_map(surface, reference) if reference else None
     facts = {
         "unit": manifest.unit,
         "cells": {"west": area.west, "south": area.south, "columns": area.columns, "rows": area.rows},
@@ -97,7 +73,6 @@ def export_ground(
         "surface": settings["surface"],
         "mesh": {"error": error, "vertices": len(points), "triangles": len(triangles)},
         "objects": len(hulls),
-        "map": None if place is None else {"epsg": place.epsg, "error": place.error, "sea_level_offset": place.offset},
     }
     extras = {key: facts[key] for key in ("unit", "origin", "ground_cell")} | {"error": error}
     convex = {"unit": manifest.unit, "convex": True}
@@ -105,7 +80,7 @@ def export_ground(
         write_meshes([("ground", vertices, triangles, extras)], folder / "ground.glb")
         if hulls:
             write_meshes([(h.name, h.vertices, h.triangles, convex) for h in hulls], folder / "objects.glb")
-        facts["heights"] = _write_images(surface, folder, place, origin)
+        facts["heights"] = _write_images(surface, folder, origin)
         _write_mujoco(surface, hulls, origin, folder)
         write_json(folder / "ground.json", facts)
 
@@ -136,9 +111,7 @@ def write_meshes(meshes: Sequence[Mesh], path: Path | str) -> None:
     glb.write(path)
 
 
-def _write_images(
-    surface: GroundSurface, folder: Path, place: MapPlace | None, origin: Float[Array, "3"]
-) -> dict[str, Any]:
+def _write_images(surface: GroundSurface, folder: Path, origin: Float[Array, "3"]) -> dict[str, Any]:
     """Write ground.png, 16 bits from the lowest to the highest point, and ground.tif, floats.
 
     Returns: what their pixels mean, for ground.json.
@@ -156,7 +129,6 @@ def _write_images(
             rowsperstrip=64,
             metadata=None,
             software="DAV-GSWT",
-            extratags=_geo_tags(place) if place else [],
         )
     rows, columns = above.shape
     north_west = [surface.west - origin[0], surface.south + (rows - 1) * surface.step - origin[1]]
@@ -167,37 +139,6 @@ def _write_images(
         "north_west": [float(at) for at in north_west],
         "png": {"black": low, "white": low + span, "scale": span / WHITE, "offset": low},
     }
-
-
-def place_on_map(surface: GroundSurface, reference: Georeference) -> MapPlace:
-    """The place of a height field whose place on earth is known."""
-    zone = int(np.clip((reference.longitude + 180) // 6 + 1, 1, 60))
-    epsg = (32600 if reference.latitude >= 0 else 32700) + zone
-    rows, columns = surface.heights.shape
-    pixels = np.stack(np.meshgrid(np.linspace(0, columns, 5), np.linspace(0, rows, 5)), -1).reshape(-1, 2)
-    x = surface.west + (pixels[:, 0] - 0.5) * surface.step
-    y = surface.south + (rows - 0.5 - pixels[:, 1]) * surface.step
-    earth = reference.to_earth(np.stack([x, y, np.zeros(len(x))], 1))
-    project = Transformer.from_crs("EPSG:4326", f"EPSG:{epsg}", always_xy=True)
-    places = np.stack(project.transform(earth[:, 1], earth[:, 0]), 1)
-    known = np.concatenate([pixels, np.ones((len(pixels), 1))], 1)
-    matrix = np.linalg.lstsq(known, places, rcond=None)[0].T
-    error = float(np.linalg.norm(known @ matrix.T - places, axis=1).max())
-    return MapPlace(epsg, matrix, error, reference.metres_per_unit, reference.altitude)
-
-
-def _geo_tags(place: MapPlace) -> list[tuple]:
-    (a, b, c), (d, e, f) = place.matrix.tolist()
-    matrix = (a, b, 0.0, c, d, e, 0.0, f, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-    keys = {MODEL_TYPE: PROJECTED, RASTER_TYPE: PIXEL_IS_AREA, PROJECTED_CRS: place.epsg}
-    flat = (1, 1, 1, len(keys), *(number for key, value in keys.items() for number in (key, 0, 1, value)))
-    items = {"scale": place.scale, "offset": place.offset}
-    inner = "".join(f'<Item name="{k.upper()}" sample="0" role="{k}">{v!r}</Item>' for k, v in items.items())
-    return [
-        (TRANSFORMATION, "d", 16, matrix, True),
-        (GEO_KEYS, "H", len(flat), flat, True),
-        (GDAL_METADATA, "s", 0, f"<GDALMetadata>{inner}</GDALMetadata>", True),
-    ]
 
 
 def _write_mujoco(surface: GroundSurface, hulls: Sequence[Hull], origin: Float[Array, "3"], folder: Path) -> None:
