@@ -15,7 +15,7 @@ from dav_gswt.study.calibration import controls, judging
 from dav_gswt.views import scoring
 from dav_gswt.views.prior_sampling import PriorConfig
 
-METHODS = ("sample", "decode", "encode_render", "estimate_variances")
+METHODS = ("sample", "decode", "encode_render")
 
 
 @pytest.fixture(scope="module")

@@ -146,7 +146,7 @@ def test_the_map_shows_the_exemplar_and_every_pose(site, requested):
     for place, name in zip(at, re.findall(r"<code>(pose_\d)</code>", text), strict=True):
         expected = view.project(cameras_by_name[name].centre[None])[0][0]
         np.testing.assert_allclose([float(v) for v in place.split()], expected)
-    turns = sorted(abs(float(turn)) for turn in re.findall(r'arrow" transform="rotate\(([-\d.]+)\)', text))
+    turns = sorted(abs(float(turn)) for turn in re.findall(r'arrow" transform="rotate\(([-\d.e]+)\)', text))
     assert turns == pytest.approx([0, 90, 180], abs=1e-6)  # to the right, along y, to the left
     assert "N</text>" not in text
     known = replace(site, frame=replace(FRAME, georeference=NORTH))

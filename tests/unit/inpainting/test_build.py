@@ -43,9 +43,6 @@ class BandPrior:
     def encode_render(self, condition):
         return np.concatenate([condition.colour, condition.alpha[..., None]], -1).transpose(0, 3, 1, 2)
 
-    def estimate_variances(self, latents):
-        return np.zeros_like(latents)
-
     def decode(self, latents):
         planes = np.ascontiguousarray(latents.transpose(0, 1, 3, 4, 2))
         if self.spoil is not None:

@@ -1,63 +1,50 @@
 """The capture agents. To add one, write a function here with the decorator `agent`.
 
-The config, the rules and the keys that each rule reads (`config.rule_keys`) follow from this registry. Every job of a
-run reads it, so the functions import what they need when they are called.
+The config and the rules take the names from this registry. Every job of a run reads it, so the functions import what
+they need when they are called.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    import dav_gswt.capture.capturing
-    import dav_gswt.geometry.scene_frame
-    import dav_gswt.photos.capture_record
-    import dav_gswt.views.candidates
+from typing import Any
 
 
 @dataclass(frozen=True)
 class Agent:
-    """Who takes the photos of a scene. Keys are those of a scene's entry in the config.
+    """Who takes the photos of a scene.
 
     Attributes:
         take: takes photos. Without `device` it is called with a `CaptureRequest`, writes photos into its folder and
             returns one record for each. With `device` it is called with a `Site` and the poses that lack photos, fills
             the photo store, and raises InputError as long as photos are missing.
         kinds: of the scenes that the agent serves.
-        poses: keys that define the candidate poses; none if the candidates are photos that exist.
-        reads: further keys that taking photos reads.
-        reach: keys that `keep_reachable` reads.
-        keep_reachable: called with the entry, the scene frame and candidates; returns those that the agent can reach.
         device: whether a device or a person takes the photos: on this machine, and never twice.
+        keep_reachable: called with the scene's entry, its frame and candidates; returns those that can be reached.
+            None: all.
+        pool: whether the candidates are photos that exist, all of which can be taken.
     """
 
     take: Callable[..., Any]
     kinds: tuple[str, ...]
-    poses: tuple[str, ...]
-    reads: tuple[str, ...]
-    reach: tuple[str, ...]
-    keep_reachable: Callable[..., Any] | None
     device: bool
+    keep_reachable: Callable[..., Any] | None
+    pool: bool
 
 
 AGENTS: dict[str, Agent] = {}
-POSES = ("candidates", "min_elevation", "poses")
 
 
 def agent(
     name: str,
-    *,
-    kinds: tuple[str, ...] = ("photos",),
-    poses: tuple[str, ...] = POSES,
-    reads: tuple[str, ...] = (),
-    reach: tuple[str, ...] = (),
-    keep_reachable: Callable[..., Any] | None = None,
+    *kinds: str,
     device: bool = True,
+    keep_reachable: Callable[..., Any] | None = None,
+    pool: bool = False,
 ):
     """Register the decorated function as the one that takes an agent's photos; see `Agent`."""
 
     def register(take: Callable[..., Any]):
-        AGENTS[name] = Agent(take, kinds, poses, reads, reach, keep_reachable, device)
+        AGENTS[name] = Agent(take, kinds, device, keep_reachable, pool)
         return take
 
     return register
@@ -68,61 +55,52 @@ def list_agents(kind: str) -> tuple[str, ...]:
     return tuple(name for name, each in AGENTS.items() if kind in each.kinds)
 
 
-@agent("render", kinds=("synthetic",), poses=(*POSES, "size"), reads=("family", "seed"), device=False)
-def render(
-    request: "dav_gswt.capture.capturing.CaptureRequest",
-) -> list["dav_gswt.photos.capture_record.CapturedPhoto"]:
+@agent("render", "synthetic", device=False)
+def render(request: Any) -> list[Any]:
     """Photos of a synthetic scene are rendered exactly at their poses."""
     from dav_gswt.capture.simulated import capture_rendered
 
     return capture_rendered(request)
 
 
-@agent("replay", kinds=("synthetic", "photos"), poses=(), device=False)
-def replay(
-    request: "dav_gswt.capture.capturing.CaptureRequest",
-) -> list["dav_gswt.photos.capture_record.CapturedPhoto"]:
+@agent("replay", "synthetic", "photos", device=False, pool=True)
+def replay(request: Any) -> list[Any]:
     """Photos that exist are taken from the pool."""
     from dav_gswt.capture.simulated import capture_replayed
 
     return capture_replayed(request)
 
 
-def _within_rig(scene, frame, candidates):
+def _within_rig(scene: Any, frame: Any, candidates: Any) -> Any:
     from dav_gswt.capture.serial_rig import filter_reachable
 
     return filter_reachable(scene, frame, candidates)
 
 
-REACH_KEYS = ("millimetres", "pan_zero", "tilt_zero", "limits", "no_go")
-
-
-@agent("serial", reads=("rig",), reach=tuple(f"rig.{key}" for key in REACH_KEYS), keep_reachable=_within_rig)
-def serial(site: "dav_gswt.capture.capturing.Site", missing: list["dav_gswt.capture.capturing.RequestedPose"]) -> None:
+@agent("serial", "photos", keep_reachable=_within_rig)
+def serial(site: Any, missing: list[Any]) -> None:
     """A motorised camera rig on a serial port."""
     from dav_gswt.capture.serial_rig import take_photos
 
     take_photos(site, missing)
 
 
-def _above_least_altitude(scene, frame, candidates):
+def _above_least_altitude(scene: Any, frame: Any, candidates: Any) -> Any:
     from dav_gswt.capture.drone import filter_reachable
 
     return filter_reachable(scene, frame, candidates)
 
 
-@agent("plan", reads=("drone",), reach=("drone.min_altitude",), keep_reachable=_above_least_altitude)
-def plan(site: "dav_gswt.capture.capturing.Site", missing: list["dav_gswt.capture.capturing.RequestedPose"]) -> None:
+@agent("plan", "photos", keep_reachable=_above_least_altitude)
+def plan(site: Any, missing: list[Any]) -> None:
     """A drone: its mission is written, its photos come through the drop folder."""
     from dav_gswt.capture.drone import take_photos
 
     take_photos(site, missing)
 
 
-@agent("handheld")
-def handheld(
-    site: "dav_gswt.capture.capturing.Site", missing: list["dav_gswt.capture.capturing.RequestedPose"]
-) -> None:
+@agent("handheld", "photos")
+def handheld(site: Any, missing: list[Any]) -> None:
     """A person: a shot list is written, the photos come through the drop folder."""
     from dav_gswt.capture.handheld import take_photos
 

@@ -90,7 +90,7 @@ def filter_attainable(
     Raises: InputError: no pose is left.
     """
     agent = AGENTS[scene["agent"]]
-    if not agent.poses:
+    if agent.pool:
         return candidates
     if agent.keep_reachable:
         candidates = agent.keep_reachable(scene, frame, candidates)

@@ -74,7 +74,7 @@ class Mount:
 
 def build_mount(rig: Mapping[str, Any], frame: SceneFrame) -> Mount:
     """The mount of the config's `rig`."""
-    return Mount(frame.exemplar.centre, rig["millimetres"], rig["pan_zero"], rig["tilt_zero"])
+    return Mount(frame.exemplar.centre, *(float(rig[key]) for key in ("millimetres", "pan_zero", "tilt_zero")))
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     rig: Rig = site.scene["rig"]
     list_photos(Path(rig["inbox"]))  # raises if the folder does not exist
     mount = build_mount(rig, site.frame)
-    with serial_protocol.open_line(rig["port"], rig["baud"], rig["timeout"], rig["retries"]) as line:
+    with serial_protocol.open_line(rig["port"], rig["baud"], float(rig["timeout"]), rig["retries"]) as line:
         device = line.hello()
         limits = rig_limits.combine_limits(rig["limits"], rig["no_go"], device.limits)
         stops = _plan_stops(limits, device.home, mount, requested)
@@ -145,7 +145,7 @@ class SerialRig:
 
     def take_photo(self, name: str, target: Axes) -> tuple[Path, Axes, str]:
         """Take one photo of a pose. Returns its file, the position of the axes, and the time."""
-        folder, patience = Path(self.rig["inbox"]), self.rig["photo_timeout"]
+        folder, patience = Path(self.rig["inbox"]), float(self.rig["photo_timeout"])
         position = self.move_to(name, target)
         before, taken = list_photos(folder), datetime.now(UTC).isoformat(timespec="seconds")
         self.line.shoot()

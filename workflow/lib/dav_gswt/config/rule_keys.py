@@ -6,7 +6,6 @@ Read by the workflow before the first job, so it imports nothing heavy.
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from dav_gswt.capture.agents import AGENTS
 from dav_gswt.errors import InputError
 
 
@@ -45,10 +44,20 @@ class EntryKeys(dict):
             raise LookupError(f"the rule is not given the key {key!r}: name it in dav_gswt.config.rule_keys")
 
 
-_CANDIDATES = {name: each.poses for name, each in AGENTS.items()}
-_SCORED = {name: (*each.poses, "feasibility", *each.reach) if each.poses else () for name, each in AGENTS.items()}
-_SELECTED = {name: (*each.poses, "burst") for name, each in AGENTS.items()}
-_CAPTURED = {name: (*_SELECTED[name], *each.reads) for name, each in AGENTS.items()}
+_POSES = ("candidates", "min_elevation", "poses")  # for devices and people
+_RENDERED_POSES = (*_POSES, "size")
+_REACH = tuple(f"rig.{key}" for key in ("millimetres", "pan_zero", "tilt_zero", "limits", "no_go"))
+_CANDIDATES = {"render": _RENDERED_POSES, "replay": (), "serial": _POSES, "plan": _POSES, "handheld": _POSES}
+_SCORED = {
+    "render": (*_RENDERED_POSES, "feasibility"),
+    "replay": (),
+    "serial": (*_POSES, "feasibility", *_REACH),
+    "plan": (*_POSES, "feasibility", "drone.min_altitude"),
+    "handheld": (*_POSES, "feasibility"),
+}
+_DEVICES = {"render": ("family", "seed"), "replay": (), "serial": ("rig",), "plan": ("drone",), "handheld": ()}
+_SELECTED = {agent: (*keys, "burst") for agent, keys in _CANDIDATES.items()}
+_CAPTURED = {agent: (*keys, *_DEVICES[agent]) for agent, keys in _SELECTED.items()}
 _RENDERED = ("family", "seed", "photos", "layout", "min_elevation", "size", "test", "oblique", "walkers")
 
 # of a scene, by rule; where they depend on the scene's agent, by agent, and `agent` itself is one of them
@@ -65,7 +74,7 @@ SCENE_KEYS: dict[str, tuple[str, ...] | dict[str, tuple[str, ...]]] = {
     "select_poses": _SELECTED,
     "capture_views": _CAPTURED,
     "request_views": _CAPTURED,
-    "render_candidates": {"render": (*AGENTS["render"].poses, *AGENTS["render"].reads)},
+    "render_candidates": {"render": (*_RENDERED_POSES, "family", "seed")},
     "calibrate_coarse": _CANDIDATES,
     "calibrate_round": _CANDIDATES,
 }
@@ -93,7 +102,7 @@ _AREA = ("columns", "rows", "centre", "corner", "radius")
 
 # of the table `export`, by rule
 EXPORT_KEYS: dict[str, tuple[str, ...]] = {
-    "export_terrain": (*_AREA, "level", "formats", "axes", "max_gb"),
+    "export_terrain": (*_AREA, "level", "formats", "axes", "spz_version", "tile_compression", "max_gb"),
     "export_ground": (*_AREA, "surface", "mesh_error"),
 }
 

@@ -59,13 +59,6 @@ class TerrainPrior:
             self._encoded = condition, self.encode(pack_render(condition))
         return self._encoded[1].numpy()
 
-    def estimate_variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
-        """See `Prior`."""
-        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT)))
-        with torch.inference_mode():
-            parts = [self.network.posterior(self.network.decode(part)).var for part in flat.split(BATCH)]
-            return (torch.cat(parts) * self.network.scale**2).numpy().reshape(latents.shape)
-
     def make_denoiser(self, condition: Condition, known: Bool[Array, "b h w"] | None = None) -> Denoiser:
         """The denoiser with the condition of the views bound.
 

@@ -31,8 +31,7 @@ class PriorConfig:
     """A prior and its sampling settings.
 
     samples: per pose. steps: of denoising. p_drop: attention dropout. weights: of LPIPS; None leaves its terms out.
-    staged: score all poses with few steps first, then the best in full. posterior: a sample is a distribution with the
-    variance of the coder, instead of a point.
+    staged: score all poses with few steps first, then the best in full.
     """
 
     model: Prior
@@ -42,7 +41,6 @@ class PriorConfig:
     seed: int = 0
     weights: Weights | None = None
     staged: bool = True
-    posterior: bool = False
 
 
 def open_scoring_prior(
@@ -60,7 +58,7 @@ def open_scoring_prior(
             "LPIPS is switched off: scores have no such term; see the keys `lpips` in docs/reference/config.md"
         )
     weights = None if lpips_file is None else read(lpips_file)
-    settings = {name: entry[name] for name in ("samples", "steps", "staged", "posterior") if name in entry}
+    settings = {name: entry[name] for name in ("samples", "steps", "staged") if name in entry}
     return PriorConfig(load_prior(entry), p_drop=p_drop, seed=seed, weights=weights, **settings)
 
 
@@ -125,8 +123,7 @@ def _sample_batch(
     prior: PriorConfig, condition: Condition, names: list[str], steps: int, masks: Float32[Array, "k s s"]
 ) -> PriorTerms:
     latents = prior.model.sample(condition, prior.samples, prior.p_drop, steps, prior.seed)
-    variances = prior.model.estimate_variances(latents) if prior.posterior else None
-    _, maps = w2_sq(latents, variances, names)
+    _, maps = w2_sq(latents, None, names)
     pictures = prior.model.decode(latents).rgba[..., :3]
     disagreement = single = None
     if prior.weights is not None:
