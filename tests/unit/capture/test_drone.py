@@ -165,17 +165,6 @@ def way(places, ordered, start=None, end=None):
     return route.path_length(np.array(stops))
 
 
-def test_places_on_a_line_are_visited_along_it():
-    places = np.array([[3.0, 0], [1, 0], [4, 0], [2, 0]])
-    assert route.order_stops(places, np.zeros(2)) == (1, 3, 0, 2)
-
-
-def test_two_opt_mends_what_the_nearest_neighbour_leaves():
-    # from 0 the nearest is 1, then -1.1, then 4: 1 + 2.1 + 5.1 = 8.2; with the first two turned round 1.1 + 2.1 + 3
-    places = np.array([[1.0], [-1.1], [4.0]])
-    assert route.order_stops(places, np.zeros(1)) == (1, 0, 2)
-
-
 @pytest.mark.parametrize("start, end", [(None, None), (0.0, None), (0.0, 0.0), (0.0, 1.0)])
 def test_every_place_is_visited_once_and_no_stretch_can_be_turned_round_to_shorten_the_way(start, end):
     for seed in range(20):

@@ -315,11 +315,3 @@ def test_a_line_survives_and_a_damaged_one_does_not(text, data):
         None,
         text,
     )  # text: a digit in lower case
-
-
-@given(st.binary(max_size=200))
-def test_noise_is_no_line(noise):
-    assert (
-        serial_protocol.unframe_line(noise) is None
-        or serial_protocol.frame_line(serial_protocol.unframe_line(noise))[:-1].lower() in noise.lower()
-    )

@@ -96,9 +96,9 @@ def test_a_radius_that_is_too_large_is_refused(cover_terrain, export_settings):
     [
         ({"radius": "6m"}, None, r"export\.radius: 6m: the scale of this terrain is not known"),
         ({"centre": [0.0, "1m"]}, None, r"export\.centre: 1m: the scale of this terrain is not known"),
-        ({"radius": "6000m"}, 1.0, r"export\.radius: 1500 tile sides; more than 0 and at most 500"),
+        ({"radius": "6000m"}, 1.0, r"export\.radius: 1500 tile sides; 0.000001 to 500"),
         ({"radius": "0m"}, 1.0, r"export\.radius: 0 tile sides"),
-        ({"radius": 1e-17, "centre": [3.0, 3.0]}, None, r"export\.radius: 1e-17 tile sides touch no cell"),
+        ({"radius": 1e-17, "centre": [3.0, 3.0]}, None, r"export\.radius: 1e-17 tile sides"),
         ({"centre": ["99999999999m", 0.0]}, 1.0, r"export\.centre lies beyond"),
     ],
 )

@@ -1,6 +1,6 @@
 """What leaves for other programs: the table `export` of the config. Nothing else depends on it."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -10,7 +10,10 @@ from dav_gswt.export.formats import EXPORTERS
 Cell = Annotated[int, Field(ge=-(2**30), le=2**30)]
 Length = Annotated[float, Field(gt=0, le=500)] | Annotated[str, Field(pattern=r"^\d{1,9}(\.\d{1,9})? ?m$")]
 Coordinate = float | Annotated[str, Field(pattern=r"^-?\d{1,12}(\.\d{1,9})? ?m$")]
-Format = Literal[tuple(EXPORTERS)]  # pyright: ignore[reportInvalidTypeForm]: of names that are registered elsewhere
+if TYPE_CHECKING:
+    Format = str
+else:
+    Format = Literal[tuple(EXPORTERS)]
 
 
 class Export(ConfigModel):

@@ -1,14 +1,16 @@
 """Scenes: what there is to make a terrain of, and how further photos of it are taken."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from dav_gswt.capture.agents import list_agents
 from dav_gswt.config.base import ConfigModel, Degrees, Name, PhotoSize, Seed, Share, Text, key
 
-SyntheticAgent = Literal[list_agents("synthetic")]  # pyright: ignore[reportInvalidTypeForm]: registered elsewhere
-PhotoAgent = Literal[list_agents("photos")]  # pyright: ignore[reportInvalidTypeForm]: registered elsewhere
+if TYPE_CHECKING:
+    SyntheticAgent = PhotoAgent = str
+else:
+    SyntheticAgent, PhotoAgent = Literal[list_agents("synthetic")], Literal[list_agents("photos")]
 Range = Annotated[tuple[float, float], Field(description="lowest and highest", strict=False)]
 Radius = Annotated[float, Field(ge=0.05, le=20)]
 Coordinate = Annotated[float, Field(ge=-100, le=100)]

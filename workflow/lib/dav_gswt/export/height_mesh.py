@@ -75,7 +75,7 @@ def _find_middles(triangles: Triangles) -> Int64[Array, "t 2"]:
     return (triangles[:, 0] + triangles[:, 1]) // 2
 
 
-def _split_triangles(triangles: Triangles) -> Triangles:
+def _split_triangles(triangles: Triangles) -> Int64[Array, "halves 3 2"]:
     """The first half of each triangle, then the second half of each."""
     (a, b, c), middle = triangles.transpose(1, 0, 2), _find_middles(triangles)
     return np.concatenate([np.stack([c, a, middle], 1), np.stack([b, c, middle], 1)])

@@ -74,8 +74,9 @@ def _write_model(folder: Path, model: ColmapModel, photos: list[TakenPhoto]) -> 
     for photo in photos:
         _copy_picture(photo, folder / "images")
     write_colmap_model(model, folder / "sparse/0")
-    columns = [*model.points.T.astype("<f4"), *np.rint(model.colours.T * 255).astype("u1")]
-    rows = np.rec.fromarrays(columns, names="x,y,z,red,green,blue")
+    columns = [*model.points.T, *np.rint(model.colours.T * 255)]
+    kinds = [*((axis, "<f4") for axis in "xyz"), *((channel, "u1") for channel in ("red", "green", "blue"))]
+    rows = np.rec.fromarrays(columns, dtype=kinds)
     PlyData([PlyElement.describe(np.asarray(rows), "vertex")], byte_order="<").write(str(folder / POINTS))
     text = json.dumps(describe_transforms(model), indent=1, allow_nan=False) + "\n"
     (folder / "transforms.json").write_text(text, encoding="utf-8")

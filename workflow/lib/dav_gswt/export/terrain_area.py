@@ -84,10 +84,8 @@ def resolve_lengths(settings: Mapping[str, Any], side: float, metres: float | No
             raise InputError(f"export.centre lies beyond {FARTHEST} tile sides")
     if "radius" in found:
         found["radius"] = resolve("radius", found["radius"])
-        if not 0 < found["radius"] <= MAX_CELLS / 2:
-            raise InputError(f"export.radius: {found['radius']:g} tile sides; more than 0 and at most {MAX_CELLS // 2}")
-        if not len(choose_area(found)[0]):  # the distance to the neighbouring cells rounds to the radius
-            raise InputError(f"export.radius: {found['radius']:g} tile sides touch no cell; make it larger")
+        if not 1e-6 <= found["radius"] <= MAX_CELLS / 2:  # a smaller one could touch no cell, by rounding
+            raise InputError(f"export.radius: {found['radius']:g} tile sides; 0.000001 to {MAX_CELLS // 2} can be")
     return found
 
 
