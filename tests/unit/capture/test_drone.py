@@ -37,7 +37,7 @@ def requested_views(requested):
 @pytest.fixture
 def site(tmp_path, monkeypatch):
     monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, requested, agent: requested)
-    return Site("moor", {"agent": "plan", "burst": 2}, FRAME, tmp_path, PhotoStore(tmp_path / "captures" / "moor"))
+    return Site("moor", {"agent": "plan"}, FRAME, tmp_path, PhotoStore(tmp_path / "captures" / "moor"))
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_photos_are_taken_from_the_poses_with_their_views(items, requested):
     assert len(stops) == len(requested)
     left = {pose.name: camera for pose, camera in requested}
     for i in stops:
-        assert [item["command"] for item in items[i + 1 : i + 7]] == [205, 93, 2000, 93, 2000, 93]
+        assert [item["command"] for item in items[i + 1 : i + 5]] == [205, 93, 2000, 93]
         hold, _, _, yaw, latitude, longitude, up = items[i]["params"]
         at = PLACE.to_world(np.array([[latitude, longitude, 430.0 + up]]))[0]
         name = min(left, key=lambda n: np.linalg.norm(left[n].centre - at))
@@ -114,12 +114,12 @@ def test_detours_are_only_made_where_they_are_needed():
 def test_the_message_says_what_to_fly_what_is_missing_and_where_to_put_it(site, requested, monkeypatch):
     with pytest.raises(InputError) as said:
         drone.take_photos(site, requested[:2])
-    for part in ("mission.plan", "4 photos are missing, of 2 poses (pose_0, pose_1)", "drop", "same command again"):
+    for part in ("mission.plan", "photos of 2 poses are missing (pose_0, pose_1)", "drop", "same command again"):
         assert part in str(said.value)
-    # (0, -10, 5), (0, 0, 20), (9.85, 1.74, 17.32) and back: 18.03 + 10.35 + 19.66 m; at each stop 4 s and 2 photos
+    # (0, -10, 5), (0, 0, 20), (9.85, 1.74, 17.32) and back: 18.03 + 10.35 + 19.66 m; at each stop 4 s and a photo
     assert "48 m, about 1 min, up to 20 m above the ground" in str(said.value)
-    flown = drone.plan_flight(requested_views(requested[:2]), PLACE, np.array([0, -0.5]), drone.FlightRules(), 2)
-    assert flown.duration == pytest.approx(48.04 / 3 + 2 * (4 + 2), abs=0.01)
+    flown = drone.plan_flight(requested_views(requested[:2]), PLACE, np.array([0, -0.5]), drone.FlightRules())
+    assert flown.duration == pytest.approx(48.04 / 3 + 2 * (4 + 1), abs=0.01)
     (site.store.folder / "mission.plan").unlink()
     monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, requested, agent: [])
     assert drone.take_photos(site, requested) is None

@@ -52,14 +52,14 @@ def shoot(tmp_path):
     (tmp_path / "inbox").mkdir()
     store = PhotoStore(tmp_path / "captures")
 
-    def shot(faults=None, places=PLACES, burst=1, seed=0, **changed):
-        scene = {"agent": "serial", "burst": burst}
+    def shot(faults=None, places=PLACES, seed=0, **changed):
+        scene = {"agent": "serial"}
         with SimulatedRig(tmp_path / "inbox", faults, seed) as device:
             shot.device = device
             scene["rig"] = RIG | {"port": device.port, "inbox": str(tmp_path / "inbox")} | changed
             site = Site("meadow", scene, FRAME, tmp_path / "photos", store)
             asked = [posed(i, place) for i, place in enumerate(places)]
-            missing = [(pose, camera) for pose, camera in asked if len(store.photos_of(camera)) < burst]
+            missing = [(pose, camera) for pose, camera in asked if not store.photos_of(camera)]
             try:
                 serial_rig.take_photos(site, missing)
                 ended = ""
@@ -146,15 +146,6 @@ def test_photos_before_a_fault_are_kept_and_not_taken_again(shoot):
     assert ("limit switch" in ended, first.last, held(store)) == (True, "STOP", [1, 1, 0, 0])
     second, ended, store = shoot()
     assert (ended, second.photos, held(store)) == ("", 2, [1, 1, 1, 1])
-
-
-def test_a_burst_goes_on_where_it_was_left(shoot):
-    places = PLACES[:1]
-    shoot(places=places)
-    device, ended, store = shoot(places=places, burst=3)
-    assert (ended, device.photos, held(store, places)) == ("", 2, [3])
-    assert len(device.verbs("MOVE")) == 1  # the rig stays where it is
-    assert len({stored.photo.read_bytes() for stored in store.photos_of(posed(0, places[0])[1])}) == 3
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])

@@ -28,7 +28,7 @@ def site(tmp_path, monkeypatch, root):
     monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, requested, agent: requested)
     return Site(
         "moor",
-        {"agent": "handheld", "burst": 2},
+        {"agent": "handheld"},
         FRAME,
         tmp_path,
         PhotoStore(tmp_path / "captures" / "moor"),
@@ -93,7 +93,7 @@ def test_an_older_list_goes_and_photos_stay(site, requested, monkeypatch):
     photo.write_text("photo")
     with pytest.raises(InputError) as said:
         handheld.take_photos(replace(site, name="a<b>&"), requested[:1])
-    for part in ("shot-list/index.html", "2 photos are missing, of 1 pose (pose_0)", "drop", "same command again"):
+    for part in ("shot-list/index.html", "photos of 1 pose are missing (pose_0)", "drop", "same command again"):
         assert part in str(said.value)
     assert photo.read_text() == "photo"
     text = (folder / "index.html").read_text()

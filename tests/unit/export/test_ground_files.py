@@ -15,7 +15,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.export import ground_files, ground_surface
 from dav_gswt.export.axes import Y_UP
 from dav_gswt.export.height_mesh import simplify_heights
-from dav_gswt.export.terrain_area import find_origin
+from dav_gswt.export.terrain_files import find_origin
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.images import image_files

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.export import terrain_area
+from dav_gswt.export import terrain_files
 from dav_gswt.export.formats import EXPORTERS
 from dav_gswt.terrain import finite
 from dav_gswt.terrain.finite import Area, Disc
@@ -23,11 +23,11 @@ from dav_gswt.terrain.finite import Area, Disc
     ],
 )
 def test_cells_lie_about_the_centre_or_from_the_corner(place, expected):
-    assert terrain_area.choose_area({"columns": 3, "rows": 2} | place) == expected
+    assert terrain_files.choose_area({"columns": 3, "rows": 2} | place) == expected
 
 
 def plan(terrain, settings, **changes):
-    return terrain_area.plan_export(terrain, settings | changes, 0.5)
+    return terrain_files.plan_export(terrain, settings | changes, 0.5)
 
 
 def test_the_eye_stands_on_the_surface_and_the_origin_is_the_middle(cover_terrain, export_settings):
@@ -44,7 +44,7 @@ def test_too_much_is_refused_with_how_much_smaller_it_must_be(cover_terrain, exp
 
     def check(bound, columns=40, **place):
         wanted = plan(cover_terrain, export_settings, columns=columns, rows=20, level=level, **place)
-        terrain_area.check_size(cover_terrain, wanted, {name: each}, 1.0 if limit else 1e-9 * bound * each.bytes)
+        terrain_files.check_size(cover_terrain, wanted, {name: each}, 1.0 if limit else 1e-9 * bound * each.bytes)
 
     with pytest.raises(
         InputError, match=rf"export: {name}: 40 x 20 cells have up to \d+ Gaussians, .* 20000; "
@@ -68,9 +68,9 @@ def test_a_level_that_is_not_there_is_named(cover_terrain, export_settings):
 def test_a_set_of_all_levels_is_counted_by_the_finest(cover_terrain, export_settings, name):
     coarse, both = plan(cover_terrain, export_settings, level=1), {key: EXPORTERS[key] for key in ("ply", name)}
     count = int(finite.count_cells(finite.keep_level(cover_terrain, 0), coarse.area, coarse.eye).sum())
-    terrain_area.check_size(cover_terrain, coarse, both, 1e-9 * (count + 0.5) * both[name].bytes)
+    terrain_files.check_size(cover_terrain, coarse, both, 1e-9 * (count + 0.5) * both[name].bytes)
     with pytest.raises(InputError, match=rf"export: {name}: 3 x 2 cells have up to {count} Gaussians"):
-        terrain_area.check_size(cover_terrain, coarse, both, 1e-9 * (count - 0.5) * both[name].bytes)
+        terrain_files.check_size(cover_terrain, coarse, both, 1e-9 * (count - 0.5) * both[name].bytes)
 
 
 def test_a_radius_takes_all_cells_that_it_touches(cover_terrain, export_settings):
@@ -88,7 +88,7 @@ def test_a_radius_takes_all_cells_that_it_touches(cover_terrain, export_settings
 def test_a_radius_that_is_too_large_is_refused(cover_terrain, export_settings):
     wanted = plan(cover_terrain, export_settings, radius=12.0)
     with pytest.raises(InputError, match=r"ply: a radius of 12 tiles has up to .*; set export\.radius to about \d+%"):
-        terrain_area.check_size(cover_terrain, wanted, {"ply": EXPORTERS["ply"]}, 20_000e-9 * 68)
+        terrain_files.check_size(cover_terrain, wanted, {"ply": EXPORTERS["ply"]}, 20_000e-9 * 68)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_a_radius_that_is_too_large_is_refused(cover_terrain, export_settings):
 )
 def test_metres_become_tile_sides_and_lengths_that_make_no_sense_are_refused(given, metres, said):
     sound = {"centre": ["-3m", 2.0], "radius": "6 m", "level": 0}
-    found = terrain_area.resolve_lengths(sound, side=4.0, metres=0.5)
+    found = terrain_files.resolve_lengths(sound, side=4.0, metres=0.5)
     assert found == {"centre": [-1.5, 2.0], "radius": 3.0, "level": 0}
     with pytest.raises(InputError, match=said):
-        terrain_area.resolve_lengths(given, 4.0, metres)
+        terrain_files.resolve_lengths(given, 4.0, metres)

@@ -58,17 +58,33 @@ def list_agents(kind: str) -> tuple[str, ...]:
 @agent("render", "synthetic", device=False)
 def render(request: Any) -> list[Any]:
     """Photos of a synthetic scene are rendered exactly at their poses."""
-    from dav_gswt.capture.simulated import capture_rendered
+    from dav_gswt.images.image_files import write_png
+    from dav_gswt.logs import progress
+    from dav_gswt.photos.capture_record import CapturedPhoto
+    from dav_gswt.photos.synthetic import scene as synthetic
 
-    return capture_rendered(request)
+    world, photos = synthetic.scene_from_config(request.site.scene), []
+    for pose, camera in progress(request.poses, "render photos"):
+        photos.append(CapturedPhoto(f"{pose.name}.png", pose, camera, camera, 0.0))
+        write_png(request.folder / photos[-1].name, synthetic.render(world, camera))
+    return photos
 
 
 @agent("replay", "synthetic", "photos", device=False, pool=True)
 def replay(request: Any) -> list[Any]:
-    """Photos that exist are taken from the pool."""
-    from dav_gswt.capture.simulated import capture_replayed
+    """The photo of the pool that is nearest to each pose is taken, ties by name; fewer if the pool ends."""
+    import shutil
 
-    return capture_replayed(request)
+    from dav_gswt.capture.capturing import view_distance
+    from dav_gswt.photos.capture_record import CapturedPhoto
+
+    site, remaining, photos = request.site, {pose.name: camera for pose, camera in request.remaining}, []
+    for pose, camera in request.poses[: len(remaining)]:
+        distance = {name: view_distance(camera, other, site.unit) for name, other in remaining.items()}
+        name = min(distance, key=lambda n: (distance[n], n))
+        shutil.copyfile(site.photos / "images" / name, request.folder / name)
+        photos.append(CapturedPhoto(name, pose, camera, remaining.pop(name), distance[name]))
+    return photos
 
 
 def _within_rig(scene: Any, frame: Any, candidates: Any) -> Any:

@@ -42,18 +42,13 @@ class Site:
     requested: tuple[Camera, ...] = ()
 
     @property
-    def burst(self) -> int:
-        """Photos per pose; each counts against the budget."""
-        return self.scene.get("burst", 1)
-
-    @property
     def unit(self) -> float:
         """The flying height in world units."""
         return self.frame.flying_height
 
-    def missing_photos(self, camera: Camera) -> int:
-        """Number of photos of a pose that the store lacks."""
-        return self.burst - len(self.store.photos_of(camera))
+    def lacks_photo(self, camera: Camera) -> bool:
+        """Whether the store has no photo of a pose."""
+        return not self.store.photos_of(camera)
 
 
 @dataclass(frozen=True)
@@ -74,11 +69,6 @@ def view_distance(a: Camera, b: Camera, unit: float) -> float:
     viewing directions in radians."""
     angle = np.arccos(np.clip(a.forward @ b.forward, -1, 1))
     return float(np.linalg.norm(a.centre - b.centre) / unit + angle)
-
-
-def photo_name(pose: Pose, i: int, burst: int) -> str:
-    """File name of the i-th photo of a pose."""
-    return f"{pose.name}.png" if burst == 1 else f"{pose.name}_{i}.png"
 
 
 def filter_attainable(
@@ -120,20 +110,17 @@ def take_requested(request: CaptureRequest) -> list[CapturedPhoto]:
     if not agent.device:
         return agent.take(request)
     with site.store.locked():
-        missing = [(pose, camera) for pose, camera in request.poses if site.missing_photos(camera) > 0]
+        missing = [(pose, camera) for pose, camera in request.poses if site.lacks_photo(camera)]
         if missing:
             agent.take(site, missing)
-        return [photo for requested in request.poses for photo in _undistort_stored(request, requested)]
+        return [_undistort_stored(request, pose, camera) for pose, camera in request.poses]
 
 
-def _undistort_stored(request: CaptureRequest, requested: RequestedPose) -> list[CapturedPhoto]:
-    """Write a pose's stored photos as its pinhole camera would have taken them."""
-    site, (pose, camera) = request.site, requested
-    photos = []
-    for i, stored in enumerate(site.store.photos_of(camera)[: site.burst]):
-        name = photo_name(pose, i, site.burst)
-        picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera)
-        image_files.write_png(request.folder / name, picture)
-        distance = view_distance(camera, stored.camera, site.unit)
-        photos.append(CapturedPhoto(name, pose, camera, stored.camera, distance, stored.taken))
-    return photos
+def _undistort_stored(request: CaptureRequest, pose: Pose, camera: Camera) -> CapturedPhoto:
+    """Write a pose's oldest stored photo as its pinhole camera would have taken it."""
+    site, name = request.site, f"{pose.name}.png"
+    stored = site.store.photos_of(camera)[0]
+    picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera)
+    image_files.write_png(request.folder / name, picture)
+    distance = view_distance(camera, stored.camera, site.unit)
+    return CapturedPhoto(name, pose, camera, stored.camera, distance, stored.taken)

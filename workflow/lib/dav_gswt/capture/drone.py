@@ -1,7 +1,7 @@
 """The agent `plan`: writes a mission for a drone, whose photos come through the drop folder.
 
 Missions are for a multicopter with a gimbal, in the format of QGroundControl (file type "Plan", version 1). At each
-view the vehicle stops, yaws to the viewing direction, tilts the gimbal, waits, and takes its photos. Altitudes are
+view the vehicle stops, yaws to the viewing direction, tilts the gimbal, waits, and takes a photo. Altitudes are
 relative to the take-off point, which must be on the ground of the scene: z = 0.
 Sources: docs.qgroundcontrol.com, "Plan File Format"; mavlink.io, MAV_CMD.
 """
@@ -93,7 +93,7 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     home = np.array([exemplar.west + exemplar.side / 2, exemplar.south])
     rules = FlightRules(**{key: float(value) for key, value in site.scene.get("drone", {}).items()})
     _check_level(site, place, missing, home, rules)
-    flight = plan_flight([(pose.name, camera) for pose, camera in missing], place, home, rules, site.burst)
+    flight = plan_flight([(pose.name, camera) for pose, camera in missing], place, home, rules)
     path = site.store.folder / "mission.plan"
     write_json(path, flight.content)
     raise InputError(
@@ -124,9 +124,7 @@ def _check_level(
         )
 
 
-def plan_flight(
-    views: list[NamedCamera], place: Georeference, home: Float[Array, "2"], rules: FlightRules, burst: int = 1
-) -> Flight:
+def plan_flight(views: list[NamedCamera], place: Georeference, home: Float[Array, "2"], rules: FlightRules) -> Flight:
     """Plan a flight from a point on the ground (`home`, world units) past all views and back.
 
     Raises: InputError: views below rules.min_altitude, by name.
@@ -150,10 +148,10 @@ def plan_flight(
             path.append(corner)
         path.append(stop)
         if i is not None:
-            mission.add_photos(stop, views[i][1], burst)
+            mission.add_photo(stop, views[i][1])
     mission.add_command(RETURN)
     length = route.path_length(np.array(path))
-    duration = length / rules.speed + len(views) * (HOLD + SETTLE + burst * WRITE)
+    duration = length / rules.speed + len(views) * (HOLD + SETTLE + WRITE)
     latitude, longitude = mission.home[:2]
     description = (
         f"a flight of {length:.0f} m, about {np.ceil(duration / 60):.0f} min, up to {at[:, 2].max():.0f} m above the "
@@ -200,14 +198,13 @@ class _Mission:
     def add_command(self, command: int, *params: float | int | None) -> None:
         self._add_item({}, command, NO_PLACE, [*params, 0, 0, 0, 0, 0, 0, 0][:7])
 
-    def add_photos(self, at: Float[Array, "3"], camera: Camera, burst: int) -> None:
+    def add_photo(self, at: Float[Array, "3"], camera: Camera) -> None:
         heading, tilt = heading_and_pitch(camera, self.reference)
         self.add_waypoint(WAYPOINT, at, HOLD, round(heading, 3))
         self.add_command(GIMBAL, round(tilt, 3), 0, 0, 0, 0, 0, TARGETING)
         self.add_command(DELAY, SETTLE, -1, -1, -1)
-        for _ in range(burst):
-            self.add_command(SHUTTER, 0, 0, 1, 0, None, None, None)  # one photo, no interval
-            self.add_command(DELAY, WRITE, -1, -1, -1)
+        self.add_command(SHUTTER, 0, 0, 1, 0, None, None, None)  # one photo, no interval
+        self.add_command(DELAY, WRITE, -1, -1, -1)
 
     def to_plan(self, speed: float) -> dict:
         latitude, longitude, altitude = (float(v) for v in self.home)

@@ -37,21 +37,21 @@ def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str
     found = [(p, camera) for p, camera in zip(paths, localize_photos(site.photos, paths), strict=True) if camera]
     for path in sorted(set(paths) - {p for p, _ in found}):
         _log.warning("%s: it could not be localised; it must overlap photos of the scene", path.name)
-    need = {pose.name: site.missing_photos(camera) for pose, camera in requested}
     pairs = [
-        (view_distance(camera, got, site.unit), pose.name, path) for path, got in found for pose, camera in requested
+        (view_distance(camera, got, site.unit), pose.name, path.name, path)
+        for path, got in found
+        for pose, camera in requested
     ]
     places, assigned = dict(found), {}
-    for distance, name, path in sorted(pairs, key=lambda p: (p[0], p[1], p[2].name)):
-        if path not in assigned and need[name] > 0 and distance <= NEAR:
-            assigned[path] = name
-            need[name] -= 1
+    for distance, name, _, path in sorted(pairs):
+        if distance <= NEAR and name not in assigned and path not in assigned.values():
+            assigned[name] = path
     for pose, camera in requested:
-        for path in sorted(p for p, name in assigned.items() if name == pose.name):
+        if path := assigned.get(pose.name):
             site.store.add(path, agent, (pose, camera), places[path], _read_time(path))
-    for path in sorted(set(places) - set(assigned)):
+    for path in sorted(set(places) - set(assigned.values())):
         _log.warning("%s: it is near no requested pose; it is not used", path.name)
-    return [(pose, camera) for pose, camera in requested if need[pose.name] > 0]
+    return [(pose, camera) for pose, camera in requested if pose.name not in assigned]
 
 
 def _list_new_photos(site: Site, requested: list[RequestedPose]) -> list[Path]:
@@ -69,12 +69,10 @@ def _list_new_photos(site: Site, requested: list[RequestedPose]) -> list[Path]:
 
 
 def describe_missing(site: Site, missing: list[RequestedPose]) -> str:
-    """Say how many photos of which poses are missing, and what to do with the photos."""
-    photos = sum(site.missing_photos(camera) for _, camera in missing)
+    """Say of which poses photos are missing, and what to do with the photos."""
     names = ", ".join(pose.name for pose, _ in missing[:NAMED]) + (", ..." if len(missing) > NAMED else "")
-    count = "1 photo is" if photos == 1 else f"{photos} photos are"
     return (
-        f"{count} missing, of {len(missing)} {'pose' if len(missing) == 1 else 'poses'} ({names}). Put the photos into "
+        f"photos of {len(missing)} pose{'' if len(missing) == 1 else 's'} are missing ({names}). Put the photos into "
         f"{make_drop_folder(site)} and run the same command again: photos that are already there are kept"
     )
 

@@ -59,7 +59,6 @@ def write_shot_list(site: Site, missing: list[RequestedPose], field: GaussianFie
     by, ground = directions.make_ruler(site.frame), np.array([camera.centre[:2] for _, camera in missing])
     ordered = route.order_stops(ground)
     places = [missing[i] for i in ordered]
-    photos = [site.missing_photos(camera) for _, camera in places]
     view = place_map_camera([camera for _, camera in places], site.frame)
     folder = site.store.folder / "shot-list"
     with atomic_folder(folder) as part:
@@ -68,7 +67,7 @@ def write_shot_list(site: Site, missing: list[RequestedPose], field: GaussianFie
         cards = []
         for i, (pose, camera) in enumerate(places):
             card = _describe_place(camera, places[i - 1][1] if i else None, i, view, site.frame, by)
-            card |= {"name": pose.name, "photos": photos[i], "picture": None}
+            card |= {"name": pose.name, "picture": None}
             if field is not None:
                 card["picture"] = f"place_{i + 1:03d}.png"
                 scale = LONGER / max(camera.width, camera.height)
@@ -78,7 +77,7 @@ def write_shot_list(site: Site, missing: list[RequestedPose], field: GaussianFie
         walk = by.format_length(route.path_length(ground[list(ordered)]))
         values = {
             "scene": site.name,
-            "summary": f"Photos: {sum(photos)}. Places: {len(places)}. The walk from the first to the last is {walk}.",
+            "summary": f"Places: {len(places)}. The walk from the first to the last is {walk}.",
             "metric": by.metres is not None,
             "near": f"{by.format_length(CLOSE * by.unit)} and {TURNED} degrees",
             "drop": drop_folder.make_drop_folder(site),

@@ -177,14 +177,13 @@ class SerialRig:
 def _photograph_poses(site: Site, rig: SerialRig, mount: Mount, requested: list[RequestedPose]) -> None:
     """Take the missing photos pose by pose; each photo is checked and stored before the rig moves on."""
     for pose, camera in progress(requested, "photos by the rig"):
-        while site.missing_photos(camera) > 0:
-            photo, axes, taken = rig.take_photo(pose.name, mount.axes_of(camera))
-            actual = mount.camera_at(axes, camera)
-            try:  # now rather than after all other photos
-                undistort_scene_photo(image_files.read_photo(photo), site.photos, actual)
-            except (InputError, ValueError) as error:
-                raise InputError(f"{photo}: {error}") from error
-            site.store.add(photo, "serial", (pose, camera), actual, taken)
+        photo, axes, taken = rig.take_photo(pose.name, mount.axes_of(camera))
+        actual = mount.camera_at(axes, camera)
+        try:  # now rather than after all other photos
+            undistort_scene_photo(image_files.read_photo(photo), site.photos, actual)
+        except (InputError, ValueError) as error:
+            raise InputError(f"{photo}: {error}") from error
+        site.store.add(photo, "serial", (pose, camera), actual, taken)
 
 
 def list_photos(folder: Path) -> Listing:

@@ -131,7 +131,6 @@ class _PhotographedScene(_Scene):
     min_elevation: float = key(
         "lowest elevation of candidates and of test views", 30, unit="degrees", renamed="lowest", ge=5, le=85
     )
-    burst: int = key("photos of each pose; every one counts", 1, ge=1, le=10)
     feasibility: Feasibility | None = key("bounds of candidate poses", None, renamed="reach")
 
 

@@ -19,7 +19,7 @@ class Exporter:
     """A format.
 
     Attributes:
-        write: writes a `terrain_files.ExportJob`; returns the number of Gaussians in the files.
+        write: writes a `terrain_files.ExportJob`; returns the number of Gaussians in the files, or None: the job's.
         axes: keys of `axes.AXES` that the format can have; the first is the usual one.
         bytes: most that a Gaussian takes.
         gaussians: most that a file can hold; None: any number.
@@ -27,7 +27,7 @@ class Exporter:
         check: raises InputError if a program or package that the format needs is not installed.
     """
 
-    write: Callable[["dav_gswt.export.terrain_files.ExportJob"], int]
+    write: Callable[["dav_gswt.export.terrain_files.ExportJob"], int | None]
     axes: tuple[str, ...]
     bytes: int
     gaussians: int | None
@@ -49,7 +49,7 @@ def exporter(
 ):
     """Register the decorated function as the writer of a format; see `Exporter`."""
 
-    def register(write: Callable[["dav_gswt.export.terrain_files.ExportJob"], int]):
+    def register(write: Callable[["dav_gswt.export.terrain_files.ExportJob"], int | None]):
         EXPORTERS[name] = Exporter(write, axes, bytes, gaussians, all_levels, check)
         return write
 
@@ -69,39 +69,35 @@ def _check_usd() -> None:
 
 
 @exporter("ply", axes=ANY_AXES, bytes=68)
-def export_ply(job: "dav_gswt.export.terrain_files.ExportJob") -> int:
+def export_ply(job: "dav_gswt.export.terrain_files.ExportJob") -> None:
     """The standard 3DGS PLY."""
     from dav_gswt.export.splat_files import write_ply
 
     write_ply(job.spool, job.path(".ply"), job.rotation)
-    return len(job.spool)
 
 
 @exporter("spz", axes=("y-up", "z-up", "y-down"), bytes=20, gaussians=10_000_000)
-def export_spz(job: "dav_gswt.export.terrain_files.ExportJob") -> int:
+def export_spz(job: "dav_gswt.export.terrain_files.ExportJob") -> None:
     """SPZ version 3."""
     from dav_gswt.export.splat_files import write_spz
 
     write_spz(job.spool, job.path(".spz"), job.rotation)
-    return len(job.spool)
 
 
 @exporter("glb", axes=("y-up", "z-up", "y-down"), bytes=60, gaussians=(2**32 - 65_536) // 60)
-def export_glb(job: "dav_gswt.export.terrain_files.ExportJob") -> int:
+def export_glb(job: "dav_gswt.export.terrain_files.ExportJob") -> None:
     """Binary glTF with KHR_gaussian_splatting; lengths in the file have 32 bits."""
     from dav_gswt.export.glb import write_splats
 
     write_splats(job.spool, job.path(".glb"), dict(job.facts), job.rotation)
-    return len(job.spool)
 
 
 @exporter("sog", axes=ANY_AXES, bytes=68, check=_check_npx)
-def export_sog(job: "dav_gswt.export.terrain_files.ExportJob") -> int:
+def export_sog(job: "dav_gswt.export.terrain_files.ExportJob") -> None:
     """SOG in one file, made from a PLY."""
     from dav_gswt.export.splat_files import write_sog
 
     write_sog([job.spool], job.path(".sog"), job.rotation)
-    return len(job.spool)
 
 
 @exporter("streamed_sog", axes=ANY_AXES, bytes=2 * 68, all_levels=True, check=_check_npx)
@@ -120,12 +116,11 @@ def export_streamed_sog(job: "dav_gswt.export.terrain_files.ExportJob") -> int:
 
 
 @exporter("usd", axes=("z-up", "y-up"), bytes=56, check=_check_usd)
-def export_usd(job: "dav_gswt.export.terrain_files.ExportJob") -> int:
+def export_usd(job: "dav_gswt.export.terrain_files.ExportJob") -> None:
     """OpenUSD."""
     from dav_gswt.export.usd import write_usd
 
     write_usd(job.spool, job.path(".usdc"), job.facts, job.metres_per_unit or 1.0, job.rotation)
-    return len(job.spool)
 
 
 @exporter("3dtiles", axes=("z-up",), bytes=2 * 19, all_levels=True)

@@ -27,7 +27,7 @@ from dav_gswt.export.ground_surface import (
     measure_tiles,
 )
 from dav_gswt.export.height_mesh import simplify_heights
-from dav_gswt.export.terrain_area import choose_area, find_metres, find_origin, resolve_lengths
+from dav_gswt.export.terrain_files import choose_area, find_metres, find_origin, resolve_lengths
 from dav_gswt.files import atomic_file, atomic_folder, write_json
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.images import image_files

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
 from dav_gswt.errors import InputError
-from dav_gswt.export.terrain_area import describe_area, suggest_size
+from dav_gswt.export.terrain_files import describe_area, suggest_size
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.logs import progress
