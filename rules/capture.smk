@@ -22,7 +22,7 @@ rule capture_views:
     benchmark:
         "<benchmarks>/<round>/capture_views.tsv"
     wildcard_constraints:
-        scene=scenes_by("render", "replay"),
+        scene=scenes_by(*(name for name, agent in AGENTS.items() if not agent.device)),
         preset=FITS_ROUNDS,
         t=POSITIVE,
     threads: 2
@@ -52,7 +52,7 @@ use rule capture_views as request_views with:
     benchmark:
         "<benchmarks>/<round>/request_views.tsv"
     wildcard_constraints:
-        scene=scenes_by("serial", "plan", "handheld"),
+        scene=scenes_by(*(name for name, agent in AGENTS.items() if agent.device)),
         preset=FITS_ROUNDS,
         t=POSITIVE,
     retries: 0  # whatever a profile says: nothing is taken twice

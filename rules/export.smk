@@ -2,7 +2,7 @@
 terrain at each level and a finite terrain. Not part of `all`: files are asked for by their paths (docs/exports.md).
 
 In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/ply (y down, as viewers take it),
-exports/ply_z-up (as it lies here), exports/spz, exports/sog, exports/terrain, exports/ground.
+exports/terrain, exports/ground.
 """
 
 
@@ -32,16 +32,16 @@ rule export_model:
 
 
 rule export_plys:
-    """A patch of terrain at each level as a PLY that any viewer of splats opens, y down or z up."""
+    """A patch of terrain at each level as a PLY that any viewer of splats opens, y down."""
     input:
         manifest="<results>/<bundle>/davgswt.json",
         archive="<results>/<bundle>/gswt.zip",
     output:
-        plys=directory("<results>/<bundle>/exports/{axes}"),
+        plys=directory("<results>/<bundle>/exports/ply"),
     log:
-        "<logs>/<bundle>/export_plys_{axes}.log",
+        "<logs>/<bundle>/export_plys.log",
     benchmark:
-        "<benchmarks>/<bundle>/export_plys_{axes}.tsv"
+        "<benchmarks>/<bundle>/export_plys.tsv"
     resources:
         mem_mb=per_attempt(2500),
         runtime=per_attempt("10m"),
@@ -50,26 +50,6 @@ rule export_plys:
         source=code_of("export_plys"),
     script:
         "../scripts/export_plys.py"
-
-
-rule convert_plys:
-    """The same patches as SPZ, or as SOG (files, and a set that is streamed); SOG needs Node.js and the network."""
-    input:
-        plys="<results>/<bundle>/exports/ply",
-    output:
-        splats=directory("<results>/<bundle>/exports/{kind}"),
-    log:
-        "<logs>/<bundle>/convert_plys_{kind}.log",
-    benchmark:
-        "<benchmarks>/<bundle>/convert_plys_{kind}.tsv"
-    resources:
-        mem_mb=per_attempt(2500),
-        runtime=per_attempt("20m"),
-    params:
-        spz_version=lambda wildcards: config["export"]["spz_version"] if wildcards.kind == "spz" else None,
-        source=code_of("convert_plys"),
-    script:
-        "../scripts/convert_plys.py"
 
 
 rule export_terrain:

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from dav_gswt import paths
+from dav_gswt.capture.agents import AGENTS
 from dav_gswt.code_digest import LIBRARY, digest_code
 from dav_gswt.config.load import add_scene_files, check_config, merge_tables, parse_command_line
 from dav_gswt.config.rule_keys import PRIOR_KEYS, EntryKeys, select_export_keys, select_preset_keys, select_scene_keys
@@ -63,7 +64,5 @@ def constraints(config):
         "inpainter": inpainters,
         "inpainted": rf"(?:/inpainted_(?:{inpainters}))?",
         "sweep": paths.NAME,
-        "axes": "ply(?:_z-up)?",
-        "kind": "spz|sog",
         "size": POSITIVE,
     }

@@ -1,6 +1,6 @@
 """Rules score_coarse and score_round: how uncertain is the field at each candidate pose?"""
 
-from dav_gswt.capture.attainable import filter_attainable
+from dav_gswt.capture.capturing import filter_attainable
 from dav_gswt.field import read_field
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
@@ -26,5 +26,4 @@ with logging_to(snakemake.log[0]):
     image_files.write_exr_parts(out.shown, scoring.make_exr_parts(scored, fitted, grid))
     inputs = {name: paths[name] for name in ("field", "ground", "views", "weights", "lpips") if paths.get(name)}
     about = {"prior": params.prior, "p_drop": params.p_drop, "seed": params.seed}
-    about["variance"] = "posterior" if prior and prior.posterior else "point"
     frozen_scales.write_frozen_scales(out.facts, scored.frozen, scored.describe(), inputs, about)

@@ -17,7 +17,7 @@ EVERYTHING = "all"  # the policy that takes the whole pool in one round
 def list_combinations(vary: dict[str, list], fixed: dict) -> list[dict]:
     """The settings of every combination, in the order they stand in: `fixed`, and a value of each of `vary` over it.
 
-    A policy with settings of its own, {policy: w2, prior: independent, p_drop: 0}, brings these. `shown` holds
+    A policy with settings of its own, {policy: w2, prior: terrain-m2, p_drop: 0}, brings these. `shown` holds
     for each of `vary` the value as tables name it. The policy that takes everything has one round, whatever is asked.
     """
     found = []

@@ -15,7 +15,7 @@ from dav_gswt.views import scoring
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt_study.calibration import controls, judging
 
-METHODS = ("sample", "decode", "encode_render", "estimate_variances")
+METHODS = ("sample", "decode", "encode_render")
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,9 @@ import pytest
 from fixtures.frames import scene_frame
 from fixtures.photo_store import read_records
 
-from dav_gswt.capture import agents, drop_folder
-from dav_gswt.capture.agents import AGENTS, StoreAgent
-from dav_gswt.capture.interface import CaptureRequest
-from dav_gswt.capture.site import Site
+from dav_gswt.capture import capturing, drop_folder
+from dav_gswt.capture.agents import AGENTS
+from dav_gswt.capture.capturing import CaptureRequest, Site
 from dav_gswt.capture.store import PhotoStore, pose_key
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
@@ -52,7 +51,7 @@ def capture(site, agent, poses, pool=(), **scene):
     folder = site.photos.parent / "capture"
     folder.mkdir(exist_ok=True)
     site = replace(site, scene=site.scene | {"agent": agent} | scene)
-    return AGENTS[agent](CaptureRequest(site, poses, list(pool), folder))
+    return capturing.take_requested(CaptureRequest(site, poses, list(pool), folder))
 
 
 def photo_pool(site):
@@ -72,8 +71,6 @@ def test_replay_takes_the_nearest_unused_photo_once_and_records_the_distance(sit
     back = read_capture_record(tmp_path)[0]
     assert (back.name, back.pose, back.distance, back.taken) == ("1.png", photos[0].pose, photos[0].distance, None)
     np.testing.assert_array_equal(back.camera.centre, photos[0].camera.centre)
-    photos = capture(site, "replay", requested(0.9, 0.9), photo_pool(site), burst=2)
-    assert [(photo.name, photo.pose.name) for photo in photos] == [("1.png", "a0"), ("0.png", "a0"), ("2.png", "a1")]
 
 
 def test_something_else_is_not_the_record_of_a_capture(tmp_path):
@@ -82,12 +79,12 @@ def test_something_else_is_not_the_record_of_a_capture(tmp_path):
         read_capture_record(tmp_path)
 
 
-def test_a_burst_of_a_rendered_scene_repeats_the_photo_with_other_noise(site, tmp_path, monkeypatch):
+def test_a_rendered_scene_is_photographed_at_each_pose(site, tmp_path, monkeypatch):
     monkeypatch.setattr(synthetic, "scene_from_config", lambda entry: None)
-    monkeypatch.setattr(synthetic, "render", lambda world, camera, again: np.full((8, 8, 3), again / 4, np.float32))
-    photos = capture(site, "render", requested(0.0), burst=3)
-    assert [photo.name for photo in photos] == ["a0_0.png", "a0_1.png", "a0_2.png"]
-    assert image_files.read_photo(tmp_path / "capture/a0_2.png")[0, 0, 0] == pytest.approx(0.5, abs=0.01)
+    monkeypatch.setattr(synthetic, "render", lambda world, camera: np.full((8, 8, 3), camera.centre[0], np.float32))
+    photos = capture(site, "render", requested(0.0, 0.5))
+    assert [(photo.name, photo.pose.name) for photo in photos] == [("a0.png", "a0"), ("a1.png", "a1")]
+    assert image_files.read_photo(tmp_path / "capture/a1.png")[0, 0, 0] == pytest.approx(0.5, abs=0.01)
 
 
 def test_the_store_gives_a_poses_photos_back_and_no_others(tmp_path):
@@ -146,7 +143,7 @@ def test_what_the_store_holds_is_not_taken_again(site, tmp_path, monkeypatch):
         for pose in missing:
             site.store.add(picture(tmp_path / "in.png"), "handheld", pose, at(0.25), WHEN)
 
-    monkeypatch.setitem(AGENTS, "handheld", StoreAgent(take))
+    monkeypatch.setitem(AGENTS, "handheld", replace(AGENTS["handheld"], take=take))
     both = requested(0.0, 1.0)
     site.store.add(picture(tmp_path / "in.png"), "handheld", both[0], both[0][1], WHEN)
     for _ in range(2):
@@ -158,11 +155,12 @@ def test_what_the_store_holds_is_not_taken_again(site, tmp_path, monkeypatch):
 
 
 def test_where_no_pose_was_chosen_no_agent_is_called(tmp_path, monkeypatch):
-    monkeypatch.setitem(AGENTS, "plan", lambda *_: pytest.fail("somebody was asked for photos"))
-    monkeypatch.setattr(agents.candidates, "list_remaining", lambda *_: requested(0.0))
+    refuse = replace(AGENTS["plan"], take=lambda *_: pytest.fail("somebody was asked for photos"))
+    monkeypatch.setitem(AGENTS, "plan", refuse)
+    monkeypatch.setattr(capturing.pools, "list_remaining", lambda *_: requested(0.0))
     scene = {"agent": "plan", "kind": "photos"}
     site = Site("dune", scene, scene_frame(flying_height=5.0), tmp_path / "photos", PhotoStore(tmp_path / "captures"))
-    agents.capture_views(site, ViewSplit((), (), ()), [], [], tmp_path / "capture")
+    capturing.capture_views(site, ViewSplit((), (), ()), [], [], tmp_path / "capture")
     assert json.loads((tmp_path / "capture/capture.json").read_text()) == {"agent": "plan", "shots": []}
     assert read_captured_views(tmp_path / "capture", 8) == [] and not (tmp_path / "captures").exists()
 
@@ -213,8 +211,9 @@ def test_an_agent_knows_the_poses_of_this_round_and_the_earlier_ones(site, tmp_p
     record = CapturedPhoto("a.png", before[0], before[1], at(3.1), 0.0)
     write_capture_record(tmp_path / "before", "handheld", [record])
     now, seen = requested(0.0, 1.0), []
-    monkeypatch.setattr(agents.candidates, "list_remaining", lambda *_: now)
-    monkeypatch.setitem(AGENTS, "handheld", lambda request: seen.extend(request.site.requested) or [])
+    monkeypatch.setattr(capturing.pools, "list_remaining", lambda *_: now)
+    listen = replace(AGENTS["handheld"], take=lambda site, _: seen.extend(site.requested))
+    monkeypatch.setitem(AGENTS, "handheld", listen)
     chosen = [pose for pose, _ in now]
-    agents.capture_views(site, ViewSplit((), (), ()), [tmp_path / "before"], chosen, tmp_path / "capture")
+    capturing.capture_views(site, ViewSplit((), (), ()), [tmp_path / "before"], chosen, tmp_path / "capture")
     assert [pose_key(camera) for camera in seen] == [pose_key(at(x)) for x in (3.0, 0.0, 1.0)]

@@ -7,7 +7,8 @@ import pytest
 from fixtures import ground as patch
 from fixtures.frames import scene_frame
 
-from dav_gswt.capture import attainable, serial_rig
+from dav_gswt.capture import serial_rig
+from dav_gswt.capture.capturing import filter_attainable
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.georeference import Georeference
@@ -24,7 +25,7 @@ POOL = [
 
 
 def names(scene):
-    return [pose.name for pose, _ in attainable.filter_attainable(scene, FRAME, GRID, EMPTY, POOL)]
+    return [pose.name for pose, _ in filter_attainable(scene, FRAME, GRID, EMPTY, POOL)]
 
 
 def test_infeasible_poses_are_left_out_but_of_a_replayed_scene():
@@ -32,7 +33,7 @@ def test_infeasible_poses_are_left_out_but_of_a_replayed_scene():
     assert names({"agent": "handheld"}) == ["above"]
     # the clearance is a share of the flying height
     near = [*POOL, (Pose("near", 90.0, 0.0, 0.09), cameras.pinhole([0.5, 0.01, 0.09], [0, 0, 0], 64, 64, 100.0))]
-    found = attainable.filter_attainable({"agent": "render"}, FRAME, GRID, EMPTY, near)
+    found = filter_attainable({"agent": "render"}, FRAME, GRID, EMPTY, near)
     assert [pose.name for pose, _ in found] == ["above"]
 
 
@@ -41,7 +42,7 @@ def test_a_drone_is_sent_no_lower_than_it_may_fly():
     low = (Pose("low", 90.0, 0.0, 0.4), cameras.pinhole([0, 0.01, 0.4], [0, 0, 0], 64, 64, 100.0))
 
     def kept(frame, **scene):
-        found = attainable.filter_attainable({"agent": "plan"} | scene, frame, GRID, EMPTY, [*POOL, low])
+        found = filter_attainable({"agent": "plan"} | scene, frame, GRID, EMPTY, [*POOL, low])
         return [pose.name for pose, _ in found]
 
     assert kept(FRAME) == ["above", "low"] == kept(place, drone={"min_altitude": 1.5})

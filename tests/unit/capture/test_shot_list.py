@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
-from dav_gswt.capture import directions, drop_folder, handheld, shot_list_map, shot_list_page
-from dav_gswt.capture.site import Site
+from dav_gswt.capture import directions, drop_folder, handheld
+from dav_gswt.capture.capturing import Site
 from dav_gswt.capture.store import PhotoStore
 from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
@@ -14,6 +14,7 @@ from dav_gswt.geometry import camera_layouts, cameras
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import image_files
+from dav_gswt.raster import render
 
 MIDDLE = [1.6, 1.6, 0.0]
 FRAME = replace(made.FRAME, flying_height=1.6)
@@ -27,7 +28,7 @@ def site(tmp_path, monkeypatch, root):
     monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, requested, agent: requested)
     return Site(
         "moor",
-        {"agent": "handheld", "burst": 2},
+        {"agent": "handheld"},
         FRAME,
         tmp_path,
         PhotoStore(tmp_path / "captures" / "moor"),
@@ -68,20 +69,18 @@ def test_the_page_is_whole_and_asks_for_nothing_from_the_net(listed):
 
 
 def test_places_come_in_an_order_that_is_short_to_walk(listed):
-    names = re.findall(r"<dd>(pose_\d)</dd>", listed[1])
+    names = re.findall(r"<code>(pose_\d)</code>", listed[1])
     shortest = ["pose_1", "pose_2", "pose_0", "pose_3"]  # 1.97 + 1.53 + sqrt(1.53^2 + 2.17^2) = 6.15
     assert names in (shortest, shortest[::-1])
-    lengths = re.search(r"the walk .* is ([\d.]+) m \(([\d.]+) flying heights\)", listed[1]).groups()
-    assert [float(length) for length in lengths] == pytest.approx([6.15, 6.15 / 1.6], abs=0.06)
+    assert float(re.search(r"The walk .* is ([\d.]+) m\.", listed[1])[1]) == pytest.approx(6.15, abs=0.06)
 
 
-def test_the_expected_picture_is_the_field_over_sky_and_ground(listed):
+def test_the_expected_picture_is_what_the_field_shows_from_there(listed, requested):
     picture = image_files.read_photo(listed[0] / "place_001.png")
     assert picture.shape == (540, 720, 3)
-    low = cameras.pinhole([1.6, -3.0, 0.5], [1.6, 1.6, 0.9], 40, 30, 60.0)
-    drawn = shot_list_page.render_expected(made.field(), low)
-    assert drawn[0, :, 2].min() > 0.6  # blue above
-    assert drawn[-1].mean() < 0.6
+    first = int(re.search(r"<code>pose_(\d)</code>", listed[1])[1])
+    seen = render(made.field(), requested[first][1].resized(720, 540), handheld.BLANK).colour
+    np.testing.assert_allclose(picture, np.clip(seen, 0, 1), atol=0.01)
 
 
 def test_an_older_list_goes_and_photos_stay(site, requested, monkeypatch):
@@ -94,7 +93,7 @@ def test_an_older_list_goes_and_photos_stay(site, requested, monkeypatch):
     photo.write_text("photo")
     with pytest.raises(InputError) as said:
         handheld.take_photos(replace(site, name="a<b>&"), requested[:1])
-    for part in ("shot-list/index.html", "2 photos are missing, of 1 pose (pose_0)", "drop", "same command again"):
+    for part in ("shot-list/index.html", "photos of 1 pose are missing (pose_0)", "drop", "same command again"):
         assert part in str(said.value)
     assert photo.read_text() == "photo"
     text = (folder / "index.html").read_text()
@@ -132,21 +131,23 @@ def test_words_for_cameras_that_do_not_look_at_the_middle():
     assert directions.describe_walk(down, down, by) == "stay where you are"
 
 
-def test_numbers_on_the_map_do_not_cover_each_other():
-    at = np.array([[10.0, 10], [10, 10], [12, 11], [200, 10]])
-    moved = shot_list_map.spread_apart(at, 40.0)
-    gaps = np.linalg.norm(moved[:, None] - moved[None], axis=-1) + 1e3 * np.eye(4)
-    assert gaps.min() > 39
-    np.testing.assert_allclose(moved[3], at[3], atol=0.01)  # who is alone stays
-
-
-def test_the_map_shows_the_exemplar_and_every_pose(requested):
-    drawn = shot_list_map.draw_map([camera for _, camera in requested], FRAME, directions.make_ruler(FRAME), None)
-    inside = drawn.camera.project(np.array([[0, 0, 0], [3.2, 3.2, 0], *(c.centre for _, c in requested)]))[0]
-    assert (inside > 0).all()
-    assert (inside < [drawn.camera.width, drawn.camera.height]).all()
-    assert drawn.picture.shape == (drawn.camera.height, drawn.camera.width, 3)
-    assert drawn.drawing.count('class="arrow"') == 3  # the fourth looks straight down
-    assert "N</text>" not in drawn.drawing
-    known = replace(FRAME, georeference=NORTH)
-    assert "N</text>" in shot_list_map.draw_map([requested[0][1]], known, directions.make_ruler(known), None).drawing
+def test_the_map_shows_the_exemplar_and_every_pose(site, requested):
+    view = handheld.place_map_camera([camera for _, camera in requested], FRAME)
+    inside = view.project(np.array([[0, 0, 0], [3.2, 3.2, 0], *(c.centre for _, c in requested)]))[0]
+    assert (inside > 0).all() and (inside < [view.width, view.height]).all()
+    page = handheld.write_shot_list(site, requested, None)
+    assert image_files.read_size(page.with_name("map.png")) == (view.width, view.height)
+    text = page.read_text()
+    assert text.count('class="arrow"') == 3  # the fourth looks straight down
+    bar, shown = (re.search(found, text)[1] for found in (r"v8h([\d.]+)v", r">([\d.]+) m</text>"))
+    assert float(bar) == pytest.approx(float(shown) * view.fx)  # a unit of the world is a metre here
+    at = re.findall(r'aria-label="Place \d"><g transform="translate\(([\d. ]+)\)', text)
+    cameras_by_name = {pose.name: camera for pose, camera in requested}
+    for place, name in zip(at, re.findall(r"<code>(pose_\d)</code>", text), strict=True):
+        expected = view.project(cameras_by_name[name].centre[None])[0][0]
+        np.testing.assert_allclose([float(v) for v in place.split()], expected)
+    turns = sorted(abs(float(turn)) for turn in re.findall(r'arrow" transform="rotate\(([-\d.e]+)\)', text))
+    assert turns == pytest.approx([0, 90, 180], abs=1e-6)  # to the right, along y, to the left
+    assert "N</text>" not in text
+    known = replace(site, frame=replace(FRAME, georeference=NORTH))
+    assert "rotate(-90.0)" in handheld.write_shot_list(known, requested[:1], None).read_text()

@@ -75,9 +75,8 @@ def test_a_radius_takes_the_cells_that_it_touches(result, tmp_path):
     [
         (["--level", "9"], "--level: there is no level 9; the last one is 1"),
         (["--radius", "2", "--corner", "0", "0"], "radius and corner exclude one another"),
-        (["--radius", "900000m"], "--radius: 225000 tile sides; more than 0 and at most 500"),
-        (["--max-gb", "0.001", "--columns", "90"], "fit: set --columns and --rows, a coarser --level, or max_gb"),
-        (["--axes", "y-down", "--format", "usd"], "a USD stage has y or z up"),
+        (["--radius", "900000m"], "--radius: 225000 tile sides; 0.000001 to 500"),
+        (["--max-gb", "0.001", "--columns", "90"], "% of that, a coarser --level, or a larger --max-gb"),
         (
             ["--columns", "400", "--rows", "400", "--max-gb", "60", "--format", "ground", "--format", "ply"],
             "have a height field of",

@@ -60,7 +60,6 @@ TURNED = {"kind": "free", "radii": [3, 1]}
         pytest.param(["scene"], "moon", "scene: there is no 'moon'; scenes has", id="an unknown scene"),
         pytest.param(["scenes", "desert", "preset"], "best", "preset: there is no 'best'", id="an unknown preset"),
         pytest.param(["scenes", "logs"], {}, "scenes.logs: 'logs' is no name", id="a scene with a reserved name"),
-        pytest.param(["export"], {"axes": "y-down", "formats": ["usd"]}, "a USD stage has y or z up", id="down"),
         pytest.param(["presets", "draft", "choose_with"], "best", "there is no 'best'", id="an unknown chooser"),
         pytest.param(["presets", "draft", "choose_with"], "draft", "chooses no photos itself", id="its own chooser"),
         pytest.param(["presets", "reference", "choose_with"], "standard", "one that does .draft", id="no chooser"),

@@ -32,7 +32,7 @@ def fill(heights, points, triangles):
     return found
 
 
-@pytest.mark.parametrize("tolerance", [0.0, 0.05, 0.2])
+@pytest.mark.parametrize("tolerance", [0.0, 0.05, 0.2, 0.6])
 def test_no_point_is_off_by_more_than_the_tolerance(tolerance):
     heights = rough()
     points, triangles = simplify_heights(heights, BLOCK, tolerance)
@@ -45,6 +45,13 @@ def test_larger_tolerances_need_fewer_triangles_and_a_plane_two_a_block():
     y, x = np.mgrid[: BLOCK + 1, : 2 * BLOCK + 1]
     points, triangles = simplify_heights((0.5 * x - 0.25 * y).astype(np.float32), BLOCK, 1e-5)
     assert len(triangles) == 4 and len(points) == 6
+
+
+def test_the_bound_holds_in_a_block_beside_the_first():
+    y, x = np.mgrid[: BLOCK + 1, : 2 * BLOCK + 1]
+    heights = np.minimum(np.maximum(x - BLOCK, 0) + y, BLOCK).astype(np.float32)  # a fold across the eastern block
+    points, triangles = simplify_heights(heights, BLOCK, 0.01)
+    np.testing.assert_allclose(fill(heights, points, triangles), heights, atol=0.01)
 
 
 @pytest.mark.parametrize("at", [(7, 12), (16, 16), (0, 8)])

@@ -8,8 +8,8 @@ import pytest
 from fixtures.land_covers import cover_content
 from fixtures.splat_files import read_glb_splats
 
-from dav_gswt.export import ground_files, spz, terrain_files
-from dav_gswt.export.axes import Y_DOWN, turn_field
+from dav_gswt.export import ground_files, splat_files, terrain_files
+from dav_gswt.export.axes import Y_DOWN, Y_UP, turn_field
 from dav_gswt.export.spool import Spool
 from dav_gswt.field import read_field
 from dav_gswt.geometry import cameras
@@ -62,12 +62,12 @@ def test_three_js_reads_splats_and_without_its_plugin_points(exported, run_node)
     assert points == f"Points {len(read_glb_splats(exported / 'terrain.glb'))}"
 
 
-@pytest.mark.parametrize("version", spz.VERSIONS)
+@pytest.mark.parametrize("version", [2, 3])
 def test_the_reference_decoder_of_spz_sees_the_same_picture(exported, node_modules, tmp_path, version):
     field = read_field(exported / "terrain.ply")
     with Spool(tmp_path / "spool") as placed:
         placed.append(turn_field(field, Y_DOWN.T))
-    spz.write_spz(placed, tmp_path / "a.spz", version)
+    splat_files.write_spz(placed, tmp_path / "a.spz", Y_UP, version)
     program = node_modules / "@playcanvas/splat-transform/bin/cli.mjs"
     command = ["node", program, "-q", "-w", tmp_path / "a.spz", tmp_path / "b.ply"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)

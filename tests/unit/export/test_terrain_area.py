@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.export import terrain_area
+from dav_gswt.export import terrain_files
+from dav_gswt.export.formats import EXPORTERS
 from dav_gswt.terrain import finite
 from dav_gswt.terrain.finite import Area, Disc
 
@@ -22,15 +23,11 @@ from dav_gswt.terrain.finite import Area, Disc
     ],
 )
 def test_cells_lie_about_the_centre_or_from_the_corner(place, expected):
-    assert terrain_area.choose_area({"columns": 3, "rows": 2} | place) == expected
-
-
-def limits(name):
-    return {name: terrain_area.LIMITS[name]}
+    assert terrain_files.choose_area({"columns": 3, "rows": 2} | place) == expected
 
 
 def plan(terrain, settings, **changes):
-    return terrain_area.plan_export(terrain, settings | changes, 0.5)
+    return terrain_files.plan_export(terrain, settings | changes, 0.5)
 
 
 def test_the_eye_stands_on_the_surface_and_the_origin_is_the_middle(cover_terrain, export_settings):
@@ -42,44 +39,38 @@ def test_the_eye_stands_on_the_surface_and_the_origin_is_the_middle(cover_terrai
 
 
 @pytest.mark.parametrize("level, name, limit", [(0, "spz", 20_000), (1, "glb", None), ("by_distance", "usd", None)])
-def test_too_much_is_refused_with_the_area_that_fits(cover_terrain, export_settings, monkeypatch, level, name, limit):
-    if limit:
-        monkeypatch.setitem(terrain_area.LIMITS, name, terrain_area.FileLimit(1, limit))
-    max_gb = 1.0 if limit else 1e-9 * 20_000 * terrain_area.LIMITS[name].bytes
+def test_too_much_is_refused_with_how_much_smaller_it_must_be(cover_terrain, export_settings, level, name, limit):
+    each = replace(EXPORTERS[name], bytes=1, gaussians=limit) if limit else EXPORTERS[name]
 
-    def check(columns, rows):
-        wanted = plan(cover_terrain, export_settings, columns=columns, rows=rows, level=level)
-        return terrain_area.check_size(cover_terrain, wanted, limits(name), max_gb)[name]
+    def check(bound, columns=40, **place):
+        wanted = plan(cover_terrain, export_settings, columns=columns, rows=20, level=level, **place)
+        terrain_files.check_size(cover_terrain, wanted, {name: each}, 1.0 if limit else 1e-9 * bound * each.bytes)
 
     with pytest.raises(
         InputError, match=rf"export: {name}: 40 x 20 cells have up to \d+ Gaussians, .* 20000; "
     ) as told:
-        check(40, 20)
-    columns, rows = map(int, re.search(r"; (\d+) x (\d+) fit", str(told.value)).groups())
-    assert 0 < check(columns, rows) <= 20_000
-    with pytest.raises(InputError):
-        check(columns + 4, rows + 4)
+        check(20_000)
+    count, share = (int(found) for found in re.search(r"up to (\d+) .* to about (\d+)% of", str(told.value)).groups())
+    assert share == round(100 * (20_000 / count) ** 0.5) and "set export.columns and export.rows to" in str(told.value)
+    check(20_000, columns=1)
+    if not limit:
+        check(count)
+        with pytest.raises(InputError, match=f"{count} Gaussians, export.max_gb"):
+            check(count - 1)
 
 
-def test_a_level_that_is_not_there_and_a_limit_below_one_cell_are_named(cover_terrain, export_settings):
+def test_a_level_that_is_not_there_is_named(cover_terrain, export_settings):
     with pytest.raises(InputError, match=r"export\.level: there is no level 2; the last one is 1"):
         plan(cover_terrain, export_settings, level=2)
-    with pytest.raises(InputError, match="not one cell fits: set export.level to a coarser one, or raise"):
-        terrain_area.check_size(cover_terrain, plan(cover_terrain, export_settings), limits("ply"), 1e-6)
 
 
-@pytest.mark.parametrize("name", sorted(terrain_area.ALL_LEVELS))
+@pytest.mark.parametrize("name", [name for name, each in EXPORTERS.items() if each.all_levels])
 def test_a_set_of_all_levels_is_counted_by_the_finest(cover_terrain, export_settings, name):
-    coarse, both = plan(cover_terrain, export_settings, level=1), limits("ply") | limits(name)
-    counts = terrain_area.check_size(cover_terrain, coarse, both, 1.0)
-    assert counts["ply"] < counts[name]
-    assert counts[name] == terrain_area.check_size(cover_terrain, replace(coarse, level=0), limits("ply"), 1.0)["ply"]
-    said = terrain_area.describe_size(counts, both)
-    assert f"ply {counts['ply']} Gaussians" in said and f"{name} (finest level) {counts[name]} Gaussians" in said
-    bound = 1e-9 * (counts[name] - 1) * terrain_area.LIMITS[name].bytes
-    with pytest.raises(InputError, match=rf"export: {name}: 3 x 2 cells have up to {counts[name]} Gaussians"):
-        terrain_area.check_size(cover_terrain, coarse, limits(name), bound)
-    assert said.endswith(f"{counts[name] * 56 / 1e6:.0f} MB of disk on the way")
+    coarse, both = plan(cover_terrain, export_settings, level=1), {key: EXPORTERS[key] for key in ("ply", name)}
+    count = int(finite.count_cells(finite.keep_level(cover_terrain, 0), coarse.area, coarse.eye).sum())
+    terrain_files.check_size(cover_terrain, coarse, both, 1e-9 * (count + 0.5) * both[name].bytes)
+    with pytest.raises(InputError, match=rf"export: {name}: 3 x 2 cells have up to {count} Gaussians"):
+        terrain_files.check_size(cover_terrain, coarse, both, 1e-9 * (count - 0.5) * both[name].bytes)
 
 
 def test_a_radius_takes_all_cells_that_it_touches(cover_terrain, export_settings):
@@ -94,17 +85,10 @@ def test_a_radius_takes_all_cells_that_it_touches(cover_terrain, export_settings
     assert len(finite.list_grid(cover_terrain, wanted.area, wanted.eye)) == len(found)
 
 
-def test_a_radius_that_is_too_large_is_refused_with_the_one_that_fits(cover_terrain, export_settings):
-    def check(radius):
-        wanted = plan(cover_terrain, export_settings, radius=radius)
-        return terrain_area.check_size(cover_terrain, wanted, limits("ply"), 20_000e-9 * 68)["ply"]
-
-    with pytest.raises(InputError, match=r"ply: a radius of 12 tiles has up to \d+ Gaussians") as told:
-        check(12.0)
-    fits = float(re.search(r"; ([\d.]+) tiles fit: set export\.radius", str(told.value))[1])
-    assert check(fits) <= 20_000
-    with pytest.raises(InputError):
-        check(fits + 1)
+def test_a_radius_that_is_too_large_is_refused(cover_terrain, export_settings):
+    wanted = plan(cover_terrain, export_settings, radius=12.0)
+    with pytest.raises(InputError, match=r"ply: a radius of 12 tiles has up to .*; set export\.radius to about \d+%"):
+        terrain_files.check_size(cover_terrain, wanted, {"ply": EXPORTERS["ply"]}, 20_000e-9 * 68)
 
 
 @pytest.mark.parametrize(
@@ -112,15 +96,15 @@ def test_a_radius_that_is_too_large_is_refused_with_the_one_that_fits(cover_terr
     [
         ({"radius": "6m"}, None, r"export\.radius: 6m: the scale of this terrain is not known"),
         ({"centre": [0.0, "1m"]}, None, r"export\.centre: 1m: the scale of this terrain is not known"),
-        ({"radius": "6000m"}, 1.0, r"export\.radius: 1500 tile sides; more than 0 and at most 500"),
+        ({"radius": "6000m"}, 1.0, r"export\.radius: 1500 tile sides; 0.000001 to 500"),
         ({"radius": "0m"}, 1.0, r"export\.radius: 0 tile sides"),
-        ({"radius": 1e-17, "centre": [3.0, 3.0]}, None, r"export\.radius: 1e-17 tile sides touch no cell"),
+        ({"radius": 1e-17, "centre": [3.0, 3.0]}, None, r"export\.radius: 1e-17 tile sides"),
         ({"centre": ["99999999999m", 0.0]}, 1.0, r"export\.centre lies beyond"),
     ],
 )
 def test_metres_become_tile_sides_and_lengths_that_make_no_sense_are_refused(given, metres, said):
     sound = {"centre": ["-3m", 2.0], "radius": "6 m", "level": 0}
-    found = terrain_area.resolve_lengths(sound, side=4.0, metres=0.5)
+    found = terrain_files.resolve_lengths(sound, side=4.0, metres=0.5)
     assert found == {"centre": [-1.5, 2.0], "radius": 3.0, "level": 0}
     with pytest.raises(InputError, match=said):
-        terrain_area.resolve_lengths(given, 4.0, metres)
+        terrain_files.resolve_lengths(given, 4.0, metres)

@@ -10,8 +10,9 @@ import pytest
 from fixtures.splat_files import read_glb_splats, read_spz, read_usd
 
 from dav_gswt.errors import InputError
-from dav_gswt.export import sog, terrain_files
+from dav_gswt.export import splat_files, terrain_files
 from dav_gswt.export.axes import AXES, turn_field
+from dav_gswt.export.formats import EXPORTERS
 from dav_gswt.field import read_field
 from dav_gswt.files import digest_files
 from dav_gswt.geometry import cameras
@@ -40,7 +41,7 @@ def test_every_file_shows_what_the_terrain_shows(cover_bundle, cover_terrain, ex
     same = render(exact, here).colour
     for name, read in readers.items():
         stated = facts["files"][name]
-        assert stated == (terrain_files.OWN_AXES[name] if axes == "own" else axes)
+        assert stated == (EXPORTERS[name].axes[0] if axes == "own" else axes)
         field = turn_field(read(tmp_path / f"out/terrain.{'usdc' if name == 'usd' else name}"), AXES[stated].T)
         assert len(field) == facts["gaussians"] == facts["gaussians_by_format"][name]
         shown = render(field, here).colour
@@ -64,10 +65,10 @@ def test_threads_change_no_byte_and_coarser_levels_lie_far_from_the_eye(cover_te
 
 @pytest.mark.parametrize("name, said", [("sog", r"SOG needs Node\.js 20"), ("usd", "USD needs the extra `usd`")])
 def test_without_what_a_format_needs_nothing_is_begun(export, tmp_path, monkeypatch, name, said):
-    monkeypatch.setattr(sog.shutil, "which", lambda name: None)
+    monkeypatch.setattr(splat_files.shutil, "which", lambda name: None)
     monkeypatch.setitem(sys.modules, "pxr.UsdVol", None)
     monkeypatch.setattr(terrain_files, "place_blocks", lambda *_: pytest.fail("work started"))
-    with pytest.raises(InputError, match=f"exports/terrain: {said}"):
+    with pytest.raises(InputError, match=f"exports: {said}"):
         export(formats=["ply", name])
     assert list(tmp_path.iterdir()) == []
 
@@ -79,13 +80,19 @@ def test_the_converter_is_given_a_ply_and_all_levels(cover_terrain, export, tmp_
         asked.append([len(read_field(word)) if word.endswith(".ply") else word for word in words])
         return CompletedProcess(words, 0)
 
-    monkeypatch.setattr(sog.shutil, "which", lambda name: "/bin/npx")
-    monkeypatch.setattr(sog.subprocess, "run", run)
-    facts = export(formats=["sog", "streamed_sog", "3dtiles"])
+    monkeypatch.setattr(splat_files.shutil, "which", lambda name: "/bin/npx")
+    monkeypatch.setattr(splat_files.subprocess, "run", run)
+    facts = export(formats=["sog", "streamed_sog", "3dtiles"], axes="y-down")
     counts = [len(finite.collect_cells(cover_terrain, -1, -1, 3, 2, level)) for level in (0, 1)]
     assert [[word for word in words if type(word) is int] for words in asked] == [[facts["gaussians"]], counts]
     held = facts["gaussians_by_format"]
     assert held == {"sog": facts["gaussians"], "streamed_sog": sum(counts), "3dtiles": sum(counts)}
-    assert asked[1][-2:] == ["-X", "4"]  # a tile's side
+    assert asked[1][-2:] == ["-X", "4"] and asked[1].count("-l") == 2  # a tile's side
+    assert facts["files"] == {"sog": "y-down", "streamed_sog": "y-down", "3dtiles": "z-up"}  # which has no other
+    monkeypatch.setattr(
+        splat_files.subprocess, "run", lambda words, **_: CompletedProcess(words, 1, "", "no such thing")
+    )
+    with pytest.raises(InputError, match="splat-transform@2.7.1 failed: no such thing"):
+        export("failed", formats=["sog"])
     names = ["terrain.json", "terrain_3dtiles", "terrain_sog"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names

@@ -13,7 +13,7 @@ from pyproj import Transformer
 from dav_gswt.export import tiles_3d
 from dav_gswt.export.axes import Y_UP, turn_field
 from dav_gswt.export.spool import Spool
-from dav_gswt.export.terrain_area import choose_limits
+from dav_gswt.export.terrain_files import ExportJob
 from dav_gswt.field import concatenate_fields
 from dav_gswt.files import digest_files
 from dav_gswt.geometry.georeference import Georeference
@@ -45,9 +45,9 @@ def assert_inside(inner, outer):
 def write(export, tmp_path):
     """A function that exports 5 x 3 cells; the folder of tileset.json and what is in it."""
 
-    def write(name="out", **changes):
-        export(name, **({"columns": 5, "rows": 3, "formats": ["3dtiles"], "tile_compression": "none"} | changes))
-        folder = tmp_path / name / "terrain_3dtiles"
+    def write(name="out", kind="3dtiles_plain", **changes):
+        export(name, **({"columns": 5, "rows": 3, "formats": [kind]} | changes))
+        folder = tmp_path / name / f"terrain_{kind}"
         return folder, json.loads((folder / "tileset.json").read_text())
 
     return write
@@ -86,7 +86,7 @@ def test_every_level_has_the_gaussians_of_the_terrain(write, cover_terrain):
 
 
 def test_compressed_contents_are_those_without_to_the_steps_of_spz(write):
-    (plain, _), (packed, tileset) = write("plain", **FEW), write("packed", tile_compression="spz", **FEW)
+    (plain, _), (packed, tileset) = write("plain", **FEW), write("packed", "3dtiles", **FEW)
     names = sorted(path.relative_to(plain) for path in plain.rglob("*.glb"))
     assert names == sorted(path.relative_to(packed) for path in packed.rglob("*.glb"))
     for name in names:
@@ -95,8 +95,6 @@ def test_compressed_contents_are_those_without_to_the_steps_of_spz(write):
         np.testing.assert_allclose(read.log_scales, wanted.log_scales, atol=1 / 32 + 1e-4)
     extension = tileset["extensions"]["3DTILES_content_gltf"]
     assert extension["extensionsRequired"] == ["KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"]
-    limits = [choose_limits({"formats": ["3dtiles"], "tile_compression": how})["3dtiles"] for how in ("none", "spz")]
-    assert limits[0].bytes > 2 * limits[1].bytes
 
 
 def test_a_georeferenced_tileset_stands_where_pyproj_puts_it(write):
@@ -111,12 +109,11 @@ def test_a_georeferenced_tileset_stands_where_pyproj_puts_it(write):
 
 
 def test_threads_and_axes_of_other_formats_change_no_byte(write):
-    (first, _), (second, _) = write("a"), write("b", threads=3, axes="y-down", formats=["ply", "3dtiles"])
+    (first, _), (second, _) = write("a"), write("b", threads=3, axes="y-down", formats=["ply", "3dtiles_plain"])
     names = [sorted(path.relative_to(folder) for path in folder.rglob("*.*")) for folder in (first, second)]
     assert names[0] == names[1]
     for name in names[0]:
         assert digest_files(first / name) == digest_files(second / name)
-    assert json.loads((second.parent / "terrain.json").read_text())["files"] == {"ply": "y-down", "3dtiles": "z-up"}
 
 
 def test_a_level_is_refined_where_its_gaussians_lie_more_than_a_pixel_apart_and_no_error_falls(cover_terrain):
@@ -127,8 +124,8 @@ def test_a_level_is_refined_where_its_gaussians_lie_more_than_a_pixel_apart_and_
     assert errors == [0.0, expected, expected]
 
 
-@pytest.mark.parametrize("spz", [False, True])
-def test_what_has_no_gaussian_has_no_tile(tmp_path, spz):
+@pytest.mark.parametrize("compressed", [False, True])
+def test_what_has_no_gaussian_has_no_tile(cover_terrain, tmp_path, compressed):
     """A cell without Gaussians at any level, and one that has them at the finest alone."""
 
     @contextmanager
@@ -137,7 +134,10 @@ def test_what_has_no_gaussian_has_no_tile(tmp_path, spz):
             spool.append(random_field(0 if area.west == 0 or level else 5))
         yield spool
 
-    tiles_3d.write_tileset(tmp_path / "out", Area(0, 0, 4, 1), [0.0, 1.0], place, {"unit": "metre"}, None, spz)
+    with Spool(tmp_path / "spool") as nothing:
+        about = ({"unit": "metre"}, 1.0, cover_terrain, Area(0, 0, 4, 1), place, None)
+        job = ExportJob(tmp_path / "a", nothing, np.eye(3), *about)
+        assert tiles_3d.write_tileset(job, tmp_path / "out", compressed) == 3 * 5
     root = json.loads((tmp_path / "out/tileset.json").read_text())["root"]
     west, east = root["children"]
     assert "content" not in west and [tile["content"]["uri"] for tile in west["children"]] == ["0/1_0.glb"]

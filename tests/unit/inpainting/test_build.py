@@ -9,10 +9,7 @@ import torch
 from fixtures import ground as patch
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
-from dav_gswt.geometry import cameras
-from dav_gswt.geometry.poses import pose_of_camera
-from dav_gswt.inpainting import build, evaluation, occluders, unseen, view_inpainting, viewpoints
-from dav_gswt.prior import conditions
+from dav_gswt.inpainting import build, unseen, view_inpainting
 from dav_gswt.prior.interface import DecodedViews
 from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import TerrainPrior
@@ -32,8 +29,8 @@ class BandPrior:
 
     name, size = "bands", 32
 
-    def __init__(self, spoil=None, depth=True, light=1.0):
-        self.spoil, self.depth, self.light = spoil, depth, np.float32(light)
+    def __init__(self, spoil=None, light=1.0):
+        self.spoil, self.light = spoil, np.float32(light)
 
     def sample(self, condition, m, p_drop, steps, seed, known=None, common=True):
         assert p_drop == 0 and not common
@@ -46,14 +43,11 @@ class BandPrior:
     def encode_render(self, condition):
         return np.concatenate([condition.colour, condition.alpha[..., None]], -1).transpose(0, 3, 1, 2)
 
-    def estimate_variances(self, latents):
-        return np.zeros_like(latents)
-
     def decode(self, latents):
         planes = np.ascontiguousarray(latents.transpose(0, 1, 3, 4, 2))
         if self.spoil is not None:
             planes[0, 0, 3, 4, self.spoil] = np.nan
-        return DecodedViews(planes[..., :4], planes[..., 4] if self.depth else None)
+        return DecodedViews(planes[..., :4], None)
 
 
 def config(prior=None, samples=2):
@@ -98,11 +92,11 @@ def test_unseen_ground_takes_the_colour_of_the_prior_and_all_else_keeps_its_byte
     off = distance_to_bands(made.field.base_colours[:n][inner.ravel()])
     assert np.median(off) < 0.08  # between two bands colours mix, and far in they keep to the mean
     assert distance_to_bands(field.base_colours[:n][inner.ravel()]).min() > 0.1
-    assert (made.field.uncertainty[marked] == 1).all() and made.objects == 0
+    assert (made.field.uncertainty[marked] == 1).all()
     assert np.array_equal(made.field.means, field.means)  # no height is moved
     assert same(field, before[0]) and np.array_equal(grid.seen, before[1])  # nothing is changed in place
     count = {"unseen": 32 * 12, "painted": 32 * 12}
-    assert made.describe(grid) == {"cells": n, **count, "things": 0, "exemplar": count, "changed": True}
+    assert made.describe(grid) == {"cells": n, **count, "exemplar": count, "changed": True}
     rows = underlay.find_rows(made.field, grid)
     under = made.field[rows].base_colours.reshape(16, 16, 3)  # the colour of the discs above it
     assert np.median(distance_to_bands(under[3:-3, 13:-2])) < 0.1
@@ -160,17 +154,9 @@ def test_ground_under_a_known_object_is_not_inpainted():
     assert hidden.field is roof and hidden.unseen.any() and not hidden.inpainted.any()
 
 
-@pytest.mark.parametrize(
-    "prior, message",
-    [
-        (BandPrior(spoil=0), "view 0 is not finite"),
-        (BandPrior(spoil=4), "view 0 is not finite"),
-        (BandPrior(depth=False), "bands has no depth"),
-    ],
-)
-def test_a_prior_with_samples_that_are_not_finite_or_without_depth_is_refused(prior, message):
-    with pytest.raises(ValueError, match=message):
-        inpaint(*half_seen(), prior)
+def test_a_prior_with_samples_that_are_not_finite_is_refused():
+    with pytest.raises(ValueError, match="is not finite"):
+        inpaint(*half_seen(), BandPrior(spoil=3))
 
 
 @pytest.mark.slow
@@ -197,66 +183,27 @@ def blob(place, sizes, colour):
     )
 
 
-def seen_by(*eyes):
-    found = [cameras.pinhole(eye, MIDDLE, 32, 32, 55.0) for eye in eyes]
-    return [(pose_of_camera(f"p{i}", c, patch.FRAME), c) for i, c in enumerate(found)]
-
-
-def condition_views(field, pool):
-    """The condition of views, and pictures that equal the render."""
-    photos = conditions.prepare_photos(patch.photos(), patch.FRAME, 32)
-    c = conditions.build_condition(field, pool, photos, patch.FRAME.flying_height, 32)
-    return c, view_inpainting.InpaintedViews(c.colour, c.alpha, c.inverse_depth)
-
-
-EYES = [1.6, 1.0, 4.2], [3.6, 1.6, 3.7], [1.6, 4.0, 3.5]
-
-
-def find_objects(bare, there, count=2, spoil=None):
-    """Objects that a prior shows `there` over a field, from some eyes. spoil: a view that shows none."""
-    pool = seen_by(*EYES[:count])
-    (condition, flat), (_, made) = condition_views(bare, pool), condition_views(there, pool)
-    if spoil is not None:
-        made.inverse_depth[spoil] = flat.inverse_depth[spoil]
-    return occluders.find_occluders(bare, patch.grid(), pool, condition, made, patch.FRAME.flying_height)
-
-
-def test_an_object_is_added_on_imagined_ground_where_two_views_agree():
-    bare = patch.field()
-    marked = replace(bare, imagined=bare.ground.copy())
-    there = concatenate_fields([marked, blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])])
-    for count in (2, 3):
-        new = find_objects(marked, there, count)
-        assert np.hypot(new.means[:, 0] - 1.7, new.means[:, 1] - 1.5).max() < 0.7
-        assert new.means[:, 2].min() > occluders.LEAST_HEIGHT * patch.FRAME.flying_height
-        assert new.means[:, 2].max() < 1.1
-        assert new.base_colours.mean(0)[1] > 0.6 and new.imagined.all() and (new.uncertainty == 1).all()
-    assert len(find_objects(marked, there, 1)) == len(find_objects(marked, there, spoil=1)) == 0
-    assert len(find_objects(bare, there)) == 0  # the ground is known
-
-
 def test_every_unseen_cell_is_well_inside_the_picture_of_its_block():
     rng = np.random.default_rng(0)
     grid = patch.grid(0.05)
     there = rng.random(grid.shape) < 0.02
     fresh = there.copy()
-    for target in viewpoints.find_targets(grid, there, patch.FRAME.flying_height):
-        ((_, camera),) = viewpoints.place_cameras(viewpoints.ABOVE, target, patch.field(), grid, patch.FRAME, 64)
+    for target in build.find_targets(grid, there, patch.FRAME.flying_height):
+        ((_, camera),) = build.place_camera(target, patch.field(), grid, patch.FRAME, 64)
         assert camera.forward[2] < -np.sin(np.radians(75))
         at, depth = camera.project(grid.centres)
         fresh &= ~((depth > 0) & (at > 2).all(1) & (at < 62).all(1)).reshape(grid.shape)
     assert there.any() and not fresh.any()
-    assert viewpoints.find_targets(grid, np.zeros(grid.shape, bool), 6.0) == []
+    assert build.find_targets(grid, np.zeros(grid.shape, bool), 6.0) == []
 
 
 def test_no_camera_is_inside_an_object_or_under_the_ground():
-    target = np.array(MIDDLE)
-    free = viewpoints.place_cameras(viewpoints.ASIDE, target, patch.field(), patch.grid(), patch.FRAME, 32)
-    tower = blob(list(free[2][1].centre), [0.4, 0.4, 0.4], [0.5, 0.5, 0.5])
-    left = viewpoints.place_cameras(
-        viewpoints.ASIDE, target, concatenate_fields([patch.field(), tower]), patch.grid(), patch.FRAME, 32
-    )
-    assert len(free) == 4 and [pose for pose, _ in left] == [pose for i, (pose, _) in enumerate(free) if i != 2]
+    def place(target, *more):
+        return build.place_camera(target, concatenate_fields([patch.field(), *more]), patch.grid(), patch.FRAME, 32)
+
+    ((_, camera),) = place(np.array(MIDDLE))
+    assert place(np.array(MIDDLE), blob(list(camera.centre), [0.4, 0.4, 0.4], [0.5, 0.5, 0.5])) == []
+    assert place(np.array([1.6, 1.6, -9.0])) == []
 
 
 def test_evaluation_compares_before_and_after_everywhere_and_where_it_was_inpainted():
@@ -265,12 +212,12 @@ def test_evaluation_compares_before_and_after_everywhere_and_where_it_was_inpain
     tests = patch.photos(1)  # of the ground as it is
     after = replace(patch.field(), imagined=east)
     after.sh[east] += 0.05
-    found = evaluation.evaluate_inpainting(field, after, tests)
+    found = build.evaluate_inpainting(field, after, tests)
     for part in ("all", "imagined"):
         assert found[part]["after"]["psnr"] > found[part]["before"]["psnr"] + 3
     assert 0 < found["imagined"]["pixels"] < found["all"]["pixels"]
     assert found["gaussians"] == {"before": len(field), "after": len(after), "imagined": int(after.imagined.sum())}
-    same_again = evaluation.evaluate_inpainting(field, field, tests)
+    same_again = build.evaluate_inpainting(field, field, tests)
     assert same_again["imagined"]["pixels"] == 0 and same_again["imagined"]["before"]["psnr"] is None
 
 

@@ -10,13 +10,13 @@ import kornia
 import numpy as np
 import pytest
 import torch
-from diffusers import AutoencoderKL, DDIMScheduler, UNet2DConditionModel
+from diffusers import AutoencoderKL, UNet2DConditionModel
 from safetensors.torch import load_file, save_file
 
 from dav_gswt.errors import InputError
-from dav_gswt.prior import dropout, zero123_weights
+from dav_gswt.prior import dropout, zero123
 from dav_gswt.prior.interface import Condition, Prior
-from dav_gswt.prior.zero123 import LATENT, SIZE, Zero123, remove_white, resize_photos
+from dav_gswt.prior.zero123 import LATENT, SIZE, Zero123, remove_white
 
 transformers = pytest.importorskip("transformers", reason="needs transformers: pip install transformers==5.23.0")
 
@@ -63,10 +63,8 @@ def written(folder, place, pipeline):
     unet, coder, eye, projection = networks()
     for part, name in ((unet, "unet"), (coder, "vae"), (eye, "image_encoder")):
         part.save_pretrained(folder / name)
-    schedule = DDIMScheduler(1000, 0.00085, 0.012, "scaled_linear", set_alpha_to_one=False, steps_offset=1)
-    schedule.save_pretrained(folder / "scheduler")
     (folder / place).mkdir()
-    prefix = zero123_weights.PROJECTIONS[place]
+    prefix = zero123.PROJECTIONS[place]
     save_file({prefix + name: v for name, v in projection.state_dict().items()}, folder / place / UNET)
     (folder / "model_index.json").write_text(json.dumps({"_class_name": pipeline, place: ["x", "y"]}))
     return folder
@@ -98,8 +96,8 @@ def older(values):
     return values
 
 
-def condition(count=2, side=64, seed=0):
-    rng, pixels = np.random.default_rng(seed), (count, side, side)
+def condition(count=2, seed=0):
+    rng, pixels = np.random.default_rng(seed), (count, SIZE, SIZE)
     shapes = (*pixels, 3), pixels, pixels, (*pixels, 3), (count, 4)
     return Condition(*(rng.uniform(0, 1, shape).astype(np.float32) for shape in shapes))
 
@@ -130,7 +128,7 @@ def test_a_view_does_not_depend_on_the_others(prior):
 
 def test_it_samples_as_the_authors_write_it_down(prior):
     """The plain twin: their preparation by kornia, their loop over DDIM's formula, no sampler of ours."""
-    view, steps, parts = condition(1, side=SIZE), 3, prior.networks
+    view, steps, parts = condition(1), 3, prior.networks
     photo = 2 * torch.from_numpy(view.photo.transpose(0, 3, 1, 2).copy()) - 1
     seen = kornia.geometry.resize(photo, (28, 28), interpolation="bicubic", align_corners=True, antialias=False)
     mean, spread = torch.tensor([0.48145466, 0.4578275, 0.40821073]), torch.tensor([0.26862954, 0.26130258, 0.27577711])
@@ -163,14 +161,12 @@ def test_what_the_field_shows_is_a_latent_too(prior):
     assert np.abs(prior.encode_render(given) - expected.numpy()).max() > 1e-3
 
 
-def test_latents_are_scaled_and_stand_for_as_much_as_the_coder_says(prior):
+def test_latents_are_scaled(prior):
     latents = np.random.default_rng(0).normal(size=(1, 2, *LATENT)).astype(np.float32)
     with torch.inference_mode():
         painted = prior.networks.vae.decode(torch.from_numpy(latents[0]) / 0.18215).sample.clamp(-1, 1)
-        expected = prior.networks.vae.encode(painted).latent_dist.std * 0.18215
     shown = remove_white((painted / 2 + 0.5).numpy().transpose(0, 2, 3, 1))
     np.testing.assert_allclose(prior.decode(latents).rgba[0], shown, atol=1e-6)
-    np.testing.assert_allclose(np.sqrt(prior.estimate_variances(latents)[0]), expected.numpy(), rtol=1e-4)
 
 
 def test_a_sample_has_one_mask_with_and_without_the_photo(prior):
@@ -193,15 +189,6 @@ def test_what_is_not_finite_or_makes_no_sense_is_refused_by_name(prior):
     for guidance in (0.5, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="guidance is"):
             Zero123(prior.networks, guidance)
-
-
-@pytest.mark.parametrize("side", [100, 300])
-def test_photos_of_any_size_keep_their_colours(side):
-    grey = np.full((1, side, side, 3), 0.25, np.float32)
-    assert resize_photos(grey).shape == (1, 3, SIZE, SIZE)
-    np.testing.assert_allclose(resize_photos(grey), 0.25, atol=1e-6)
-    noisy = resize_photos(np.random.default_rng(0).integers(0, 2, (1, side, side, 3)).astype(np.float32))
-    assert noisy.min() >= 0 and noisy.max() <= 1
 
 
 def test_drawn_over_white_the_picture_is_what_was_painted():
@@ -239,18 +226,7 @@ def put(**tensors):
         ("vae", lambda path: torch.save(load_file(path), path), f"{CODER}: not readable as safetensors"),
         ("image_encoder", pickle_instead, "pytorch_model.bin: a pickle.*docs/prior.md"),
         ("unet", lambda path: path.unlink(), f"there is no {UNET}"),
-        (
-            "cc_projection",
-            lambda path: changed(path, lambda v: {"projection.bias": v["projection.bias"]}),
-            "is missing",
-        ),
-        ("vae", put(more=torch.zeros(1)), "'more' is not of this network"),
         ("cc_projection", put(projection__weight=torch.zeros(3, 3)), r"the shape \(3, 3\), not \(16, 20\)"),
-        (
-            "image_encoder",
-            put(visual_projection__weight=torch.full((16, 16), torch.nan)),
-            "visual_projection.weight holds numbers that are not finite",
-        ),
         ("unet", put(conv_in__bias=torch.zeros(16, dtype=torch.int32)), "conv_in.bias has the type I32"),
     ],
 )
@@ -264,10 +240,10 @@ def test_damaged_weights_are_refused_by_name(folder, tmp_path, part, damage, mes
 @pytest.mark.parametrize(
     "name, change, message",
     [
-        ("unet/config.json", {"in_channels": 4}, "in_channels is 4, not 8"),
-        ("vae/config.json", {"latent_channels": 16}, "latent_channels is 16, not 4"),
-        ("image_encoder/config.json", {"projection_dim": 8}, "cross_attention_dim is 16, not 8"),
-        ("scheduler/scheduler_config.json", {"beta_schedule": "none"}, "no schedule"),
+        ("unet/config.json", {"in_channels": 4}, "has the shape"),
+        ("vae/config.json", {"latent_channels": 16}, "has the shape"),
+        ("image_encoder/config.json", {"projection_dim": 8}, "has the shape"),
+        ("vae/config.json", {"down_block_types": ["Another"]}, "describes no such network"),
     ],
 )
 def test_a_config_of_another_model_is_refused_by_name(folder, tmp_path, name, change, message):
@@ -286,6 +262,6 @@ def test_a_folder_of_something_else_or_of_too_many_bytes_is_refused_by_what_it_i
     with monkeypatch.context() as patch, pytest.raises(InputError, match="pip install 'transformers=="):
         patch.setitem(sys.modules, "transformers", None)
         Zero123.open(folder)
-    monkeypatch.setattr(zero123_weights, "MOST_BYTES", 1000)
+    monkeypatch.setattr(zero123, "MOST_BYTES", 1000)
     with pytest.raises(InputError, match="GiB of weights"):
         Zero123.open(folder)

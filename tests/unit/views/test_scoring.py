@@ -35,9 +35,6 @@ class KnownDisagreement:
     def encode_render(self, condition):
         return 0.5 * condition.colour[..., 2:].repeat(4, -1).transpose(0, 3, 1, 2)
 
-    def estimate_variances(self, latents):
-        return np.zeros_like(latents)
-
     def decode(self, latents):
         pictures = np.clip(0.5 + latents, 0, 1).transpose(0, 1, 3, 4, 2)
         return DecodedViews(np.ascontiguousarray(pictures), None)
@@ -77,24 +74,6 @@ def test_w2_is_the_disagreement_of_the_samples_and_the_residual_how_far_their_me
         np.testing.assert_allclose(found.scores.terms["residual"][0], 4 * (0.5 * 0.4) ** 2, rtol=0.2)
     first = FrozenScales(Scales(dict.fromkeys(scores.TERMS, 7.0)), Quantiles(0.0, 1.0))  # of an earlier round
     assert scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2), frozen=first).scores.scales == first.scales
-
-
-def test_posterior_adds_the_variances_of_the_latents_to_w2_and_independent_noise_makes_samples_disagree():
-    class Uneven(KnownDisagreement):
-        def estimate_variances(self, latents):
-            return np.arange(latents.shape[1], dtype=np.float32)[None, :, None, None, None] + np.zeros_like(latents)
-
-    point, posterior = (sampled_w2(0.2, posterior=p) for p in (False, True))
-    wider = sampled_w2(0.2, Uneven, posterior=True)
-    assert np.array_equal(point, posterior)  # of samples that are equally wide
-    np.testing.assert_allclose(wider - point, 4.0, rtol=1e-5)  # deviations 0 and 1, in four channels
-
-    class Noisy(KnownDisagreement):
-        def sample(self, condition, m, p_drop, steps, seed, common=True):
-            return super().sample(condition, m, 0.0 if common else 0.3, steps, seed)
-
-    common, own = (sampled_w2(0.0, Noisy, independent_noise=n) for n in (False, True))
-    assert not common.any() and (own > 0).all()
 
 
 def test_a_gaussian_gets_the_uncertainty_of_the_pixels_that_it_covers():

@@ -89,9 +89,6 @@ class Counting:
     def encode_render(self, condition):
         return np.zeros((len(condition), 4, 32, 32), np.float32)
 
-    def estimate_variances(self, latents):
-        return np.zeros_like(latents)
-
     def decode(self, latents):
         return DecodedViews(np.full((*latents.shape[:2], 32, 32, 4), 0.5, np.float32), None)
 
@@ -140,7 +137,7 @@ def test_terms_do_not_depend_on_the_number_of_threads_which_pytorch_keeps(monkey
     planes = [rng.uniform(0, 1, (count, SIZE, SIZE)).astype(np.float32) for _ in range(2)]
     colour, photo = (rng.uniform(0, 1, (count, SIZE, SIZE, 3)).astype(np.float32) for _ in range(2))
     seen = Condition(colour, *planes, photo, rng.uniform(-1, 1, (count, 4)).astype(np.float32))
-    config = PriorConfig(prior, 2, 2, 0.2, weights=lpips_arrays.random(), posterior=True)
+    config = PriorConfig(prior, 2, 2, 0.2, weights=lpips_arrays.random())
     before, found = torch.get_num_threads(), []
     for threads in ("1", "2"):
         monkeypatch.setenv("DAV_GSWT_THREADS", threads)

@@ -1,1 +1,1 @@
-"""Capture: takes the photos that a policy requested. To add an agent, name it in `agents.AGENTS`."""
+"""Capture: takes the photos that a policy requested. To add an agent, write a function in `agents`."""

@@ -1,75 +1,123 @@
-"""The capture agents by name, and the capture of a round.
+"""The capture agents. To add one, write a function here with the decorator `agent`.
 
-To add an agent, write a `CaptureAgent` and name it in `AGENTS`. Agents of devices and people only fill the photo store:
-wrap such a function in `StoreAgent`.
+The config and the rules take the names from this registry. Every job of a run reads it, so the functions import what
+they need when they are called.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
-
-from dav_gswt.capture import drone, handheld, render, replay, serial_rig
-from dav_gswt.capture.interface import CaptureAgent, CaptureRequest, RequestedPose, photo_name, view_distance
-from dav_gswt.capture.site import Site
-from dav_gswt.geometry.poses import Pose
-from dav_gswt.images import image_files
-from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
-from dav_gswt.photos.lenses import undistort_scene_photo
-from dav_gswt.photos.view_split import ViewSplit
-from dav_gswt.views import candidates
+from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
-class StoreAgent:
-    """Agent that takes the photos which the store lacks, then undistorts all requested ones into the capture folder.
+class Agent:
+    """Who takes the photos of a scene.
 
-    take_photos: fills the store; raises InputError as long as photos are missing.
+    Attributes:
+        take: takes photos. Without `device` it is called with a `CaptureRequest`, writes photos into its folder and
+            returns one record for each. With `device` it is called with a `Site` and the poses that lack photos, fills
+            the photo store, and raises InputError as long as photos are missing.
+        kinds: of the scenes that the agent serves.
+        device: whether a device or a person takes the photos: on this machine, and never twice.
+        keep_reachable: called with the scene's entry, its frame and candidates; returns those that can be reached.
+            None: all.
+        pool: whether the candidates are photos that exist, all of which can be taken.
     """
 
-    take_photos: Callable[[Site, list[RequestedPose]], None]
-
-    def __call__(self, request: CaptureRequest) -> list[CapturedPhoto]:
-        site = request.site
-        with site.store.locked():
-            missing = [(pose, camera) for pose, camera in request.poses if site.missing_photos(camera) > 0]
-            if missing:
-                self.take_photos(site, missing)
-            return [photo for requested in request.poses for photo in _undistort_stored(request, requested)]
+    take: Callable[..., Any]
+    kinds: tuple[str, ...]
+    device: bool
+    keep_reachable: Callable[..., Any] | None
+    pool: bool
 
 
-AGENTS: dict[str, CaptureAgent] = {
-    "render": render.capture_rendered,
-    "replay": replay.capture_replayed,
-    "serial": StoreAgent(serial_rig.take_photos),
-    "plan": StoreAgent(drone.take_photos),
-    "handheld": StoreAgent(handheld.take_photos),
-}
+AGENTS: dict[str, Agent] = {}
 
 
-def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[Pose], folder: Path) -> None:
-    """Fill `folder` with the photos of the chosen poses and with capture.json.
+def agent(
+    name: str,
+    *kinds: str,
+    device: bool = True,
+    keep_reachable: Callable[..., Any] | None = None,
+    pool: bool = False,
+):
+    """Register the decorated function as the one that takes an agent's photos; see `Agent`."""
 
-    split: views.json. before: the capture folders of earlier rounds. chosen: the poses to photograph. The agent is not
-    called if no pose was chosen.
-    """
-    remaining = candidates.list_remaining(site.scene, site.frame, site.photos / "sparse", split, before)
-    requested = candidates.select_by_name(remaining, chosen)
-    earlier = [photo.requested for capture in before for photo in read_capture_record(capture)]
-    site = replace(site, requested=(*earlier, *(camera for _, camera in requested)))
-    folder.mkdir(parents=True, exist_ok=True)
-    agent = site.scene["agent"]
-    photos = AGENTS[agent](CaptureRequest(site, requested, remaining, folder)) if requested else []
-    write_capture_record(folder, agent, photos)
+    def register(take: Callable[..., Any]):
+        AGENTS[name] = Agent(take, kinds, device, keep_reachable, pool)
+        return take
+
+    return register
 
 
-def _undistort_stored(request: CaptureRequest, requested: RequestedPose) -> list[CapturedPhoto]:
-    """Write a pose's stored photos as its pinhole camera would have taken them."""
-    site, (pose, camera) = request.site, requested
-    photos = []
-    for i, stored in enumerate(site.store.photos_of(camera)[: site.burst]):
-        name = photo_name(pose, i, site.burst)
-        picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera)
-        image_files.write_png(request.folder / name, picture)
-        distance = view_distance(camera, stored.camera, site.unit)
-        photos.append(CapturedPhoto(name, pose, camera, stored.camera, distance, stored.taken))
+def list_agents(kind: str) -> tuple[str, ...]:
+    """The names of the agents that serve a kind of scene."""
+    return tuple(name for name, each in AGENTS.items() if kind in each.kinds)
+
+
+@agent("render", "synthetic", device=False)
+def render(request: Any) -> list[Any]:
+    """Photos of a synthetic scene are rendered exactly at their poses."""
+    from dav_gswt.images.image_files import write_png
+    from dav_gswt.logs import progress
+    from dav_gswt.photos.capture_record import CapturedPhoto
+    from dav_gswt.photos.synthetic import scene as synthetic
+
+    world, photos = synthetic.scene_from_config(request.site.scene), []
+    for pose, camera in progress(request.poses, "render photos"):
+        photos.append(CapturedPhoto(f"{pose.name}.png", pose, camera, camera, 0.0))
+        write_png(request.folder / photos[-1].name, synthetic.render(world, camera))
     return photos
+
+
+@agent("replay", "synthetic", "photos", device=False, pool=True)
+def replay(request: Any) -> list[Any]:
+    """The photo of the pool that is nearest to each pose is taken, ties by name; fewer if the pool ends."""
+    import shutil
+
+    from dav_gswt.capture.capturing import view_distance
+    from dav_gswt.photos.capture_record import CapturedPhoto
+
+    site, remaining, photos = request.site, {pose.name: camera for pose, camera in request.remaining}, []
+    for pose, camera in request.poses[: len(remaining)]:
+        distance = {name: view_distance(camera, other, site.unit) for name, other in remaining.items()}
+        name = min(distance, key=lambda n: (distance[n], n))
+        shutil.copyfile(site.photos / "images" / name, request.folder / name)
+        photos.append(CapturedPhoto(name, pose, camera, remaining.pop(name), distance[name]))
+    return photos
+
+
+def _within_rig(scene: Any, frame: Any, candidates: Any) -> Any:
+    from dav_gswt.capture.serial_rig import filter_reachable
+
+    return filter_reachable(scene, frame, candidates)
+
+
+@agent("serial", "photos", keep_reachable=_within_rig)
+def serial(site: Any, missing: list[Any]) -> None:
+    """A motorised camera rig on a serial port."""
+    from dav_gswt.capture.serial_rig import take_photos
+
+    take_photos(site, missing)
+
+
+def _above_least_altitude(scene: Any, frame: Any, candidates: Any) -> Any:
+    from dav_gswt.capture.drone import filter_reachable
+
+    return filter_reachable(scene, frame, candidates)
+
+
+@agent("plan", "photos", keep_reachable=_above_least_altitude)
+def plan(site: Any, missing: list[Any]) -> None:
+    """A drone: its mission is written, its photos come through the drop folder."""
+    from dav_gswt.capture.drone import take_photos
+
+    take_photos(site, missing)
+
+
+@agent("handheld", "photos")
+def handheld(site: Any, missing: list[Any]) -> None:
+    """A person: a shot list is written, the photos come through the drop folder."""
+    from dav_gswt.capture.handheld import take_photos
+
+    take_photos(site, missing)

@@ -28,14 +28,10 @@ class Ruler:
     def format_length(self, length: float) -> str:
         """A length in world units as metres, or as flying heights if metres are not known."""
         if self.metres is None:
-            return self.format_heights(length)
+            count = f"{length / self.unit:.1f}"
+            return f"{count} flying height{'' if count == '1.0' else 's'}"
         metres = length * self.metres
         return f"{metres:.0f} m" if metres >= 20 else f"{metres:.1f} m"
-
-    def format_heights(self, length: float) -> str:
-        """A length in world units as flying heights."""
-        count = f"{length / self.unit:.1f}"
-        return f"{count} flying height{'' if count == '1.0' else 's'}"
 
     def format_direction(self, direction: Float[Array, "d"]) -> str:
         """A compass direction, or a direction on the map if north is not known."""
@@ -64,17 +60,12 @@ def describe_tilt(camera: Camera) -> str:
     return "level" if down == 0 else f"{'down' if down > 0 else 'up'} {abs(down)} degrees"
 
 
-def heading(camera: Camera) -> Float[Array, "3"]:
-    """The level direction that the photographer faces: ahead, or the picture's top if the camera looks down."""
-    return -camera.rotation[1] if abs(tilt(camera)) >= STEEP else camera.forward
-
-
 def describe_facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
-    """Say which way to face."""
-    ahead, inwards = heading(camera)[:2], (frame.exemplar.centre - camera.centre)[:2]
-    towards = by.format_direction(ahead)
+    """Say which way to face, or where the picture's top is if the camera looks down."""
     if abs(tilt(camera)) >= STEEP:
-        return f"turn the top of the picture to {towards}"
+        return f"turn the top of the picture to {by.format_direction(-camera.rotation[1][:2])}"
+    ahead, inwards = camera.forward[:2], (frame.exemplar.centre - camera.centre)[:2]
+    towards = by.format_direction(ahead)
     across = ahead[0] * inwards[1] - ahead[1] * inwards[0]
     off = np.degrees(np.arctan2(abs(across), ahead @ inwards))
     if off > FACING or np.linalg.norm(inwards) < HERE * by.unit:
@@ -82,30 +73,24 @@ def describe_facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
     return f"face the middle, which is to {'the ' if by.place else ''}{towards}"
 
 
-def describe_position(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
-    """Say where to stand."""
-    out = (camera.centre - frame.exemplar.centre)[:2]
-    away = float(np.linalg.norm(out))
-    if away < HERE * by.unit:
-        return "Stand in the middle"
-    if by.place:
-        return f"Stand {by.format_length(away)} {by.format_direction(out)} of the middle"
-    return f"Stand {by.format_length(away)} from the middle, towards {by.format_direction(out)}"
-
-
 def describe_pose(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
     """Say where to stand, how high to hold the camera, and where it looks."""
+    out = (camera.centre - frame.exemplar.centre)[:2]
+    away, direction = float(np.linalg.norm(out)), by.format_direction(out)
+    if away < HERE * by.unit:
+        position = "Stand in the middle"
+    elif by.place:
+        position = f"Stand {by.format_length(away)} {direction} of the middle"
+    else:
+        position = f"Stand {by.format_length(away)} from the middle, towards {direction}"
     up = f"camera {by.format_length(float(camera.centre[2]))} above the ground"
-    position, facing = describe_position(camera, frame, by), describe_facing(camera, frame, by)
-    return f"{position}, {up}; {facing}; look {describe_tilt(camera)}."
+    return f"{position}, {up}; {describe_facing(camera, frame, by)}; look {describe_tilt(camera)}."
 
 
 def describe_walk(a: Camera, b: Camera, by: Ruler) -> str:
     """Say how to walk from one pose to the next."""
     way = (b.centre - a.centre)[:2]
     far = float(np.linalg.norm(way))
-    return (
-        "stay where you are"
-        if far < HERE * by.unit
-        else f"go {by.format_length(far)} towards {by.format_direction(way)}"
-    )
+    if far < HERE * by.unit:
+        return "stay where you are"
+    return f"go {by.format_length(far)} towards {by.format_direction(way)}"

@@ -1,27 +1,69 @@
-"""The agent `plan`: writes a mission for a drone, whose photos come through the drop folder."""
+"""The agent `plan`: writes a mission for a drone, whose photos come through the drop folder.
+
+Missions are for a multicopter with a gimbal, in the format of QGroundControl (file type "Plan", version 1). At each
+view the vehicle stops, yaws to the viewing direction, tilts the gimbal, waits, and takes a photo. Altitudes are
+relative to the take-off point, which must be on the ground of the scene: z = 0.
+Sources: docs.qgroundcontrol.com, "Plan File Format"; mavlink.io, MAV_CMD.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.capture import drop_folder, missing_photos, qgc_plan
-from dav_gswt.capture.interface import RequestedPose
-from dav_gswt.capture.site import Site
+from dav_gswt.capture import drop_folder, route
+from dav_gswt.capture.capturing import RequestedPose, Site
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.views.candidates import Candidates
 
+NamedCamera = tuple[str, Camera]
+
+WAYPOINT, RETURN, TAKEOFF, DELAY, SPEED, GIMBAL, SHUTTER = 16, 20, 22, 93, 178, 205, 2000  # MAV_CMD
+RELATIVE, NO_PLACE = 3, 2  # MAV_FRAME: position with altitude above home; command without position
+PX4, QUADROTOR = 12, 2  # MAV_AUTOPILOT, MAV_TYPE
+ABOVE_HOME = 1  # QGroundControl's AltitudeMode
+TARGETING = 2  # MAV_MOUNT_MODE: the gimbal takes angles
+GROUND_SPEED = 1  # SPEED_TYPE
+HOLD, SETTLE, WRITE = 1.0, 3.0, 1.0  # seconds: to come to rest, for the gimbal to turn, for a photo to be taken
+LEVEL = 0.02  # horizontal part of a viewing direction below which the picture's top gives the heading
+SAME = 0.01  # metres: nearer positions count as equal
+
+
+@dataclass(frozen=True)
+class FlightRules:
+    """Safety limits of a flight, in metres above the plane of the ground and metres per second.
+
+    No photo is taken below min_altitude; below clearance the vehicle only moves vertically.
+    """
+
+    min_altitude: float = 2.0
+    clearance: float = 5.0
+    speed: float = 3.0
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A plan: content of its file, length in metres, duration in seconds, and a description."""
+
+    content: dict
+    length: float
+    duration: float
+    description: str
+
 
 def filter_reachable(scene: dict, frame: SceneFrame, candidates: Candidates) -> Candidates:
-    """Keep the poses that are not too low to fly to; all where the scene's unit in metres is not known.
+    """Keep the poses that are not too low to fly to; all if the scene's unit in metres is not known.
 
     Raises: InputError: no pose is left.
     """
     if frame.georeference is None or not candidates:
         return candidates
-    least = scene.get("drone", {}).get("min_altitude", qgc_plan.FlightRules.min_altitude)
+    least = scene.get("drone", {}).get("min_altitude", FlightRules.min_altitude)
     scale = frame.georeference.metres_per_unit
     found = [(pose, camera) for pose, camera in candidates if scale * camera.centre[2] >= least]
     if not found:
@@ -49,38 +91,145 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
         )
     exemplar = site.frame.exemplar
     home = np.array([exemplar.west + exemplar.side / 2, exemplar.south])
-    rules = qgc_plan.FlightRules(**{key: float(value) for key, value in site.scene.get("drone", {}).items()})
+    rules = FlightRules(**{key: float(value) for key, value in site.scene.get("drone", {}).items()})
     _check_level(site, place, missing, home, rules)
-    flown = qgc_plan.plan_flight([(pose.name, camera) for pose, camera in missing], place, home, rules, site.burst)
+    flight = plan_flight([(pose.name, camera) for pose, camera in missing], place, home, rules)
     path = site.store.folder / "mission.plan"
-    write_json(path, flown.content)
+    write_json(path, flight.content)
     raise InputError(
-        f"{path}: fly this mission (QGroundControl: Plan, Open): {missing_photos.describe_missing(site, missing)}. "
-        f"It is a flight of {flown.describe()}; take off from the ground near {flown.describe_home()}. "
-        f"Then {missing_photos.describe_delivery(site)}"
+        f"{path}: fly this mission (QGroundControl: Plan, Open), {flight.description}: "
+        + drop_folder.describe_missing(site, missing)
     )
 
 
 def _check_level(
-    site: Site, place: Georeference, missing: list[RequestedPose], home: Float[Array, "2"], rules: qgc_plan.FlightRules
+    site: Site, place: Georeference, missing: list[RequestedPose], home: Float[Array, "2"], rules: FlightRules
 ) -> None:
-    """Check that the ground is level enough, as a mission assumes: `altitude` is wrong by distance times slope.
+    """Check that the ground is level enough, as a mission assumes: an altitude is wrong by distance times slope.
 
     Raises: InputError: a pose is off by more than half its altitude, or by more than half the clearance.
     """
     at = place.metres_per_unit * np.stack([camera.centre for _, camera in missing])
     off = np.linalg.norm(at[:, :2] - place.metres_per_unit * home, axis=1) * np.tan(np.radians(place.slope))
     low, worst, drone = off > at[:, 2] / 2, float(off.max()), f"scenes.{site.name}.drone"
-    enough = f"{np.ceil(2 * worst):.0f} or more"
-    remedies = [f"{drone}.clearance to {enough}"] if worst > rules.clearance / 2 else []
-    if low.any():
-        remedies.append(f"{drone}.min_altitude to {enough}")
-    if not remedies:
-        return
-    names = ", ".join(pose.name for (pose, _), short in zip(missing, low, strict=True) if short)
-    raise InputError(
-        f"scenes.{site.name}: the ground slopes by {place.slope:.1f} degrees, so that altitudes of a mission over "
-        f"level ground would be wrong by up to {worst:.1f} m"
-        + (f", and of {names} by more than half" if names else "")
-        + f"; set {' and '.join(remedies)} if there is room to spare everywhere, or take agent: handheld"
+    keys = ["clearance"] * (worst > rules.clearance / 2) + ["min_altitude"] * bool(low.any())
+    if keys:
+        names = ", ".join(pose.name for (pose, _), short in zip(missing, low, strict=True) if short)
+        raise InputError(
+            f"scenes.{site.name}: the ground slopes by {place.slope:.1f} degrees, so that altitudes of a mission over "
+            f"level ground would be wrong by up to {worst:.1f} m"
+            + (f", and of {names} by more than half" if names else "")
+            + f"; set {' and '.join(f'{drone}.{key} to {np.ceil(2 * worst):.0f} or more' for key in keys)} if there is "
+            "room to spare everywhere, or take agent: handheld"
+        )
+
+
+def plan_flight(views: list[NamedCamera], place: Georeference, home: Float[Array, "2"], rules: FlightRules) -> Flight:
+    """Plan a flight from a point on the ground (`home`, world units) past all views and back.
+
+    Raises: InputError: views below rules.min_altitude, by name.
+    """
+    scale = place.metres_per_unit
+    at = scale * np.array([camera.centre for _, camera in views])
+    low = [name for (name, _), z in zip(views, at[:, 2], strict=True) if z < rules.min_altitude]
+    if low:
+        raise InputError(
+            f"{', '.join(low)}: lower than {rules.min_altitude:g} m above the ground, where no photo is taken from "
+            "the air (drone.min_altitude of the scene's entry); take a rig or agent: handheld for poses this low"
+        )
+    start = scale * np.array([*home, 0.0]) + [0.0, 0.0, rules.clearance]
+    mission, path = _Mission(place, scale * np.array([*home, 0.0])), [start]
+    mission.add_waypoint(TAKEOFF, start)
+    mission.add_command(SPEED, GROUND_SPEED, rules.speed, -1)
+    for i in [*route.order_stops(at, start, start), None]:
+        stop = start if i is None else at[i]
+        for corner in plan_detour(path[-1], stop, rules.clearance):
+            mission.add_waypoint(WAYPOINT, corner)
+            path.append(corner)
+        path.append(stop)
+        if i is not None:
+            mission.add_photo(stop, views[i][1])
+    mission.add_command(RETURN)
+    length = route.path_length(np.array(path))
+    duration = length / rules.speed + len(views) * (HOLD + SETTLE + WRITE)
+    latitude, longitude = mission.home[:2]
+    description = (
+        f"a flight of {length:.0f} m, about {np.ceil(duration / 60):.0f} min, up to {at[:, 2].max():.0f} m above the "
+        f"ground; take off from the ground near {latitude:.6f}, {longitude:.6f}"
     )
+    return Flight(mission.to_plan(rules.speed), length, duration, description)
+
+
+def plan_detour(a: Float[Array, "3"], b: Float[Array, "3"], clearance: float) -> list[Float[Array, "3"]]:
+    """Corners of a path that climbs, crosses and descends instead of moving sideways below `clearance`.
+
+    Over level ground a straight path is lowest at an end: each end below the clearance gets a corner straight above it.
+    """
+    if np.linalg.norm(a[:2] - b[:2]) < SAME:
+        return []
+    return [np.array([*end[:2], clearance]) for end in (a, b) if end[2] < clearance]
+
+
+def heading_and_pitch(camera: Camera, place: Georeference) -> tuple[float, float]:
+    """Compass heading of the vehicle and pitch of the gimbal (0: level, -90: straight down) for a camera, degrees."""
+    ahead, top = camera.forward, -camera.rotation[1]
+    level = float(np.hypot(*ahead[:2]))
+    heading = place.azimuth(ahead if level > LEVEL else top)
+    return heading, float(np.degrees(np.arctan2(ahead[2], level)))
+
+
+class _Mission:
+    """Builder of a mission. home: latitude, longitude and altitude of the take-off point."""
+
+    def __init__(self, place: Georeference, home: Float[Array, "3"]):
+        self.reference = place
+        self.items: list[dict] = []
+        self.home = self._to_earth(home)
+
+    def add_waypoint(
+        self, command: int, at: Float[Array, "3"], hold: float = 0.0, heading: float | None = None
+    ) -> None:
+        latitude, longitude, altitude = self._to_earth(at)
+        up = round(float(altitude - self.home[2]), 3)
+        where = [round(float(latitude), 9), round(float(longitude), 9), up]
+        heights = {"AMSLAltAboveTerrain": None, "Altitude": up, "AltitudeMode": ABOVE_HOME}
+        self._add_item(heights, command, RELATIVE, [hold, 0, 0, heading, *where])
+
+    def add_command(self, command: int, *params: float | int | None) -> None:
+        self._add_item({}, command, NO_PLACE, [*params, 0, 0, 0, 0, 0, 0, 0][:7])
+
+    def add_photo(self, at: Float[Array, "3"], camera: Camera) -> None:
+        heading, tilt = heading_and_pitch(camera, self.reference)
+        self.add_waypoint(WAYPOINT, at, HOLD, round(heading, 3))
+        self.add_command(GIMBAL, round(tilt, 3), 0, 0, 0, 0, 0, TARGETING)
+        self.add_command(DELAY, SETTLE, -1, -1, -1)
+        self.add_command(SHUTTER, 0, 0, 1, 0, None, None, None)  # one photo, no interval
+        self.add_command(DELAY, WRITE, -1, -1, -1)
+
+    def to_plan(self, speed: float) -> dict:
+        latitude, longitude, altitude = (float(v) for v in self.home)
+        mission = {
+            "cruiseSpeed": speed,
+            "firmwareType": PX4,
+            "globalPlanAltitudeMode": ABOVE_HOME,
+            "hoverSpeed": speed,
+            "items": self.items,
+            "plannedHomePosition": [round(latitude, 9), round(longitude, 9), round(altitude, 3)],
+            "vehicleType": QUADROTOR,
+            "version": 2,
+        }
+        return {
+            "fileType": "Plan",
+            "geoFence": {"circles": [], "polygons": [], "version": 2},
+            "groundStation": "QGroundControl",
+            "mission": mission,
+            "rallyPoints": {"points": [], "version": 2},
+            "version": 1,
+        }
+
+    def _to_earth(self, at: Float[Array, "3"]) -> Float[Array, "3"]:
+        return self.reference.to_earth(at[None] / self.reference.metres_per_unit)[0]
+
+    def _add_item(self, more: dict, command: int, frame: int, params: list) -> None:
+        item = more | {"autoContinue": True, "command": command, "doJumpId": len(self.items) + 1, "frame": frame}
+        self.items.append(item | {"params": params, "type": "SimpleItem"})

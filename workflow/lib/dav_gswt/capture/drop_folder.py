@@ -8,8 +8,7 @@ import logging
 from datetime import UTC, datetime
 from pathlib import Path
 
-from dav_gswt.capture.interface import RequestedPose, view_distance
-from dav_gswt.capture.site import Site
+from dav_gswt.capture.capturing import RequestedPose, Site, view_distance
 from dav_gswt.files import digest_files
 from dav_gswt.images import image_files
 from dav_gswt.photos.exif import read_capture_time
@@ -18,6 +17,7 @@ from dav_gswt.photos.sfm.localization import localize_photos
 _log = logging.getLogger(__name__)
 
 NEAR = 0.6  # greatest `view_distance` of a photo from its pose: beyond, it shows something else
+NAMED = 6  # poses that a message names
 
 
 def make_drop_folder(site: Site) -> Path:
@@ -30,28 +30,28 @@ def make_drop_folder(site: Site) -> Path:
 def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str) -> list[RequestedPose]:
     """Copy dropped photos into the store, nearest first. Returns the poses that still lack photos.
 
-    A photo that is stored for a pose of this round or of an earlier one (`Site.requested`) is in use and left alone;
-    one that was stored for a pose that is no longer asked for is localised again. Of equal files the first counts.
+    A photo that is stored for a pose of this round or of an earlier one (`Site.requested`) is in use and skipped. A
+    photo stored for a pose that is no longer requested is localised again. Of equal files the first counts.
     """
     paths = _list_new_photos(site, requested)
     found = [(p, camera) for p, camera in zip(paths, localize_photos(site.photos, paths), strict=True) if camera]
     for path in sorted(set(paths) - {p for p, _ in found}):
         _log.warning("%s: it could not be localised; it must overlap photos of the scene", path.name)
-    need = {pose.name: site.missing_photos(camera) for pose, camera in requested}
     pairs = [
-        (view_distance(camera, got, site.unit), pose.name, path) for path, got in found for pose, camera in requested
+        (view_distance(camera, got, site.unit), pose.name, path.name, path)
+        for path, got in found
+        for pose, camera in requested
     ]
     places, assigned = dict(found), {}
-    for distance, name, path in sorted(pairs, key=lambda p: (p[0], p[1], p[2].name)):
-        if path not in assigned and need[name] > 0 and distance <= NEAR:
-            assigned[path] = name
-            need[name] -= 1
+    for distance, name, _, path in sorted(pairs):
+        if distance <= NEAR and name not in assigned and path not in assigned.values():
+            assigned[name] = path
     for pose, camera in requested:
-        for path in sorted(p for p, name in assigned.items() if name == pose.name):
+        if path := assigned.get(pose.name):
             site.store.add(path, agent, (pose, camera), places[path], _read_time(path))
-    for path in sorted(set(places) - set(assigned)):
+    for path in sorted(set(places) - set(assigned.values())):
         _log.warning("%s: it is near no requested pose; it is not used", path.name)
-    return [(pose, camera) for pose, camera in requested if need[pose.name] > 0]
+    return [(pose, camera) for pose, camera in requested if pose.name not in assigned]
 
 
 def _list_new_photos(site: Site, requested: list[RequestedPose]) -> list[Path]:
@@ -66,6 +66,15 @@ def _list_new_photos(site: Site, requested: list[RequestedPose]) -> list[Path]:
         elif digest not in used:
             new[digest] = path
     return list(new.values())
+
+
+def describe_missing(site: Site, missing: list[RequestedPose]) -> str:
+    """Say of which poses photos are missing, and what to do with the photos."""
+    names = ", ".join(pose.name for pose, _ in missing[:NAMED]) + (", ..." if len(missing) > NAMED else "")
+    return (
+        f"photos of {len(missing)} pose{'' if len(missing) == 1 else 's'} are missing ({names}). Put the photos into "
+        f"{make_drop_folder(site)} and run the same command again: photos that are already there are kept"
+    )
 
 
 def _read_time(path: Path) -> str:

@@ -1,50 +1,142 @@
-"""The agent `handheld`: writes a shot list for a person, whose photos come through the drop folder."""
+"""The agent `handheld`: writes a shot list for a person, whose photos come through the drop folder.
+
+The shot list is a web page without scripts or network access, to be opened from a file on a phone: a map, and the
+places in a short walking order with the picture expected at each.
+"""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
 
-from dav_gswt.capture import directions, drop_folder, missing_photos, route, shot_list_page
-from dav_gswt.capture.interface import RequestedPose
-from dav_gswt.capture.site import Site
+from dav_gswt.capture import directions, drop_folder, route
+from dav_gswt.capture.capturing import RequestedPose, Site
+from dav_gswt.capture.directions import Ruler
 from dav_gswt.errors import InputError
-from dav_gswt.field import read_field
+from dav_gswt.field import GaussianField, read_field
 from dav_gswt.files import atomic_folder
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import SceneFrame
+from dav_gswt.images import image_files
+from dav_gswt.raster import render
+from dav_gswt.templates import render_template
+
+LONGER = 720  # pixels of an expected picture's longer side
+WIDE = 800  # pixels of the map's longer side; its drawing is readable at half the size
+MARGIN = 0.14  # around everything on the map, as a share of the longer side
+LOW = 0.5  # flying heights: anything higher would hide the ground on the map
+BLANK = 0.8  # grey where nothing is known
+CLOSE, TURNED = 0.2, 15  # flying heights, degrees: a photo nearer than this to its pose is always assigned to it
 
 
 def take_photos(site: Site, requested: list[RequestedPose], field: Path | str | None = None) -> None:
     """Import dropped photos; for those still missing write a shot list.
 
-    field: the current field, for the map and the expected pictures; by default the one of the site, if any.
+    field: the current field, for the map and the expected pictures; by default the site's, if it has one.
     Raises: InputError: photos are missing (the message says which, and names the page to follow).
     """
     missing = drop_folder.import_dropped_photos(site, requested, "handheld")
     if not missing:
         return
-    listed = write_shot_list(site, missing, field or site.field)
+    path = field or site.field
+    page = write_shot_list(site, missing, read_field(path) if path else None)
     raise InputError(
-        f"{listed}: take this page with you, printed or its folder copied to a phone: "
-        f"{missing_photos.describe_missing(site, missing)}. Then {missing_photos.describe_delivery(site)}"
+        f"{page}: take this page with you, printed or its folder copied to a phone: "
+        + drop_folder.describe_missing(site, missing)
     )
 
 
-def write_shot_list(site: Site, missing: list[RequestedPose], field: Path | str | None) -> Path:
-    """Write captures/{scene}/shot-list/ with the poses in a short walking order. Returns its page."""
+def write_shot_list(site: Site, missing: list[RequestedPose], field: GaussianField | None) -> Path:
+    """Write captures/{scene}/shot-list/: index.html, map.png and, with a field, a picture of each place.
+
+    Returns: the page.
+    """
     if site.shot_list_template is None:
         raise ValueError("the agent handheld needs the template of its page")
-    ground = np.array([camera.centre[:2] for _, camera in missing])
+    by, ground = directions.make_ruler(site.frame), np.array([camera.centre[:2] for _, camera in missing])
     ordered = route.order_stops(ground)
-    stations = [
-        shot_list_page.Station(pose.name, camera, site.missing_photos(camera))
-        for pose, camera in (missing[i] for i in ordered)
-    ]
-    length = route.path_length(ground[list(ordered)])
-    shot_list = shot_list_page.ShotList(
-        site.name, site.frame, directions.make_ruler(site.frame), drop_folder.make_drop_folder(site), length
-    )
+    places = [missing[i] for i in ordered]
+    view = place_map_camera([camera for _, camera in places], site.frame)
     folder = site.store.folder / "shot-list"
     with atomic_folder(folder) as part:
-        shot_list_page.write_page(
-            part, site.shot_list_template, shot_list, stations, read_field(field) if field else None
-        )
+        blank = np.full((view.height, view.width, 3), BLANK, np.float32)
+        image_files.write_png(part / "map.png", blank if field is None else _draw(field, view))
+        cards = []
+        for i, (pose, camera) in enumerate(places):
+            card = _describe_place(camera, places[i - 1][1] if i else None, i, view, site.frame, by)
+            card |= {"name": pose.name, "picture": None}
+            if field is not None:
+                card["picture"] = f"place_{i + 1:03d}.png"
+                scale = LONGER / max(camera.width, camera.height)
+                size = (max(round(side * scale), 16) for side in (camera.width, camera.height))
+                image_files.write_png(part / card["picture"], _draw(field, camera.resized(*size)))
+            cards.append(card)
+        walk = by.format_length(route.path_length(ground[list(ordered)]))
+        values = {
+            "scene": site.name,
+            "summary": f"Places: {len(places)}. The walk from the first to the last is {walk}.",
+            "metric": by.metres is not None,
+            "near": f"{by.format_length(CLOSE * by.unit)} and {TURNED} degrees",
+            "drop": drop_folder.make_drop_folder(site),
+            "map": _describe_map(view, site.frame, by),
+            "cards": cards,
+        }
+        (part / "index.html").write_text(render_template(site.shot_list_template, values), encoding="utf-8")
     return folder / "index.html"
+
+
+def place_map_camera(stations: list[Camera], frame: SceneFrame) -> Camera:
+    """A camera that looks down on the exemplar and all stations."""
+    square = frame.exemplar
+    corners = [[square.west, square.south], [square.east, square.north]]
+    points = np.array([*corners, *(station.centre[:2] for station in stations)])
+    low, high = points.min(0), points.max(0)
+    margin = MARGIN * (high - low).max()
+    low, size = low - margin, high - low + 2 * margin
+    cell = float(size.max()) / WIDE
+    width, height = (max(round(s / cell), WIDE // 2) for s in size)
+    west, south = low + (size - cell * np.array([width, height])) / 2
+    return cameras.top_down(float(west), float(south), width, height, cell, LOW * frame.flying_height)
+
+
+def _draw(field: GaussianField, camera: Camera) -> Float32[Array, "h w 3"]:
+    return np.clip(render(field, camera, BLANK).colour, 0, 1)
+
+
+def _describe_map(view: Camera, frame: SceneFrame, by: Ruler) -> dict[str, Any]:
+    """Where the template draws the exemplar, its middle, a scale and north."""
+    square = frame.exemplar
+    corner, middle = view.project(np.array([[square.west, square.north, 0.0], square.centre]))[0].tolist()
+    unit, name = (by.unit, "flying heights") if by.metres is None else (1 / by.metres, "m")
+    fifth = view.width / view.fx / unit / 5
+    power = 10.0 ** np.floor(np.log10(fifth))
+    many = float(max(step * power for step in (1, 2, 5, 10) if step * power <= fifth * 1.001))
+    return {
+        "width": view.width,
+        "height": view.height,
+        "corner": corner,
+        "middle": middle,
+        "side": square.side * view.fx,
+        "scale": many * unit * view.fx,
+        "scale_text": f"{many:g} {name}",
+        "north": by.place.north if by.place else None,
+    }
+
+
+def _describe_place(
+    camera: Camera, before: Camera | None, i: int, view: Camera, frame: SceneFrame, by: Ruler
+) -> dict[str, Any]:
+    """A place as the page shows it; turn: of its arrow on the map, degrees; None: the camera looks straight down."""
+    steep = abs(directions.tilt(camera)) >= directions.STEEP
+    return {
+        "number": i + 1,
+        "at": view.project(camera.centre[None])[0][0].tolist(),
+        "turn": None if steep else float(np.degrees(np.arctan2(-camera.forward[1], camera.forward[0]))),
+        "walk": "Start here." if before is None else f"From place {i}: {directions.describe_walk(before, camera, by)}.",
+        "pose": directions.describe_pose(camera, frame, by),
+        "width": camera.width,
+        "height": camera.height,
+    }

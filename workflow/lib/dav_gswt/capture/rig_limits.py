@@ -1,26 +1,80 @@
-"""Limits and no-go zones of a rig in the space of its axes, and paths around the zones.
+"""The axes of a rig: cameras at their positions, limits and no-go zones, and paths around the zones.
 
-All axes of a move begin and end together, so a move is a straight line in this space, and whether it meets a box is
-exact. If the straight path is blocked, three moves are tried: one axis moves aside, all move, the axis moves back.
+The axes are pan (azimuth plus `pan_zero`) and tilt (elevation plus `tilt_zero`) in degrees, and radius, the distance to
+the exemplar's centre in millimetres. All axes of a move begin and end together, so a move is a straight line in their
+space, and whether it meets a box is exact. If the straight path is blocked, three moves are tried: one axis moves
+aside, all move, the axis moves back.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry import camera_layouts
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import SceneFrame
 
 AXES = ("pan", "tilt", "radius")
 TURN = 360.0
+TOLERANCE = 2.0  # degrees between a pose and how the rig holds its camera
 SLACK = np.array([0.5, 0.5, 2.0])  # degrees, degrees, millimetres: tolerance of the reached position
 BESIDE = 0.01  # distance at which a path passes a zone; zones are widened by SLACK before
 
 Axes = Float[Array, "3"]
 AxisRanges = Mapping[str, Sequence[float | int]]  # of the config: lowest and highest value by axis
+
+
+@dataclass(frozen=True)
+class Mount:
+    """Position of a rig in the scene. centre: what it turns about. millimetres: per world unit."""
+
+    centre: Float[Array, "3"]
+    millimetres: float
+    pan_zero: float
+    tilt_zero: float
+
+    def axes_of(self, camera: Camera) -> Axes:
+        """Axes at which the rig holds this camera; pan from 0 to 360.
+
+        The pan follows from the camera's x axis, which is defined also straight above. Rounded to 0.001, the resolution
+        of the protocol.
+        """
+        out = camera.centre - self.centre
+        radius = float(np.linalg.norm(out))
+        elevation = np.degrees(np.arcsin(np.clip(out[2] / max(radius, 1e-12), -1, 1)))
+        azimuth = np.degrees(np.arctan2(-camera.rotation[0, 0], camera.rotation[0, 1]))
+        axes = [(self.pan_zero + azimuth) % TURN, self.tilt_zero + elevation, self.millimetres * radius]
+        return np.round(axes, 3)
+
+    def camera_at(self, axes: Axes, like: Camera) -> Camera:
+        """Camera at a position of the axes, with the lens of `like`."""
+        pan, tilt, radius = axes
+        elevation = np.clip(tilt - self.tilt_zero, -90.0, 90.0)  # a rig straight above reports a little too much
+        turn, distance = pan - self.pan_zero, radius / self.millimetres
+        posed = camera_layouts.orbit(elevation, turn, distance, self.centre, like.width, like.height, 60.0)
+        return replace(like, rotation=posed.rotation, translation=posed.translation)
+
+    def find_violation(self, camera: Camera) -> str | None:
+        """Say why no position of the axes gives this camera's orientation; None if one does."""
+        axes = self.axes_of(camera)
+        if not axes[2] > 0:
+            return "it is at the centre that the rig turns about"
+        held = self.camera_at(axes, camera).rotation
+        angle = np.degrees(np.arccos(np.clip((np.trace(held.T @ camera.rotation) - 1) / 2, -1, 1)))
+        if angle <= TOLERANCE:
+            return None
+        return f"it is turned {angle:.1f} degrees away from how the rig looks: at the exemplar's centre, upright"
+
+
+def build_mount(rig: Mapping[str, Any], frame: SceneFrame) -> Mount:
+    """The mount of the config's `rig`."""
+    return Mount(frame.exemplar.centre, *(float(rig[key]) for key in ("millimetres", "pan_zero", "tilt_zero")))
 
 
 @dataclass(frozen=True)
@@ -51,18 +105,14 @@ def combine_limits(limits: AxisRanges, no_go: Sequence[AxisRanges], device: Floa
     zones, names = [], []
     for i, zone in enumerate(no_go, 1):
         box = np.array([zone.get(axis, (-np.inf, np.inf)) for axis in AXES], float) + SLACK[:, None] * [-1, 1]
-        for turned in _repeat_zone(box, both[0]):
-            zones.append(turned)
-            names.append(f"no_go {i}")
+        turns = _whole_turns(both[0, 0] - box[0, 1], both[0, 1] - box[0, 0]) if np.isfinite(box[0]).all() else [0]
+        zones += [box + [[TURN * n], [0.0], [0.0]] for n in turns]
+        names += [f"no_go {i}"] * len(turns)
     return RigLimits(both, np.array(zones).reshape(-1, 3, 2), tuple(names))
 
 
-def _repeat_zone(box: Float[Array, "3 2"], pans: Float[Array, "2"]) -> list[Float[Array, "3 2"]]:
-    """Repeat a zone at every whole turn of the pan within its range: the rig is at the same place there."""
-    if not np.isfinite(box[0]).all():
-        return [box]
-    turns = range(int(np.ceil((pans[0] - box[0, 1]) / TURN)), int(np.floor((pans[1] - box[0, 0]) / TURN)) + 1)
-    return [box + [[TURN * n], [0.0], [0.0]] for n in turns]
+def _whole_turns(low: float, high: float) -> Sequence[int]:
+    return range(int(np.ceil(low / TURN)), int(np.floor(high / TURN)) + 1)
 
 
 def find_violation(there: RigLimits, place: Axes) -> str | None:
@@ -89,7 +139,7 @@ def _touched_zones(there: RigLimits, a: Axes, b: Axes) -> Bool[Array, "n"]:
 def find_path(there: RigLimits, a: Axes, b: Axes) -> list[Axes] | None:
     """Stops of the shortest free path from a to b, b last; None if no tried path is free.
 
-    Tried are the straight path and those that move aside along one axis. No stop if a equals b.
+    The straight path is tried, and those that move aside along one axis. No stop if a equals b.
     """
     if np.array_equal(a, b):
         return []
@@ -97,19 +147,26 @@ def find_path(there: RigLimits, a: Axes, b: Axes) -> list[Axes] | None:
         return [b]
     aside = []
     for axis in (2, 1, 0):
-        for value in _side_values(there, axis):
+        low, high = there.limits[axis]  # values to pass at: the ends of the range, and just beside each zone
+        edges = np.concatenate([[low, high], there.zones[:, axis, 0] - BESIDE, there.zones[:, axis, 1] + BESIDE])
+        edges = np.round(edges[np.isfinite(edges)], 3)
+        for value in np.unique(edges[(edges >= low) & (edges <= high)]):
             there_and_back = [a, _replace_axis(a, axis, value), _replace_axis(b, axis, value), b]
             stops = [p for p, q in pairwise(there_and_back) if not np.array_equal(p, q)] + [b]
             if _is_free(there, stops):
                 aside.append(stops[1:])
-    return min(aside, key=lambda stops: _path_length(there, [a, *stops]), default=None)
+    span = np.maximum(there.limits[:, 1] - there.limits[:, 0], 1e-9)  # degrees and millimetres can then be added
+
+    def length(stops: list[Axes]) -> float:
+        return float(sum(np.linalg.norm((q - p) / span) for p, q in pairwise([a, *stops])))
+
+    return min(aside, key=length, default=None)
 
 
 def list_turns(there: RigLimits, target: Axes, pan: float) -> list[Axes]:
     """A position with its pan at every whole turn within the limits, the nearest to `pan` first."""
-    low, high = there.limits[0]
-    found = range(int(np.ceil((low - target[0]) / TURN)), int(np.floor((high - target[0]) / TURN)) + 1)
-    places = [_replace_axis(target, 0, target[0] + TURN * n) for n in found]
+    low, high = there.limits[0] - target[0]
+    places = [_replace_axis(target, 0, target[0] + TURN * n) for n in _whole_turns(low, high)]
     return sorted(places, key=lambda place: abs(place[0] - pan))
 
 
@@ -126,22 +183,8 @@ def plan_route(there: RigLimits, a: Axes, target: Axes) -> list[Axes] | str:
     return next((stops for stops in paths if stops is not None), "every path there that was tried crosses a no_go")
 
 
-def _side_values(there: RigLimits, axis: int) -> list[float]:
-    """Values of an axis at which a path may pass: the ends of its range, and just beside each zone."""
-    low, high = there.limits[axis]
-    edges = np.concatenate([[low, high], there.zones[:, axis, 0] - BESIDE, there.zones[:, axis, 1] + BESIDE])
-    edges = np.round(edges[np.isfinite(edges)], 3)
-    return sorted({float(v) for v in edges if low <= v <= high})
-
-
 def _is_free(there: RigLimits, stops: list[Axes]) -> bool:
     return not any(_touched_zones(there, p, q).any() for p, q in pairwise(stops))
-
-
-def _path_length(there: RigLimits, stops: list[Axes]) -> float:
-    """Length of a path in shares of the axes' ranges, so that degrees and millimetres can be added."""
-    span = np.maximum(there.limits[:, 1] - there.limits[:, 0], 1e-9)
-    return float(sum(np.linalg.norm((q - p) / span) for p, q in pairwise(stops)))
 
 
 def _replace_axis(place: Axes, axis: int, value: float) -> Axes:

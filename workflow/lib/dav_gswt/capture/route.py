@@ -1,7 +1,7 @@
 """Short routes through places."""
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from numpy import ndarray as Array
 
 LEAST = 1e-9  # relative shortening below which two orders count as equally long
@@ -21,7 +21,10 @@ def order_stops(
     far = np.linalg.norm(stops[:, None] - stops[None], axis=-1)
     if start is None:
         far[n], far[:, n] = 0.0, 0.0  # a start that is as near to every place
-    return tuple(int(i) for i in _two_opt(_nearest_neighbour_path(far, n), far, closed=end is not None)[1 : n + 1])
+    path, unvisited = [n], list(range(n))
+    while unvisited:
+        path.append(unvisited.pop(int(np.argmin(far[path[-1], unvisited]))))
+    return tuple(_shorten([*path, *range(n + 1, len(far))], far, closed=end is not None)[1 : n + 1])
 
 
 def path_length(places: Float[Array, "n d"]) -> float:
@@ -29,16 +32,8 @@ def path_length(places: Float[Array, "n d"]) -> float:
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
 
-def _nearest_neighbour_path(far: Float[Array, "m m"], n: int) -> list[int]:
-    """From the start (stop n) always to the nearest unvisited place, then to the end if there is one."""
-    path, unvisited = [n], list(range(n))
-    while unvisited:
-        path.append(unvisited.pop(int(np.argmin(far[path[-1], unvisited]))))
-    return path + list(range(n + 1, len(far)))
-
-
-def _two_opt(path: list[int], far: Float[Array, "m m"], closed: bool) -> Int[Array, "m"]:
-    """Reverse stretches while that shortens the path; the start stays first, the end (if closed) last."""
+def _shorten(path: list[int], far: Float[Array, "m m"], closed: bool) -> list[int]:
+    """2-opt: reverse stretches while that shortens the path; the start stays first, the end (if closed) last."""
     way = np.array(path)
     least = LEAST * (1 + far[way[:-1], way[1:]].sum())
     last = len(way) - (1 if closed else 0)  # stretches [i, j] lie within 1 .. last - 1
@@ -56,4 +51,4 @@ def _two_opt(path: list[int], far: Float[Array, "m m"], closed: bool) -> Int[Arr
                 k = int(j[np.argmax(gain)])
                 way[i : k + 1] = way[i : k + 1][::-1].copy()
                 shorter = True
-    return way
+    return way.tolist()

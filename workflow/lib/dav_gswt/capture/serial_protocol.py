@@ -36,14 +36,10 @@ FIRST, LAST = 10000, 99999  # sequence numbers; a run starts at a random one, so
 SLICE = 0.05  # seconds that one read waits
 WRITE_TIMEOUT = 5.0  # seconds, at least, after which a line that takes no byte is broken: a busy machine may stall
 TIMEOUT_FACTOR = {"SHOOT": 5.0}  # of a verb's answer: cameras block while they expose
-UNHOMED = ("HELLO", "HOME", "STOP")  # verbs that need no known position: a restart before them does not matter
 STOPPED = "the rig's stop button is pressed; release it when the way is clear, then run the same again"
+RESTARTED = "the rig restarted and lost its position; run the same again: photos taken until now are kept"
 _NUMBER = re.compile(r"[+-]?[0-9]{1,7}(\.[0-9]{1,6})?")
 _LINE = re.compile(rb"([\x20-\x7e]+)\*([0-9A-Fa-f]{4})\r?\n")
-
-
-class RigRestarted(Exception):
-    """The rig has restarted and must be homed."""
 
 
 @dataclass(frozen=True)
@@ -132,13 +128,11 @@ class SerialLine:
     def where(self) -> tuple[bool, Float[Array, "3"]]:
         """Return whether the rig moves, and its position.
 
-        Raises: RigRestarted: the position is unknown. InputError: the stop button is pressed.
+        Raises: InputError: the rig restarted and its position is unknown, or the stop button is pressed.
         """
         state, *words = self._request("WHERE") or [""]
-        if state == "lost":
-            raise RigRestarted
-        if state == "stopped":
-            raise InputError(f"{self._name}: {STOPPED}")
+        if state in ("lost", "stopped"):
+            raise InputError(f"{self._name}: {RESTARTED if state == 'lost' else STOPPED}")
         if state not in ("still", "moving"):
             raise self._protocol_error("WHERE", [state, *words])
         return state == "moving", self._parse_numbers("WHERE", words, 3)
@@ -151,23 +145,30 @@ class SerialLine:
         """Stop the rig. A failure is logged, not raised."""
         try:
             self._request("STOP")
-        except (InputError, RigRestarted) as error:
+        except InputError as error:
             _log.warning("the rig did not confirm that it stands still: check it (%s)", error)
 
     def _request(self, verb: str, *words: str) -> list[str]:
         """Send a request until it is answered. Returns the words after OK.
 
-        Raises: RigRestarted: the rig restarted, and the verb needs a position. InputError: it refuses or is silent.
+        Raises: InputError: the rig refuses, is silent, or has restarted.
         """
         self._seq = self._seq + 1 if self._seq < LAST else FIRST
         text = " ".join([str(self._seq), verb, *words])
         wait = self._timeout * TIMEOUT_FACTOR.get(verb, 1.0)
-        if self._has_input():
+        with self._whole():
+            waiting = bool(self._port.in_waiting)
+        if waiting:
             self._read_answer(verb, SLICE)  # unsolicited lines, before a new request
         for _ in range(1 + self._retries):
-            self._send(b"\n" + frame_line(text))  # an empty line first ends the remains of a damaged one
-            if (answer := self._read_answer(verb, wait)) is not None:
-                return self._check_answer(verb, answer)
+            with self._whole():
+                self._port.write(b"\n" + frame_line(text))  # an empty line first ends the remains of a damaged one
+            if (answer := self._read_answer(verb, wait)) is None:
+                continue
+            if answer[0] == "OK":
+                return answer[1:]
+            why = RESTARTED if answer[1:2] == ["LOST"] else " ".join(answer[1:]) or "no reason given"
+            raise InputError(f"{self._name}: the rig refused {verb}: {why}")
         raise InputError(
             f"{self._name}: the rig did not answer {verb}, asked {1 + self._retries} times with {wait:g} s each; "
             "check that it is on, its cable, rig.port and rig.baud"
@@ -184,18 +185,11 @@ class SerialLine:
                 return words
         return None
 
-    def _check_answer(self, verb: str, answer: list[str]) -> list[str]:
-        if answer[0] == "OK":
-            return answer[1:]
-        if answer[1:2] == ["LOST"] and verb not in UNHOMED:
-            raise RigRestarted
-        raise InputError(f"{self._name}: the rig refused {verb}: {' '.join(answer[1:]) or 'no reason given'}")
-
     def _handle_unsolicited(self, verb: str, words: list[str]) -> None:
         if verb in ("HELLO", "STOP"):  # old lines, or the effect of STOP itself
             return
-        if words[:1] == ["BOOT"] and verb not in UNHOMED:
-            raise RigRestarted
+        if words[:1] == ["BOOT"]:
+            raise InputError(f"{self._name}: {RESTARTED}")
         if words[:1] == ["LIMIT"]:
             axis = " ".join(words[1:]) or "an axis"
             raise InputError(f"{self._name}: the rig ran into a limit switch ({axis}); free it, and check rig.limits")
@@ -205,10 +199,8 @@ class SerialLine:
     def _read_line(self, until: float) -> str | None:
         """Read the next undamaged line; None on timeout."""
         while True:
-            try:
+            with self._whole():
                 self._rest += self._port.read_until(b"\n", LONGEST - len(self._rest))
-            except OSError as error:
-                raise self._line_error(error) from error
             if self._rest.endswith(b"\n") or len(self._rest) >= LONGEST:
                 text, self._rest = unframe_line(self._rest), b""
                 if text is not None:
@@ -216,18 +208,13 @@ class SerialLine:
             if time.monotonic() > until:
                 return None
 
-    def _has_input(self) -> bool:
-        """Whether unread bytes are there."""
+    @contextmanager
+    def _whole(self) -> Iterator[None]:
+        """Raises: InputError: the line broke in the block."""
         try:
-            return bool(self._port.in_waiting)
+            yield
         except OSError as error:
-            raise self._line_error(error) from error
-
-    def _send(self, data: bytes) -> None:
-        try:
-            self._port.write(data)
-        except OSError as error:
-            raise self._line_error(error) from error
+            raise InputError(f"{self._name}: the line to the rig broke ({error}); check its cable") from error
 
     def _parse_numbers(self, verb: str, words: list[str], n: int) -> Float[Array, "n"]:
         if len(words) != n or not all(_NUMBER.fullmatch(word) for word in words):
@@ -237,6 +224,3 @@ class SerialLine:
     def _protocol_error(self, verb: str, words: list[str]) -> InputError:
         said = " ".join(words)
         return InputError(f"{self._name}: the rig's answer to {verb}, {said!r}, is none of docs/rig-protocol.md")
-
-    def _line_error(self, error: OSError) -> InputError:
-        return InputError(f"{self._name}: the line to the rig broke ({error}); check its cable")

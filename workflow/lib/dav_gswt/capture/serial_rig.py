@@ -1,23 +1,23 @@
 """The agent `serial`: a motorised camera rig drives to each pose and releases the camera.
 
 All poses and moves are checked before the first move. A fault stops the rig and ends the run; photos taken until then
-are in the store, and the next run takes only the others.
+are in the store, and the next run takes only the others. A tethered camera's software saves the photos into a folder,
+the inbox.
 """
 
 import logging
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from pydantic import TypeAdapter
 
-from dav_gswt.capture import inbox, rig_limits, serial_protocol
-from dav_gswt.capture.interface import RequestedPose
-from dav_gswt.capture.rig_geometry import Mount
-from dav_gswt.capture.rig_limits import Axes, AxisRanges, RigLimits
-from dav_gswt.capture.site import Site
+from dav_gswt.capture import rig_limits, serial_protocol
+from dav_gswt.capture.capturing import RequestedPose, Site
+from dav_gswt.capture.rig_limits import Axes, Mount, RigLimits, build_mount
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame
@@ -27,37 +27,11 @@ from dav_gswt.photos.lenses import undistort_scene_photo
 
 _log = logging.getLogger(__name__)
 
-RESTARTS = 3  # restarts of the rig that one run tolerates
 POLL = 0.05  # seconds between queries of the position
+PHOTO_POLL = 0.25  # seconds between looks at the inbox; a photo that did not change in between may be complete
 
-
-@dataclass(frozen=True, kw_only=True)
-class RigReach:
-    """The keys of a scene's `rig` that say where it can stand; docs/reference/config.md describes them."""
-
-    millimetres: float
-    limits: AxisRanges
-    pan_zero: float = 0.0
-    tilt_zero: float = 0.0
-    no_go: tuple[AxisRanges, ...] = ()
-
-    def build_mount(self, frame: SceneFrame) -> Mount:
-        return Mount(frame.exemplar.centre, self.millimetres, self.pan_zero, self.tilt_zero)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RigSettings(RigReach):
-    """All of a scene's `rig`."""
-
-    port: str
-    inbox: Path
-    baud: int = 115200
-    settle: float = 1.0
-    timeout: float = 2.0
-    retries: int = 3
-    move_timeout: float = 120.0
-    photo_timeout: float = 30.0
-    dry_run: bool = True
+Rig = Mapping[str, Any]  # a scene's `rig`; docs/reference/config.md describes its keys
+Listing = dict[str, tuple[int, int]]
 
 
 def take_photos(site: Site, requested: list[RequestedPose]) -> None:
@@ -66,19 +40,23 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     Raises: InputError: a pose is out of reach (all such are named, nothing moves), a fault of the rig, its line or its
     camera, or a dry run.
     """
-    if "rig" not in site.scene:
-        raise InputError(f"config: scenes.{site.name}.rig: the agent serial needs it (see docs/reference/config.md)")
-    settings = TypeAdapter(RigSettings).validate_python(site.scene["rig"])
-    inbox.list_photos(settings.inbox)  # raises if the folder does not exist
-    mount = settings.build_mount(site.frame)
-    with serial_protocol.open_line(settings.port, settings.baud, settings.timeout, settings.retries) as line:
+    rig: Rig = site.scene["rig"]
+    list_photos(Path(rig["inbox"]))  # raises if the folder does not exist
+    mount = build_mount(rig, site.frame)
+    with serial_protocol.open_line(rig["port"], rig["baud"], float(rig["timeout"]), rig["retries"]) as line:
         device = line.hello()
-        limits = rig_limits.combine_limits(settings.limits, settings.no_go, device.limits)
+        limits = rig_limits.combine_limits(rig["limits"], rig["no_go"], device.limits)
         stops = _plan_stops(limits, device.home, mount, requested)
-        if not settings.dry_run:
-            _photograph_poses(site, SerialRig(settings, line, limits, device.home), mount, requested)
-    if settings.dry_run:
-        raise InputError(_describe_dry_run(site, stops))
+        if rig["dry_run"]:
+            for name, path in stops:
+                _log.info("%s: %s", name, "; then ".join(describe_axes(place) for place in path) or "no move")
+        else:
+            _photograph_poses(site, SerialRig(rig, line, limits, device.home), mount, requested)
+    if rig["dry_run"]:
+        raise InputError(
+            f"a dry run: the rig can reach all {len(stops)} poses, nothing was moved and no photo was taken; with "
+            f"scenes.{site.name}.rig.dry_run: false it takes them"
+        )
 
 
 def filter_reachable(scene: dict, frame: SceneFrame, candidates: list[RequestedPose]) -> list[RequestedPose]:
@@ -86,11 +64,9 @@ def filter_reachable(scene: dict, frame: SceneFrame, candidates: list[RequestedP
 
     Raises: InputError: no pose is left.
     """
-    if "limits" not in scene.get("rig", {}):
-        return candidates
-    settings = TypeAdapter(RigReach).validate_python(scene["rig"])
-    mount = settings.build_mount(frame)
-    limits = rig_limits.combine_limits(settings.limits, settings.no_go, np.array([[-np.inf, np.inf]] * 3))
+    rig: Rig = scene["rig"]
+    mount = build_mount(rig, frame)
+    limits = rig_limits.combine_limits(rig["limits"], rig["no_go"], np.array([[-np.inf, np.inf]] * 3))
 
     def is_allowed(camera: Camera) -> bool:
         places = rig_limits.list_turns(limits, mount.axes_of(camera), 0.0)
@@ -101,7 +77,7 @@ def filter_reachable(scene: dict, frame: SceneFrame, candidates: list[RequestedP
     if candidates and not found:
         raise InputError(
             "the rig can stand at none of the candidate poses: their radius is the flying height, "
-            f"{frame.flying_height * settings.millimetres:.0f} mm; check rig.limits and rig.millimetres"
+            f"{frame.flying_height * rig['millimetres']:.0f} mm; check rig.limits and rig.millimetres"
         )
     return found
 
@@ -134,16 +110,6 @@ def _plan_stops(
     return found
 
 
-def _describe_dry_run(site: Site, stops: list[tuple[str, list[Axes]]]) -> str:
-    """Log each move. Returns the message that ends a dry run."""
-    for name, path in stops:
-        _log.info("%s: %s", name, "; then ".join(describe_axes(place) for place in path) or "no move")
-    return (
-        f"a dry run: the rig can reach all {len(stops)} poses, nothing was moved and no photo was taken; "
-        f"with scenes.{site.name}.rig.dry_run: false it takes them"
-    )
-
-
 def describe_axes(axes: Axes) -> str:
     """Format a position of the axes."""
     return f"pan {axes[0]:.1f}, tilt {axes[1]:.1f} degrees, radius {axes[2]:.0f} mm"
@@ -153,18 +119,16 @@ def describe_axes(axes: Axes) -> str:
 class SerialRig:
     """Drives a rig. at: its last commanded position; None until it is homed."""
 
-    settings: RigSettings
+    rig: Rig
     line: serial_protocol.SerialLine
     limits: RigLimits
     home: Axes
     at: Axes | None = None
-    restarts: int = 0
 
     def move_to(self, name: str, target: Axes) -> Axes:
-        """Move to a pose along its stops, from home if the position was lost. Returns the reported position.
+        """Move to a pose along its stops, the first time from home. Returns the reported position.
 
-        Raises: RigRestarted: on the way; call `recover`, then move again. InputError: no free path, or the rig ends
-        elsewhere.
+        Raises: InputError: no free path, or the rig ends elsewhere.
         """
         if self.at is None:
             self.line.home()
@@ -176,27 +140,29 @@ class SerialRig:
         for stop in stops:
             self.line.move(stop)
             self._wait_until_still(stop)
-        time.sleep(self.settings.settle)
+        time.sleep(self.rig["settle"])
         return self._wait_until_still(stops[-1] if stops else start)
 
-    def recover(self) -> None:
-        """Stop after a restart; the next move begins with homing. Raises: InputError: too many restarts."""
-        self.at = None
-        self.restarts += 1
-        if self.restarts > RESTARTS:
-            raise InputError(
-                f"{self.settings.port}: the rig restarted {self.restarts} times; check its power and cables"
-            )
-        _log.warning("the rig restarted and lost its position: homing it again")
-        self.line.stop()
+    def take_photo(self, name: str, target: Axes) -> tuple[Path, Axes, str]:
+        """Take one photo of a pose. Returns its file, the position of the axes, and the time."""
+        folder, patience = Path(self.rig["inbox"]), float(self.rig["photo_timeout"])
+        position = self.move_to(name, target)
+        before, taken = list_photos(folder), datetime.now(UTC).isoformat(timespec="seconds")
+        self.line.shoot()
+        if photo := wait_for_photo(folder, before, patience):
+            return photo, position, taken
+        raise InputError(
+            f"{name}: the camera was released, but no photo came into {folder} within {patience:g} s; check the "
+            "camera and the software that saves its photos there, and rig.photo_timeout"
+        )
 
     def _wait_until_still(self, goal: Axes) -> Axes:
         """Wait until the rig stands still at the goal. Returns the reported position."""
-        until = time.monotonic() + self.settings.move_timeout
+        until = time.monotonic() + self.rig["move_timeout"]
         while (reported := self.line.where())[0]:
             if time.monotonic() > until:
                 raise InputError(
-                    f"the rig still moves after {self.settings.move_timeout:g} s, to {describe_axes(goal)}; "
+                    f"the rig still moves after {self.rig['move_timeout']:g} s, to {describe_axes(goal)}; "
                     "if it is that slow, raise rig.move_timeout"
                 )
             time.sleep(POLL)
@@ -209,44 +175,65 @@ class SerialRig:
 
 
 def _photograph_poses(site: Site, rig: SerialRig, mount: Mount, requested: list[RequestedPose]) -> None:
-    """Take the missing photos pose by pose; each photo is stored before the rig moves on."""
+    """Take the missing photos pose by pose; each photo is checked and stored before the rig moves on."""
     for pose, camera in progress(requested, "photos by the rig"):
-        while site.missing_photos(camera) > 0:
-            photo, axes, taken = _take_photo(rig, pose.name, mount.axes_of(camera))
-            actual = mount.camera_at(axes, camera)
-            _check_photo(photo, site, actual)
-            site.store.add(photo, "serial", (pose, camera), actual, taken)
+        photo, axes, taken = rig.take_photo(pose.name, mount.axes_of(camera))
+        actual = mount.camera_at(axes, camera)
+        try:  # now rather than after all other photos
+            undistort_scene_photo(image_files.read_photo(photo), site.photos, actual)
+        except (InputError, ValueError) as error:
+            raise InputError(f"{photo}: {error}") from error
+        site.store.add(photo, "serial", (pose, camera), actual, taken)
 
 
-def _take_photo(rig: SerialRig, name: str, target: Axes) -> tuple[Path, Axes, str]:
-    """Take one photo of a pose. Returns its file, the position of the axes, and the time.
+def list_photos(folder: Path) -> Listing:
+    """List the photos of the inbox: size and modification time by name, so that an overwritten one counts as new.
 
-    After a restart the pose is begun again; the camera is not released again if the photo came meanwhile.
+    Raises: InputError: no such folder.
     """
-    folder, patience = rig.settings.inbox, rig.settings.photo_timeout
-    before, axes, taken = None, target, ""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: there is no such folder; rig.inbox is where the camera's software saves photos")
+    found = {}
+    for path in folder.iterdir():
+        if path.suffix.lower() in image_files.SUFFIXES and not path.name.startswith("."):
+            try:
+                stat = path.stat()
+            except FileNotFoundError:  # renamed meanwhile
+                continue
+            found[path.name] = (stat.st_size, stat.st_mtime_ns)
+    return found
+
+
+def wait_for_photo(folder: Path, before: Listing, patience: float) -> Path | None:
+    """Wait for the one photo that is new since `before`, until it is complete.
+
+    Returns: None if no photo came within `patience` seconds.
+
+    Raises: InputError: more than one came, or one that is incomplete when the time is up.
+    """
+    until = time.monotonic() + patience
+    last: Listing = {}
+    checked: Listing = {}
+    error = ""
     while True:
-        try:
-            position = rig.move_to(name, target)
-            if before is None or not inbox.list_new_photos(folder, before):
-                before = inbox.list_photos(folder) if before is None else before
-                axes, taken = position, datetime.now(UTC).isoformat(timespec="seconds")
-                rig.line.shoot()
-            if photo := inbox.wait_for_photo(folder, before, patience):
-                return photo, axes, taken
+        now = {name: stat for name, stat in list_photos(folder).items() if before.get(name) != stat}
+        if now == last and len(now) > 1:
             raise InputError(
-                f"{name}: the camera was released, but no photo came into {folder} within {patience:g} s; check the "
-                "camera and the software that saves its photos there, and rig.photo_timeout"
+                f"{folder}: {len(now)} photos came for one exposure ({', '.join(sorted(now)[:5])}); set the camera to "
+                "single photos of one format, remove them, and run the same again"
             )
-        except serial_protocol.RigRestarted:
-            rig.recover()
-            if before is not None and (photo := inbox.wait_for_photo(folder, before, patience)):
-                return photo, axes, taken
-
-
-def _check_photo(photo: Path, site: Site, camera: Camera) -> None:
-    """Raises: InputError: the photo is not of the scene's lens. Checked now rather than after all other photos."""
-    try:
-        undistort_scene_photo(image_files.read_photo(photo), site.photos, camera)
-    except (InputError, ValueError) as error:
-        raise InputError(f"{photo}: {error}") from error
+        if now and now == last and now != checked:
+            path, checked = folder / next(iter(now)), now
+            try:
+                image_files.read_photo(path)
+                return path
+            except InputError as unreadable:
+                error = str(unreadable)
+        if time.monotonic() > until:
+            break
+        last = now
+        time.sleep(PHOTO_POLL)
+    if now:
+        name = next(iter(now))
+        raise InputError(f"{error or folder / name} (waited {patience:g} s for it; rig.photo_timeout is how long)")
+    return None

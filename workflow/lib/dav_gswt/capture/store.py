@@ -53,11 +53,8 @@ class PhotoStore:
             name = f"photo{photo.suffix.lower()}"
             shutil.copyfile(photo, made / name)
             record = {"agent": agent, "pose": asdict(pose), "taken": taken, "source": photo.name, "photo": name}
-            record |= {
-                "asked": camera_to_json(pinhole),
-                "got": camera_to_json(camera),
-                "sha256": digest_files(made / name),
-            }
+            record |= {"asked": camera_to_json(pinhole), "got": camera_to_json(camera)}
+            record["sha256"] = digest_files(made / name)
             write_json(made / "shot.json", record)
             numbers = [int(path.name) for path in home.glob("[0-9]*") if path.name.isdecimal()]
             place = home / f"{max(numbers, default=-1) + 1:03d}"  # after all that are there: the oldest come first

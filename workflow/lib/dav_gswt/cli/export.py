@@ -35,8 +35,6 @@ def add_command(commands) -> None:
     size.add_argument("--corner", type=int, nargs=2, metavar=("I", "J"), help="south-western cell, instead of --at")
     parser.add_argument("--level", type=_parse_level, help="of detail, 0 the finest (default), or by_distance")
     parser.add_argument("--axes", help="own (default), z-up, y-up or y-down")
-    parser.add_argument("--spz-version", type=int, help="2 or 3 (default)")
-    parser.add_argument("--tile-compression", help="of 3dtiles: spz (default) or none")
     parser.add_argument("--max-gb", type=float, help="most that a file may take (default: 2)")
     parser.add_argument("--surface", help="of ground: ground (default) or visible")
     parser.add_argument("--mesh-error", type=float, help="of ground, in ground cells (default: 0.25)")

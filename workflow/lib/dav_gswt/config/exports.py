@@ -1,15 +1,19 @@
 """What leaves for other programs: the table `export` of the config. Nothing else depends on it."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from dav_gswt.config.base import ConfigModel, key
+from dav_gswt.export.formats import EXPORTERS
 
 Cell = Annotated[int, Field(ge=-(2**30), le=2**30)]
 Length = Annotated[float, Field(gt=0, le=500)] | Annotated[str, Field(pattern=r"^\d{1,9}(\.\d{1,9})? ?m$")]
 Coordinate = float | Annotated[str, Field(pattern=r"^-?\d{1,12}(\.\d{1,9})? ?m$")]
-Format = Literal["ply", "spz", "glb", "sog", "streamed_sog", "usd", "3dtiles"]
+if TYPE_CHECKING:
+    Format = str
+else:
+    Format = Literal[tuple(EXPORTERS)]
 
 
 class Export(ConfigModel):
@@ -36,17 +40,15 @@ class Export(ConfigModel):
         "level of detail, 0 the finest; `by_distance`: as seen from the centre, an eye floor above the surface", 0
     )
     formats: list[Format] = key(
-        "`streamed_sog`, `3dtiles`: all levels in chunks; `sog` and `streamed_sog` need Node.js, `usd` the extra `usd`",
+        "`streamed_sog`, `3dtiles`, `3dtiles_plain`: all levels in chunks; `sog` and `streamed_sog` need Node.js, "
+        "`usd` the extra `usd`; CesiumJS draws `3dtiles`, three.js `3dtiles_plain`",
         ["glb"],
         min_length=1,
-        max_length=7,
+        max_length=len(EXPORTERS),
     )
     axes: Literal["own", "z-up", "y-up", "y-down"] = key(
-        "`own`: those of each format, docs/exports.md; `3dtiles` keeps its own, `usd` knows no `y-down`", "own"
-    )
-    spz_version: Literal[2, 3] = key("of SPZ files; 2 for older readers, whose rotations are coarser", 3)
-    tile_compression: Literal["spz", "none"] = key(
-        "of the files of `3dtiles`; CesiumJS draws `spz` alone, three.js `none` alone", "spz"
+        "`own`: the usual axes of each format (docs/exports.md), which a format also keeps if it cannot have others",
+        "own",
     )
     max_gb: float = key(
         "most that a file may take; what would be larger is refused before any work", 2, unit="GB", gt=0, le=64
@@ -69,6 +71,4 @@ class Export(ConfigModel):
             raise ValueError(f"centre lies beyond {2**30} tile sides")
         if len(set(self.formats)) < len(self.formats):
             raise ValueError("formats has one twice")
-        if self.axes == "y-down" and "usd" in self.formats:
-            raise ValueError("axes: a USD stage has y or z up, not down; leave axes out or take usd from formats")
         return self

@@ -1,11 +1,16 @@
 """Scenes: what there is to make a terrain of, and how further photos of it are taken."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from dav_gswt.capture.agents import list_agents
 from dav_gswt.config.base import ConfigModel, Degrees, Name, PhotoSize, Seed, Share, Text, key
 
+if TYPE_CHECKING:
+    SyntheticAgent = PhotoAgent = str
+else:
+    SyntheticAgent, PhotoAgent = Literal[list_agents("synthetic")], Literal[list_agents("photos")]
 Range = Annotated[tuple[float, float], Field(description="lowest and highest", strict=False)]
 Radius = Annotated[float, Field(ge=0.05, le=20)]
 Coordinate = Annotated[float, Field(ge=-100, le=100)]
@@ -126,7 +131,6 @@ class _PhotographedScene(_Scene):
     min_elevation: float = key(
         "lowest elevation of candidates and of test views", 30, unit="degrees", renamed="lowest", ge=5, le=85
     )
-    burst: int = key("photos of each pose; every one counts", 1, ge=1, le=10)
     feasibility: Feasibility | None = key("bounds of candidate poses", None, renamed="reach")
 
 
@@ -162,7 +166,7 @@ class SyntheticScene(_PhotographedScene):
     walkers: int = key("further test views at eye level, 0.8, 1.6 and 3.2 m above the ground in turn", 0, ge=0, le=200)
     size: int = key("width and height of the photos", unit="pixels", ge=64, le=4096)
     materials: Materials = _materials("one")
-    agent: Literal["render", "replay"] = key(
+    agent: SyntheticAgent = key(
         "`render`: photos are rendered at the chosen poses; `replay`: chosen from those rendered beforehand"
     )
 
@@ -201,7 +205,7 @@ class PhotoScene(_PhotographedScene):
     focal: float | None = key("where EXIF has none or is wrong", None, unit="mm (35 mm equivalent)", ge=4, le=2000)
     materials: Materials = _materials("auto")
     masks: Text | None = key("a folder of masks named as the photos: black pixels are not ground", None)
-    agent: Literal["replay", "serial", "plan", "handheld"] = key(
+    agent: PhotoAgent = key(
         "who takes further photos: `replay` takes them from the photos of the folder that are left; `serial` is a "
         "camera rig, `plan` a drone, `handheld` a person"
     )

@@ -172,12 +172,6 @@ class _Prior(ConfigModel):
     samples: int = key("drawn for each pose", ge=2, le=100)
     steps: int = key("denoising steps of a sample", ge=1, le=1000)
     staged: bool = key("`true`: all poses with 2 steps, then in full those that may be among the best", True)
-    posterior: bool = key("`true`: a sample is a distribution, as wide as the encoder says; `false`: a point", False)
-    independent_noise: bool = key(
-        "`true`: each sample starts from its own noise; `false`: from one noise, as in the paper",
-        False,
-        renamed="noises",
-    )
     lpips: bool = key("`false`: without the term LPIPS", True)
 
 

@@ -1,27 +1,42 @@
-"""The ground of a finite terrain for simulators and engines: a collision mesh, height maps, objects' hulls."""
+"""The ground of a finite terrain for simulators and engines: a mesh, height maps, a MuJoCo model, objects' hulls.
+
+The frame is that of `exports/terrain`, z up. Height maps have the northern row first. MuJoCo's height field:
+https://mujoco.readthedocs.io/en/stable/XMLreference.html#asset-hfield.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
+import tifffile
 from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.manifest import Manifest
-from dav_gswt.export import height_images, mujoco
 from dav_gswt.export.axes import Y_UP, turn_points
 from dav_gswt.export.glb import ELEMENT_ARRAY_BUFFER, GlbWriter
-from dav_gswt.export.ground_surface import GroundSurface, check_points, choose_steps, collect_surface, measure_tiles
+from dav_gswt.export.ground_surface import (
+    GroundSurface,
+    Hull,
+    check_points,
+    choose_steps,
+    collect_hulls,
+    collect_surface,
+    measure_tiles,
+)
 from dav_gswt.export.height_mesh import simplify_heights
-from dav_gswt.export.hulls import Hull, collect_hulls
-from dav_gswt.export.terrain_area import choose_area, find_metres, find_origin, resolve_lengths
-from dav_gswt.files import atomic_folder, write_json
+from dav_gswt.export.terrain_files import choose_area, find_metres, find_origin, resolve_lengths
+from dav_gswt.files import atomic_file, atomic_folder, write_json
 from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.images import image_files
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.finite import Area, require_plane
 from dav_gswt.tiles.build import TileSet
+
+WHITE = 65535
+FLOOR = 0.5  # thickness of MuJoCo's ground below the lowest point, in tile sides: nothing thin falls through
 
 Mesh = tuple[str, Array, Array, dict[str, Any]]  # name, vertices, triangles, extras
 
@@ -36,19 +51,20 @@ def export_ground(
 ) -> None:
     """Write ground.{glb,png,tif,hfield,xml,json} and objects.glb of the area of the config's `export` to a folder.
 
-    Of an area within a radius it is the rectangle about it: a height field has four corners.
+    If the area has a radius, this is the rectangle about it: a height field has four corners.
 
-    Args:   sets: the tiles of all materials. reference: where the scene lies on earth, if it is known.
-    Raises: InputError: a planet, an area whose height field has too many points, metres of a terrain without a scale.
+    Args:   sets: the tiles of all materials. reference: place on earth, if it is known.
+    Raises: InputError: a planet, an area whose height field has too many points, metres for a terrain without a scale.
     """
     area = check_ground(terrain, manifest, sets, reference, settings)
     origin = find_origin(terrain, area)
-    tiles = measure_tiles(sets, settings["surface"] == "visible")
-    surface = collect_surface(terrain, tiles, area)
-    points, triangles = simplify_heights(surface.heights, surface.block, settings["mesh_error"] * surface.cell)
-    hulls = list(collect_hulls(terrain, area, origin))
-    place = height_images.place_on_map(surface, reference) if reference else None
+    surface = collect_surface(terrain, measure_tiles(sets, settings["surface"] == "visible"), area)
     error = settings["mesh_error"] * surface.cell
+    points, triangles = simplify_heights(surface.heights, surface.block, error)
+    row, column = points.T
+    x, y = surface.west + column * surface.step, surface.south + row * surface.step
+    vertices = np.stack([x, y, surface.heights[row, column]], 1) - origin
+    hulls = list(collect_hulls(terrain, area, origin))
     facts = {
         "unit": manifest.unit,
         "cells": {"west": area.west, "south": area.south, "columns": area.columns, "rows": area.rows},
@@ -57,17 +73,15 @@ def export_ground(
         "surface": settings["surface"],
         "mesh": {"error": error, "vertices": len(points), "triangles": len(triangles)},
         "objects": len(hulls),
-        "map": None if place is None else {"epsg": place.epsg, "error": place.error, "sea_level_offset": place.offset},
     }
     extras = {key: facts[key] for key in ("unit", "origin", "ground_cell")} | {"error": error}
+    convex = {"unit": manifest.unit, "convex": True}
     with atomic_folder(out) as folder:
-        vertices = place_vertices(surface, points, origin)
         write_meshes([("ground", vertices, triangles, extras)], folder / "ground.glb")
         if hulls:
-            write_meshes([_as_mesh(hull, manifest.unit) for hull in hulls], folder / "objects.glb")
-        facts["heights"] = _write_images(surface, folder, place, origin)
-        mujoco.write_hfield(surface, folder / "ground.hfield")
-        mujoco.write_model(surface, hulls, origin, "ground.hfield", folder / "ground.xml")
+            write_meshes([(h.name, h.vertices, h.triangles, convex) for h in hulls], folder / "objects.glb")
+        facts["heights"] = _write_images(surface, folder, origin)
+        _write_mujoco(surface, hulls, origin, folder)
         write_json(folder / "ground.json", facts)
 
 
@@ -85,35 +99,6 @@ def check_ground(
     return area
 
 
-def place_vertices(surface: GroundSurface, points: Array, origin: Float[Array, "3"]) -> Float[Array, "v 3"]:
-    """Positions of lattice points (row, column) in the frame of an export, z up."""
-    row, column = points.T
-    x, y = surface.west + column * surface.step, surface.south + row * surface.step
-    return np.stack([x, y, surface.heights[row, column]], 1) - origin
-
-
-def _as_mesh(hull: Hull, unit: str) -> Mesh:
-    return hull.name, hull.vertices, hull.triangles, {"unit": unit, "convex": True}
-
-
-def _write_images(
-    surface: GroundSurface, folder: Path, place: height_images.MapPlace | None, origin: Float[Array, "3"]
-) -> dict[str, Any]:
-    """The height maps; what their pixels mean, as ground.json says it."""
-    above = replace(surface, heights=surface.heights - np.float32(origin[2]))
-    white, black = height_images.write_height_png(above, folder / "ground.png")
-    height_images.write_height_tiff(above.heights, folder / "ground.tif", place)
-    rows, columns = surface.heights.shape
-    north_west = [surface.west - origin[0], surface.south + (rows - 1) * surface.step - origin[1]]
-    return {
-        "rows": rows,
-        "columns": columns,
-        "step": surface.step,
-        "north_west": [float(at) for at in north_west],
-        "png": {"black": black, "white": black + white, "scale": white / height_images.WHITE, "offset": black},
-    }
-
-
 def write_meshes(meshes: Sequence[Mesh], path: Path | str) -> None:
     """Write triangle meshes of our axes as nodes of a GLB, y up."""
     glb = GlbWriter({"scene": 0, "scenes": [{"nodes": list(range(len(meshes)))}], "nodes": [], "meshes": []})
@@ -124,3 +109,59 @@ def write_meshes(meshes: Sequence[Mesh], path: Path | str) -> None:
         glb.document["nodes"].append({"mesh": number, "name": name, "extras": extras})
         glb.document["meshes"].append({"name": name, "primitives": [primitive]})
     glb.write(path)
+
+
+def _write_images(surface: GroundSurface, folder: Path, origin: Float[Array, "3"]) -> dict[str, Any]:
+    """Write ground.png, 16 bits from the lowest to the highest point, and ground.tif, floats.
+
+    Returns: what their pixels mean, for ground.json.
+    """
+    above = surface.heights[::-1]
+    low, high = float(above.min()), float(above.max())
+    span = max(high - low, 1e-9)
+    levels = np.rint((above.astype(float) - low) * (WHITE / span)).astype(np.uint16)
+    image_files.write_grey16(folder / "ground.png", levels)
+    with atomic_file(folder / "ground.tif") as part:
+        tifffile.imwrite(
+            part,
+            np.ascontiguousarray(above, np.float32),
+            photometric="minisblack",
+            rowsperstrip=64,
+            metadata=None,
+            software="DAV-GSWT",
+        )
+    rows, columns = above.shape
+    north_west = [surface.west - origin[0], surface.south + (rows - 1) * surface.step - origin[1]]
+    return {
+        "rows": rows,
+        "columns": columns,
+        "step": surface.step,
+        "north_west": [float(at) for at in north_west],
+        "png": {"black": low, "white": low + span, "scale": span / WHITE, "offset": low},
+    }
+
+
+def _write_mujoco(surface: GroundSurface, hulls: Sequence[Hull], origin: Float[Array, "3"], folder: Path) -> None:
+    """Write ground.hfield (rows and columns as int32, heights from south to north) and ground.xml, a model of it."""
+    heights = surface.heights
+    with atomic_file(folder / "ground.hfield") as part, part.open("wb") as file:
+        file.write(np.array(heights.shape, "<i4").tobytes() + np.ascontiguousarray(heights, "<f4").tobytes())
+    half = (np.array(heights.shape[::-1]) - 1) * surface.step / 2
+    low, high = float(heights.min()), float(heights.max())
+    size = [*half.tolist(), max(high - low, 1e-6), FLOOR * surface.block * surface.step]
+    middle = [*(np.array([surface.west, surface.south]) + half - origin[:2]).tolist(), low - float(origin[2])]
+    assets = [f'    <hfield name="ground" file="ground.hfield" size="{_numbers(size)}"/>']
+    geoms = [f'    <geom name="ground" type="hfield" hfield="ground" pos="{_numbers(middle)}"/>']
+    for hull in hulls:
+        name = quoteattr(hull.name)
+        assets.append(f'    <mesh name={name} vertex="{_numbers(hull.vertices.ravel().tolist())}"/>')
+        geoms.append(f'    <geom name={name} type="mesh" mesh={name} rgba="0.45 0.42 0.36 1"/>')
+    light = '    <light directional="true" pos="0 0 100" dir="0.3 0.2 -1"/>'
+    lines = ['<mujoco model="terrain">', "  <asset>", *assets, "  </asset>"]
+    lines += ["  <worldbody>", light, *geoms, "  </worldbody>", "</mujoco>", ""]
+    with atomic_file(folder / "ground.xml") as part:
+        part.write_text("\n".join(lines), encoding="utf-8")
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return " ".join(f"{value:.7g}" for value in values)

@@ -1,25 +1,28 @@
-"""The ground of a finite terrain as a height field: the tiles' ground layer seen from above, on the terrain's surface.
+"""The ground of a finite terrain: the tiles' ground layer seen from above, as heights, and hulls of the objects on it.
 
 Heights are sampled on a lattice that divides a tile's side into a power of two, with a point or more a ground cell, and
 smoothed by SMOOTHING: no photo measures how one disc of the ground layer lies against its neighbour.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Int64
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.transform import Rotation
+from scipy.special import expit
 
 from dav_gswt.errors import InputError
-from dav_gswt.export.terrain_area import suggest_area
+from dav_gswt.export.terrain_files import describe_area, suggest_size
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.logs import progress
 from dav_gswt.raster import render
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.finite import Area, list_cells
+from dav_gswt.terrain.finite import Area, list_cells, place_feet
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import EDGES, arrange_torus
 
@@ -28,6 +31,8 @@ SMOOTHING = 1.0  # standard deviation of what heights are averaged over, in grou
 AROUND = 0.2  # of the neighbours that are seen beside a tile, as a share of its side
 MAX_STEPS = 1024  # of the lattice in a tile's side
 MAX_POINTS = 2**25  # of an area's height field
+SOLID = 0.3  # least opacity of a Gaussian that belongs to a hull
+DIRECTIONS = 96  # a hull has the outermost point in each, so at most as many vertices
 
 
 @dataclass(frozen=True)
@@ -113,16 +118,13 @@ def _look_down(field: GaussianField, side: float, steps: int) -> Float32[Array, 
 
 
 def check_points(area: Area, steps: int) -> None:
-    """Raises: InputError: an area's height field would have more than MAX_POINTS points, with the area that fits."""
-
-    def count(part: Area) -> int:
-        return (part.columns * steps + 1) * (part.rows * steps + 1)
-
-    if count(area) > MAX_POINTS:
-        size = f"{area.columns} x {area.rows} cells have a height field of {count(area)} points"
-        fits = suggest_area(area, count, MAX_POINTS)
-        hint = f"{fits.columns} x {fits.rows} fit: set export.columns and export.rows" if fits else "not one cell fits"
-        raise InputError(f"export: ground: {size}, at most {MAX_POINTS} are written; {hint}")
+    """Raises: InputError: an area's height field would have more than MAX_POINTS points."""
+    count = (area.columns * steps + 1) * (area.rows * steps + 1)
+    if count > MAX_POINTS:
+        size = f"{describe_area(replace(area, disc=None))} a height field of {count} points"
+        raise InputError(
+            f"export: ground: {size}, at most {MAX_POINTS} are written; {suggest_size(area, count, MAX_POINTS)}"
+        )
 
 
 def collect_surface(terrain: EndlessTerrain, tiles: TileSurfaces, area: Area) -> GroundSurface:
@@ -165,11 +167,70 @@ def _choose_heights(
     return np.take_along_axis(each, chosen[None], axis=0)[0]
 
 
-def sample_surface(surface: GroundSurface, x: Float[Array, "n"], y: Float[Array, "n"]) -> Float[Array, "n"]:
-    """Bilinear heights at places of the world within the area."""
-    rows, columns = surface.heights.shape
-    u, v = (x - surface.west) / surface.step, (y - surface.south) / surface.step
-    a, b = (np.clip(np.floor(p), 0, n - 2).astype(int) for p, n in ((u, columns), (v, rows)))
-    s, t, z = u - a, v - b, surface.heights
-    south, north = (z[b + k, a] * (1 - s) + z[b + k, a + 1] * s for k in (0, 1))
-    return south * (1 - t) + north * t
+@dataclass(frozen=True)
+class Hull:
+    """A closed convex mesh in the frame of an export, triangles counter-clockwise from outside."""
+
+    name: str
+    vertices: Float32[Array, "v 3"]
+    triangles: Int64[Array, "t 3"]
+
+
+def collect_hulls(terrain: EndlessTerrain, area: Area, origin: Float[Array, "3"]) -> Iterator[Hull]:
+    """The hulls of all objects whose feet lie in an area, in the order of its cells. origin: as `plan_export` has it.
+
+    An object without any extent in space, as one of a single flat leaf, has none.
+    """
+    if terrain.scatter is None:
+        return
+    i, j, _, _ = list_cells(terrain, area.west, area.south, area.columns, area.rows)
+    found = terrain.scatter.instances_in(i, j)
+    feet = place_feet(terrain, found)
+    shapes = [find_outermost(levels[0]) for levels in terrain.objects]
+    names = [each.name for each in terrain.object_entries]
+    for k, number in enumerate(found.number.tolist()):
+        angle = np.radians(found.turn[k])
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        points = feet[k] + found.size[k] * shapes[number] @ turn.T
+        points[:, 2] += terrain.heights.at(points[:, 0], points[:, 1])[0]
+        mesh = wrap(points - origin)
+        if mesh is not None:
+            yield Hull(f"{names[number]}_{k}", *mesh)
+
+
+def find_outermost(field: GaussianField) -> Float[Array, "k 3"]:
+    """The outermost points of an object in directions all around: of its ellipsoids of one standard deviation."""
+    solid = field[expit(field.opacity_logits.astype(float)) >= SOLID]
+    field = solid if len(solid) else field
+    axes = Rotation.from_quat(field.quats.astype(float), scalar_first=True).as_matrix()
+    axes = axes * np.exp(field.log_scales.astype(float))[:, None]
+    means = field.means.astype(float)
+    points = []
+    for direction in _spread_directions():
+        along = np.einsum("nij,i->nj", axes, direction)  # how far each axis reaches in the direction
+        reach = np.linalg.norm(along, axis=1)
+        k = int(np.argmax(means @ direction + reach))
+        points.append(means[k] + axes[k] @ along[k] / max(reach[k], 1e-30))
+    return np.unique(np.round(points, 9), axis=0)
+
+
+def _spread_directions() -> Float[Array, "k 3"]:
+    """Directions all around, about as far apart: a Fibonacci lattice of the sphere."""
+    k = np.arange(DIRECTIONS) + 0.5
+    z, turn = 1 - 2 * k / DIRECTIONS, np.pi * (1 + 5**0.5) * k
+    flat = np.sqrt(1 - z * z)
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], 1)
+
+
+def wrap(points: Float[Array, "n 3"]) -> tuple[Float32[Array, "v 3"], Int64[Array, "t 3"]] | None:
+    """The convex hull of points, or None where they have no volume."""
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        return None
+    corners = points[hull.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = (normals * hull.equations[:, :3]).sum(1) < 0
+    simplices = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+    used, triangles = np.unique(simplices, return_inverse=True)
+    return points[used].astype(np.float32), triangles.reshape(-1, 3).astype(np.int64)

@@ -62,10 +62,9 @@ def _model_of(taken: list[TakenPhoto], known: ColmapModel) -> ColmapModel:
 
 
 def _same(one: Camera, other: Camera) -> bool:
-    """Whether two cameras are one: a device's photo may have the name of another one of the model."""
-    poses = (one.rotation, other.rotation), (one.translation, other.translation)
-    lenses = [(c.fx, c.fy, c.cx, c.cy, c.width, c.height) for c in (one, other)]
-    return all(np.allclose(a, b, atol=1e-6) for a, b in (*poses, lenses))
+    """Whether two cameras are equal: a device's photo may have the name of another photo of the model."""
+    rows = [(*c.rotation.ravel(), *c.translation, c.fx, c.fy, c.cx, c.cy, c.width, c.height) for c in (one, other)]
+    return np.allclose(*rows, atol=1e-6)
 
 
 def _write_model(folder: Path, model: ColmapModel, photos: list[TakenPhoto]) -> None:
@@ -75,7 +74,10 @@ def _write_model(folder: Path, model: ColmapModel, photos: list[TakenPhoto]) -> 
     for photo in photos:
         _copy_picture(photo, folder / "images")
     write_colmap_model(model, folder / "sparse/0")
-    _write_points(model, folder / POINTS)
+    columns = [*model.points.T, *np.rint(model.colours.T * 255)]
+    kinds = [*((axis, "<f4") for axis in "xyz"), *((channel, "u1") for channel in ("red", "green", "blue"))]
+    rows = np.rec.fromarrays(columns, dtype=kinds)
+    PlyData([PlyElement.describe(np.asarray(rows), "vertex")], byte_order="<").write(str(folder / POINTS))
     text = json.dumps(describe_transforms(model), indent=1, allow_nan=False) + "\n"
     (folder / "transforms.json").write_text(text, encoding="utf-8")
 
@@ -110,14 +112,3 @@ def describe_transforms(model: ColmapModel) -> dict:
         frames.append(where | lens)
     whole = {"camera_model": "PINHOLE", "applied_transform": np.eye(4)[:3].tolist(), "ply_file_path": POINTS}
     return whole | {"frames": frames}
-
-
-def _write_points(model: ColmapModel, path: Path) -> None:
-    rows = np.empty(
-        len(model.points), [(axis, "<f4") for axis in "xyz"] + [(c, "u1") for c in ("red", "green", "blue")]
-    )
-    for j, axis in enumerate("xyz"):
-        rows[axis] = model.points[:, j]
-    for j, channel in enumerate(("red", "green", "blue")):
-        rows[channel] = np.rint(model.colours[:, j] * 255)
-    PlyData([PlyElement.describe(rows, "vertex")], byte_order="<").write(str(path))

@@ -1,37 +1,42 @@
-"""Gaussians on disk, a file a column, while other programs' files are made of them in parts: memory stays bounded."""
+"""Gaussians on disk, one file per column, so that other programs' files are made in parts with bounded memory."""
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float, Float32, Float64
 from numpy import ndarray as Array
+from scipy.spatial.transform import Rotation
 
+from dav_gswt.export.axes import turn_points, turn_quats
 from dav_gswt.field import GaussianField
+from dav_gswt.raster.interface import RIM
 
 COLUMNS = {"means": 3, "dc": 3, "opacity_logits": 1, "log_scales": 3, "quats": 4}  # float32 each
-BYTES = 4 * sum(COLUMNS.values())  # of a Gaussian
 CHUNK = 262_144  # Gaussians that are read at once
+
+Box = tuple[Float64[Array, "3"], Float64[Array, "3"]]  # the smallest and the largest of each coordinate
 
 
 class Spool:
     """Gaussians whose colours do not depend on the view, in our axes.
 
-    Written once, part by part; each column can then be read any number of times. It is the owner's task to remove the
-    folder.
+    Use it as a context manager to append, then read its columns any number of times. Whoever made the folder
+    removes it.
     """
 
     def __init__(self, folder: Path | str):
         self.folder, self.count = Path(folder), 0
         self.folder.mkdir(parents=True)
-        self._files = {name: (self.folder / name).open("wb") for name in COLUMNS}
+        self._open = ExitStack()
+        self._files = {name: self._open.enter_context((self.folder / name).open("wb")) for name in COLUMNS}
 
     def __enter__(self) -> "Spool":
         return self
 
     def __exit__(self, *_) -> None:
-        for file in self._files.values():
-            file.close()
+        self._open.close()
 
     def __len__(self) -> int:
         return self.count
@@ -40,14 +45,10 @@ class Spool:
         """Add Gaussians. Raises: ValueError: their colours depend on the view."""
         if field.sh_degree:
             raise ValueError("a spool holds colours of degree 0")
-        values = {"dc": field.sh[:, 0]} | {name: getattr(field, name) for name in COLUMNS if name != "dc"}
         for name, file in self._files.items():
-            file.write(np.ascontiguousarray(values[name], "<f4").tobytes())
+            values = field.sh[:, 0] if name == "dc" else getattr(field, name)
+            file.write(np.ascontiguousarray(values, "<f4").tobytes())
         self.count += len(field)
-
-    def close(self) -> None:
-        """End writing; reading needs it."""
-        self.__exit__()
 
     def read(self, column: str) -> Iterator[Float32[Array, "n k"]]:
         """A column in parts, in the order of writing."""
@@ -56,7 +57,20 @@ class Spool:
             while len(values := np.fromfile(file, "<f4", CHUNK * width)):
                 yield values.reshape(-1, width)
 
-    def read_all(self) -> Iterator[dict[str, Float32[Array, "n k"]]]:
-        """All columns side by side, in parts."""
-        for values in zip(*(self.read(name) for name in COLUMNS), strict=True):
-            yield dict(zip(COLUMNS, values, strict=True))
+    def find_box(self, rotation: Float[Array, "3 3"]) -> Box:
+        """The box along a format's axes (rows of `axes.AXES`) of the Gaussians as drawn: to RIM deviations.
+
+        Raises: ValueError: there is no Gaussian.
+        """
+        boxes = []
+        for means, scales, quats in zip(*map(self.read, ("means", "log_scales", "quats")), strict=True):
+            points = turn_points(means, rotation).astype(float)
+            axes = Rotation.from_quat(turn_quats(quats, rotation), scalar_first=True).as_matrix()
+            reach = RIM * np.sqrt(np.einsum("nij,nj->ni", axes**2, np.exp(2 * scales.astype(float))))
+            boxes.append(((points - reach).min(0), (points + reach).max(0)))
+        return unite_boxes(boxes)
+
+
+def unite_boxes(boxes: list[Box]) -> Box:
+    """The box about boxes. Raises: ValueError: there is none."""
+    return np.min([low for low, _ in boxes], 0), np.max([high for _, high in boxes], 0)

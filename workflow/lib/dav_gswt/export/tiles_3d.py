@@ -1,140 +1,114 @@
-"""A finite terrain as 3D Tiles 1.1: a tree of GLBs, a level of detail a row, which programs load as they come near.
+"""A finite terrain as 3D Tiles 1.1: a tree of GLBs, one level of detail a row, which programs load as they approach.
 
-Source: https://docs.ogc.org/cs/22-025r4/22-025r4.html. A tile of level l covers 2^l by 2^l cells and gives way (refine:
-REPLACE) to the four of level l - 1 under it; the root has no content. Axes are east, north and up; GLBs have y up, as
-the specification wants it.
+Source: https://docs.ogc.org/cs/22-025r4/22-025r4.html. A tile of level l covers 2^l by 2^l cells and is replaced
+(refine: REPLACE) by the four tiles of level l - 1 below it; the root has no content. Axes are east, north and up; the
+GLBs have y up, as the specification requires.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
-from numpy import ndarray as Array
 
 import dav_gswt
 from dav_gswt.export.axes import Z_UP
-from dav_gswt.export.bounds import Box, find_box, unite_boxes
-from dav_gswt.export.glb_splats import EXTENSION, write_glb_splats
-from dav_gswt.export.glb_spz import COMPRESSION, write_glb_spz
-from dav_gswt.export.spool import Spool
+from dav_gswt.export.glb import COMPRESSION, EXTENSION, write_splats
+from dav_gswt.export.spool import Box, unite_boxes
+from dav_gswt.export.terrain_files import ExportJob
 from dav_gswt.files import write_json
-from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.logs import progress
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.finite import Area
 
-# Pixels that programs let a tile be wrong by before they refine it (CesiumJS's maximumScreenSpaceError): a level whose
-# error is as many spacings of its Gaussians is refined where these would lie more than a pixel apart.
+# The error in pixels up to which programs keep a tile (CesiumJS's maximumScreenSpaceError). A level whose error is as
+# many spacings of its Gaussians is refined where these would be more than a pixel apart.
 ALLOWED_PIXELS = 16
 GLTF_EXTENSION = "3DTILES_content_gltf"
 
-Placer = Callable[[Area, int], AbstractContextManager[Spool]]  # the Gaussians of cells at a level
 
-
-@dataclass(frozen=True)
-class TileWriter:
-    """Writes the contents of a tree.
-
-    Attributes:
-        folder: of tileset.json.
-        errors: of each level, in units: what is lost where it is shown instead of a finer one; 0 of the finest.
-        place: puts cells on the surface.
-        extras: of the contents' nodes.
-        spz: whether contents are compressed.
-    """
-
-    folder: Path
-    errors: Sequence[float]
-    place: Placer
-    extras: Mapping[str, Any]
-    spz: bool = False
-
-    def write_tree(self, area: Area) -> dict[str, Any]:
-        """The root of an area's tree, its contents written. Raises: ValueError: the area has no Gaussian."""
-        top = len(self.errors) - 1
-        blocks = progress(split_area(area, 2**top), "write tiles")
-        tiles = [self._write_tile(block, top) for block in blocks]
-        children, boxes = zip(*[tile for tile in tiles if tile is not None], strict=True)
-        box = unite_boxes(list(boxes))
-        return {
-            "boundingVolume": {"box": to_volume(box)},
-            "geometricError": measure_absence(box, self.errors),
-            "refine": "REPLACE",
-            "children": list(children),
-        }
-
-    def _write_tile(self, area: Area, level: int) -> tuple[dict[str, Any], Box] | None:
-        """The tile of an area at a level and the finer ones under it, and their box; None: there is no Gaussian."""
-        finer = [self._write_tile(part, level - 1) for part in split_area(area, 2 ** (level - 1))] if level else []
-        below = [tile for tile in finer if tile is not None]
-        boxes, content = [box for _, box in below], None
-        with self.place(area, level) as placed:
-            if len(placed):
-                boxes.append(find_box(placed, Z_UP))
-                content = self._write_content(placed, area, level, boxes[-1])
-        if not boxes:
-            return None
-        box = unite_boxes(boxes)
-        tile: dict[str, Any] = {"boundingVolume": {"box": to_volume(box)}, "geometricError": self.errors[level]}
-        tile |= {"content": content} if content else {}
-        return tile | ({"children": [child for child, _ in below]} if below else {}), box
-
-    def _write_content(self, placed: Spool, area: Area, level: int, box: Box) -> dict[str, Any]:
-        uri = f"{level}/{area.west}_{area.south}.glb"
-        write = write_glb_spz if self.spz else write_glb_splats
-        write(placed, self.folder / uri, dict(self.extras) | {"level": level})
-        return {"uri": uri, "boundingVolume": {"box": to_volume(box)}}
-
-
-def write_tileset(
-    folder: Path | str,
-    area: Area,
-    errors: Sequence[float],
-    place: Placer,
-    facts: Mapping[str, Any],
-    transform: Float[Array, "4 4"] | None,
-    spz: bool = False,
-) -> None:
+def write_tileset(job: ExportJob, folder: Path, compressed: bool) -> int:
     """Write tileset.json and {level}/{column}_{row}.glb, named by the south-western cells, to a new folder.
 
-    Args:   errors: of each level, see `TileWriter`. facts: kept in the files' extras. transform: to metres from the
-            earth's centre; None: the tileset stays where it is, in the terrain's unit. spz: see `TileWriter`.
+    If the terrain's place on earth is known, the tileset's transform puts it there; else it stays in its own unit.
+    Returns: the number of Gaussians. Raises: ValueError: the area has none.
     """
-    folder = Path(folder)
     folder.mkdir()
-    root = TileWriter(folder, errors, place, {"unit": facts["unit"]}, spz).write_tree(area)
-    if transform is not None:
-        root["transform"] = transform.T.ravel().tolist()  # column by column
-    # what GLBs use, so that a program knows before it loads one: CesiumJS draws Gaussians where it is told so here
-    extension = {"extensionsUsed": [EXTENSION, COMPRESSION]} if spz else {"extensionsUsed": [EXTENSION]}
-    extension |= {"extensionsRequired": [EXTENSION, COMPRESSION]} if spz else {}
+    writer = _TreeWriter(job, folder, measure_errors(job.terrain), compressed)
+    root = writer.write_root()
+    if job.reference is not None:
+        shift = np.eye(4)
+        shift[:3, 3] = job.facts["origin"]
+        root["transform"] = (job.reference.to_geocentric @ shift).T.ravel().tolist()  # column by column
+    # CesiumJS draws Gaussians only if the tileset itself names the extensions of its GLBs
+    used: dict[str, Any] = {"extensionsUsed": [EXTENSION]}
+    if compressed:
+        used = {name: [EXTENSION, COMPRESSION] for name in ("extensionsUsed", "extensionsRequired")}
     tileset = {
         "asset": {"version": "1.1", "extras": {"generator": f"DAV-GSWT {dav_gswt.__version__}"}},
         "extensionsUsed": [GLTF_EXTENSION],
-        "extensions": {GLTF_EXTENSION: extension},
-        "extras": dict(facts),
+        "extensions": {GLTF_EXTENSION: used},
+        "extras": dict(job.facts),
         "geometricError": root["geometricError"],
         "root": root,
     }
     write_json(folder / "tileset.json", tileset)
+    return writer.count
+
+
+@dataclass
+class _TreeWriter:
+    """Writes the contents of a tree. errors: of each level, see `measure_errors`. count: Gaussians written so far."""
+
+    job: ExportJob
+    folder: Path
+    errors: list[float]
+    compressed: bool
+    count: int = 0
+
+    def write_root(self) -> dict[str, Any]:
+        """The root of the tree. Its error exceeds that of the coarsest level: without it there is nothing at all."""
+        top = len(self.errors) - 1
+        blocks = progress(split_area(self.job.area, 2**top), "write tiles")
+        found = [tile for tile in (self._write_tile(block, top) for block in blocks) if tile is not None]
+        box = unite_boxes([box for _, box in found])
+        return {
+            "boundingVolume": {"box": to_volume(box)},
+            "geometricError": float(max(np.linalg.norm(box[1] - box[0]), 2 * self.errors[-1])),
+            "refine": "REPLACE",
+            "children": [tile for tile, _ in found],
+        }
+
+    def _write_tile(self, area: Area, level: int) -> tuple[dict[str, Any], Box] | None:
+        """The tile of an area and the finer ones below it, and their box; None: there is no Gaussian."""
+        finer = [self._write_tile(part, level - 1) for part in split_area(area, 2 ** (level - 1))] if level else []
+        below = [tile for tile in finer if tile is not None]
+        boxes, content = [box for _, box in below], {}
+        with self.job.place(area, level) as placed:
+            if len(placed):
+                self.count += len(placed)
+                boxes.append(placed.find_box(Z_UP))
+                uri = f"{level}/{area.west}_{area.south}.glb"
+                extras = {"unit": self.job.facts["unit"], "level": level}
+                write_splats(placed, self.folder / uri, extras, compressed=self.compressed)
+                content = {"content": {"uri": uri, "boundingVolume": {"box": to_volume(boxes[-1])}}}
+        if not boxes:
+            return None
+        box = unite_boxes(boxes)
+        tile: dict[str, Any] = {"boundingVolume": {"box": to_volume(box)}, "geometricError": self.errors[level]}
+        return tile | content | ({"children": [child for child, _ in below]} if below else {}), box
 
 
 def measure_errors(terrain: EndlessTerrain) -> list[float]:
-    """The geometric error of each level, in units: by the spacing of its Gaussians, if they lay on a square lattice."""
+    """The geometric error of each level, in units, from the spacing of its Gaussians on a square lattice.
+
+    It is what is lost where the level is shown instead of a finer one: 0 for the finest, and never falling.
+    """
     counts: dict[int, list[int]] = {}
     for (level, _), tile in sorted(terrain.tiles.items(), key=lambda item: item[0]):
         counts.setdefault(level, []).append(len(tile))
     spacings = [terrain.side / np.sqrt(max(np.mean(counts[level]), 1)) for level in range(1, len(terrain.switches))]
     return [0.0, *(float(v) for v in ALLOWED_PIXELS * np.maximum.accumulate(spacings))]
-
-
-def measure_absence(box: Box, errors: Sequence[float]) -> float:
-    """What is lost where nothing is shown: as much as there is, and more than the coarsest level loses."""
-    return float(max(np.linalg.norm(box[1] - box[0]), 2 * errors[-1]))
 
 
 def split_area(area: Area, edge: int) -> list[Area]:
@@ -150,10 +124,3 @@ def to_volume(box: Box) -> list[float]:
     """A box of the specification: its centre and the halves of its sides."""
     low, high = box
     return [*((low + high) / 2).tolist(), *np.diag((high - low) / 2).ravel().tolist()]
-
-
-def place_on_globe(reference: Georeference, origin: Float[Array, "3"]) -> Float[Array, "4 4"]:
-    """Takes coordinates that count from an origin of the world to metres from the earth's centre."""
-    shift = np.eye(4)
-    shift[:3, 3] = origin
-    return reference.to_geocentric @ shift

@@ -8,39 +8,46 @@ from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 from scipy.ndimage import map_coordinates
 
-from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
+from dav_gswt.field import GaussianField, rgb_to_sh
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.inpainting import occluders, unseen, viewpoints
-from dav_gswt.inpainting.view_inpainting import LEAST_ALPHA, inpaint_views
+from dav_gswt.images.lpips_weights import Weights
+from dav_gswt.inpainting import unseen
+from dav_gswt.inpainting.view_inpainting import LEAST_ALPHA, inpaint_view
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior import conditions
 from dav_gswt.prior.conditions import ReferencePhotos
-from dav_gswt.reconstruction import underlay
+from dav_gswt.reconstruction import evaluation, underlay
 from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.views import collision
+from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.prior_sampling import PriorConfig
 
 _log = logging.getLogger(__name__)
 
+BLOCK = 0.4  # flying heights: side of the ground under one camera, whose picture shows 0.7
+ELEVATION, RADIUS = 80.0, 0.7  # degrees, flying heights: nearly from above, so that the picture's top is defined
+FIELD_OF_VIEW = 55.0  # degrees, as of the prior's training examples
 INSET = 2.0  # pixels along the border of a picture that are not used: the prior knows little of what lies beyond
 
 
 @dataclass(frozen=True)
 class InpaintingResult:
-    """A field, the cells that no photo saw, and those of them that were inpainted. objects: number of new Gaussians."""
+    """A field, the cells that no photo saw, and those of them that were inpainted."""
 
     field: GaussianField
     unseen: Bool[Array, "rows columns"]
     inpainted: Bool[Array, "rows columns"]
-    objects: int
 
     def describe(self, grid: Ground) -> dict:
-        """The content of completion.json; its key `things` counts Gaussians of objects."""
+        """The content of completion.json."""
         block = np.s_[grid.first_row : grid.first_row + grid.cells, grid.first_column : grid.first_column + grid.cells]
         counts = {"cells": grid.heights.size, "unseen": int(self.unseen.sum()), "painted": int(self.inpainted.sum())}
         inside = {"unseen": int(self.unseen[block].sum()), "painted": int(self.inpainted[block].sum())}
-        return counts | {"things": self.objects, "exemplar": inside, "changed": bool(self.field.imagined.any())}
+        return counts | {"exemplar": inside, "changed": bool(self.field.imagined.any())}
 
 
 @dataclass(frozen=True)
@@ -60,31 +67,32 @@ def inpaint_field(
     """Inpaint the ground that no photo saw, one picture from above after the other, each conditioned on those before.
 
     Discs of such ground, and of the underlay under such ground alone, take the generated colours and keep their places,
-    since the depth of a prior is rougher than the surface of the ground. Gaussians are added where the depth shows an
-    object from two sides (`occluders`). All these are marked `imagined`, with uncertainty 1. Colours are read from the
-    pictures without a fit: a picture of 64 pixels is coarser than the discs. The grid is not changed: `seen` remains
-    what photos saw. A cell under a known object, which no picture from above shows, keeps its colour unmarked.
+    since the depth of a prior is rougher than the surface of the ground. They are marked `imagined`, with uncertainty
+    1. Colours are read from the pictures without a fit: a picture of 64 pixels is coarser than the discs. The grid is
+    not changed: `seen` remains what photos saw. A cell under a known object, which no picture from above shows, keeps
+    its colour unmarked.
 
     Returns: the field itself, if there is nothing to inpaint or the field has no ground layer.
-    Raises: ValueError: see `inpaint_views`.
+    Raises: ValueError: see `inpaint_view`.
     """
     cells = unseen.find_unseen_cells(field, grid)
     _log.info("%d of %d cells of the ground were seen by no photo", cells.sum(), cells.size)
     if not cells.any():
-        return InpaintingResult(field, cells, cells, 0)
-    targets = viewpoints.find_targets(grid, cells, frame.flying_height)
+        return InpaintingResult(field, cells, cells)
+    targets = find_targets(grid, cells, frame.flying_height)
     references = conditions.prepare_photos(photos, frame, config.model.size)
     scene = _Scene(grid, frame, references, config, _mean_ground_colour(field, grid))
     coloured, left = _colour_cells(scene, field, cells, targets)
     done = cells & ~left
     if not done.any():
         _log.info("none of them is visible: known objects cover them all")
-        return InpaintingResult(field, cells, done, 0)
+        return InpaintingResult(field, cells, done)
     marked = unseen.select_gaussians(field, grid, done)
-    ground = _mark_gaussians(_colour_underlay(coloured, grid, marked), marked)
-    result = concatenate_fields([ground, *_add_occluders(scene, ground, targets)])
-    _log.info("%d cells inpainted, %d Gaussians of objects added", done.sum(), len(result) - len(field))
-    return InpaintingResult(result, cells, done, len(result) - len(field))
+    coloured = _colour_underlay(coloured, grid, marked)
+    uncertainty = np.where(marked, np.float32(1), field.uncertainty)
+    result = replace(coloured, uncertainty=uncertainty, imagined=field.imagined | marked)
+    _log.info("%d cells inpainted", done.sum())
+    return InpaintingResult(result, cells, done)
 
 
 def _mean_ground_colour(field: GaussianField, grid: Ground) -> Float[Array, "3"]:
@@ -99,19 +107,17 @@ def _colour_cells(
     """The field with generated colours, and the unseen cells that no picture showed."""
     coloured, left, size = field, cells, scene.config.model.size
     for target in progress(targets, "inpaint unseen ground"):
-        cameras = viewpoints.place_cameras(viewpoints.ABOVE, target, coloured, scene.grid, scene.frame, size)
-        for pose, camera in cameras:
-            condition = conditions.build_condition(
-                coloured, [(pose, camera)], scene.photos, scene.frame.flying_height, size
-            )
+        for pose, camera in place_camera(target, coloured, scene.grid, scene.frame, size):
+            view = [(pose, camera)]
+            condition = conditions.build_condition(coloured, view, scene.photos, scene.frame.flying_height, size)
             shows, shows_left = (
                 unseen.render_share(coloured, unseen.select_gaussians(field, scene.grid, some), camera)
                 for some in (cells, left)
             )
-            touched = shows_left[None] > unseen.TOUCHED
-            views = inpaint_views(scene.config, condition, touched, scene.ground_colour)
-            good = (shows > unseen.LOOKS) & (views.alpha[0] > LEAST_ALPHA)
-            coloured, left = _colour_discs(coloured, left, camera, views.colour[0], good)
+            touched = shows_left > unseen.TOUCHED
+            picture, alpha = inpaint_view(scene.config, condition, touched, scene.ground_colour)
+            good = (shows > unseen.LOOKS) & (alpha > LEAST_ALPHA)
+            coloured, left = _colour_discs(coloured, left, camera, picture, good)
     return coloured, left
 
 
@@ -160,21 +166,53 @@ def _colour_underlay(field: GaussianField, grid: Ground, marked: Bool[Array, "n"
     return replace(field, sh=sh)
 
 
-def _mark_gaussians(field: GaussianField, marked: Bool[Array, "n"]) -> GaussianField:
-    uncertainty = np.where(marked, np.float32(1), field.uncertainty)
-    return replace(field, uncertainty=uncertainty, imagined=field.imagined | marked)
+def find_targets(grid: Ground, cells: Bool[Array, "rows columns"], flying_height: float) -> list[Float[Array, "3"]]:
+    """The centroid of the marked cells in each block of a lattice over the grid.
+
+    Blocks with few marked cells come first: they have most known ground around them.
+    """
+    centres = grid.centres[cells.ravel()]
+    if not len(centres):
+        return []
+    at = np.floor((centres[:, :2] - [grid.west, grid.south]) / (BLOCK * flying_height)).astype(int)
+    _, block, count = np.unique(at, axis=0, return_inverse=True, return_counts=True)
+    return [centres[block.ravel() == i].mean(0) for i in np.argsort(count, kind="stable")]
 
 
-def _add_occluders(scene: _Scene, field: GaussianField, targets: list[Float[Array, "3"]]) -> list[GaussianField]:
-    """The objects on the inpainted ground about each target."""
-    fields, size, flying_height = [], scene.config.model.size, scene.frame.flying_height
-    ground_colour = _mean_ground_colour(field, scene.grid)
-    for target in progress(targets, "find objects on it"):
-        places = viewpoints.ABOVE + viewpoints.ASIDE
-        pool = viewpoints.place_cameras(places, target, field, scene.grid, scene.frame, size)
-        if len(pool) > 1:
-            condition = conditions.build_condition(field, pool, scene.photos, flying_height, size)
-            nothing = np.zeros((len(pool), size, size), bool)
-            views = inpaint_views(scene.config, condition, nothing, ground_colour)
-            fields.append(occluders.find_occluders(field, scene.grid, pool, condition, views, flying_height))
-    return fields
+def place_camera(
+    target: Float[Array, "3"], field: GaussianField, grid: Ground, frame: SceneFrame, size: int
+) -> Candidates:
+    """The camera above a target; none if it were in an object or underground."""
+    distance = RADIUS * frame.flying_height
+    camera = camera_layouts.orbit(ELEVATION, 0.0, distance, target, size, size, FIELD_OF_VIEW)
+    centre = camera.centre[None]
+    if (collision.find_below_ground(centre, grid) | collision.find_inside_objects(centre, field)).any():
+        return []
+    return [(pose_of_camera("virtual", camera, frame), camera)]
+
+
+def evaluate_inpainting(
+    before: GaussianField, after: GaussianField, tests: list[TrainingView], weights: Weights | None = None
+) -> dict:
+    """Metrics of the field before and after, over `all` pixels of the modelled ground and over those of `imagined`
+    (inpainted) ground alone, and the number of pixels.
+
+    The pixels are the same before and after: those that look at the inpainted discs. tests: weighted, see
+    `observation.mask_to_ground`.
+    Returns: the content of metrics.json; null under `imagined` if no test photo sees such ground.
+    """
+
+    def mask(view: TrainingView) -> TrainingView:
+        looks = unseen.mask_pixels(before, after.imagined, view.camera)
+        return replace(view, weight=np.where(looks, view.weight, np.float32(0)))
+
+    views = {"all": tests, "imagined": [mask(view) for view in tests]}
+    metrics = {
+        part: {
+            "before": evaluation.evaluate_field(before, masked, weights=weights),
+            "after": evaluation.evaluate_field(after, masked, weights=weights),
+            "pixels": int(sum((view.weight > 0).sum() for view in masked)),
+        }
+        for part, masked in views.items()
+    }
+    return metrics | {"gaussians": {"before": len(before), "after": len(after), "imagined": int(after.imagined.sum())}}

@@ -8,7 +8,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle import store as bundles
 from dav_gswt.errors import InputError
-from dav_gswt.export.splats import TILES_PER_ROW
+from dav_gswt.export.terrain_files import TILES_PER_ROW
 from dav_gswt.field import GaussianField
 from dav_gswt.inspect import result_files
 from dav_gswt.inspect.field_scenes import (

@@ -61,9 +61,7 @@ def replace_dropout(network: nn.Module) -> list[HeldDropout]:
 
 @contextmanager
 def hold_masks(layers: list[HeldDropout], m: int, p: float, seed: int):
-    """Hold the masks of one trajectory. Raises: ValueError: m < 1 or p outside [0, 1)."""
-    if m < 1:
-        raise ValueError(f"m is {m}; there is at least one sample")
+    """Hold the masks of one trajectory. Raises: ValueError: p outside [0, 1)."""
     if not 0 <= p < 1:
         raise ValueError(f"p_drop is {p}; it must be at least 0 and less than 1")
     for layer in layers:

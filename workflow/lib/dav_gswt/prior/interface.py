@@ -85,8 +85,3 @@ class Prior(Protocol):
     def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
         """The latents of the field's render: samples equal them where the render is what the prior expects."""
         ...
-
-    def estimate_variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
-        """The variance of each latent, if it stands for a distribution: that of the encoder's posterior for the decoded
-        picture, in units of the latents."""
-        ...

@@ -37,7 +37,7 @@ class TerrainPrior:
         return cls(network, weights.load_weights(network, path))
 
     def copy(self) -> "TerrainPrior":
-        """A copy that shares no state with this one."""
+        """See `CopyablePrior`."""
         return copy.deepcopy(self)
 
     def encode(self, planes: Float32[Tensor, "n 5 s s"]) -> Float32[Tensor, "n c hz wz"]:
@@ -54,21 +54,10 @@ class TerrainPrior:
         return DecodedViews(np.ascontiguousarray(images[..., :4]), images[..., 4] / np.float32(DEPTH_SCALE))
 
     def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
-        """See `Prior`."""
-        return self._encode_render(condition).numpy()
-
-    def _encode_render(self, condition: Condition) -> Float32[Tensor, "b c hz wz"]:
-        """Latents of the field's render; those of the last condition are remembered, as scoring asks for them twice."""
+        """See `Prior`. The latents of the last condition are kept, because scoring needs them twice."""
         if self._encoded is None or self._encoded[0] is not condition:
             self._encoded = condition, self.encode(pack_render(condition))
-        return self._encoded[1]
-
-    def estimate_variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
-        """See `Prior`."""
-        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT)))
-        with torch.inference_mode():
-            parts = [self.network.posterior(self.network.decode(part)).var for part in flat.split(BATCH)]
-            return (torch.cat(parts) * self.network.scale**2).numpy().reshape(latents.shape)
+        return self._encoded[1].numpy()
 
     def make_denoiser(self, condition: Condition, known: Bool[Array, "b h w"] | None = None) -> Denoiser:
         """The denoiser with the condition of the views bound.
@@ -77,7 +66,8 @@ class TerrainPrior:
         Raises:  ValueError: the condition is not finite, see `Condition.check`.
         """
         condition.check()
-        render, photo = self._encode_render(condition), self.encode(pack_photo(condition.photo))
+        render = torch.from_numpy(self.encode_render(condition))
+        photo = self.encode(pack_photo(condition.photo))
         opacity = average_opacity(torch.from_numpy(condition.alpha))
         valid = torch.ones_like(opacity) if known is None else torch.from_numpy(known).float()[:, None]
         with torch.inference_mode():
@@ -106,19 +96,6 @@ class TerrainPrior:
         sampling = Sampling(m, p_drop, steps, seed, common=common)
         denoise = self.make_denoiser(condition, known)
         return sampler.sample_latents(denoise, self.layers, self.schedule, len(condition), LATENT, sampling)
-
-    def repair(
-        self,
-        condition: Condition,
-        strength: float,
-        steps: int,
-        seed: int,
-        known: Bool[Array, "b h w"] | None = None,
-    ) -> Float32[Array, "b c hz wz"]:
-        """Add a little noise to the latents of the render and remove it again: `sampler.repair_latents`."""
-        latents = self._encode_render(condition)
-        denoise, sampling = self.make_denoiser(condition, known), Sampling(1, 0.0, steps, seed)
-        return sampler.repair_latents(denoise, self.layers, self.schedule, latents, strength, sampling)
 
 
 def pack_render(condition: Condition) -> Float32[Tensor, "b 5 s s"]:

@@ -1,5 +1,6 @@
-"""Weights of the terrain prior in a safetensors file: checked before they are loaded, never a pickle."""
+"""Weights in safetensors files: names, shapes and types are compared before a tensor is read. No pickle is opened."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import torch
@@ -11,58 +12,74 @@ from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import UNREADABLE, atomic_file
 
 TERRAIN_WEIGHTS = Path(__file__).with_name("terrain.safetensors")  # they come with the library
-MOST_BYTES = 256 * 2**20
+MOST_BYTES = 256 * 2**20  # of the terrain prior
+FLOAT_TYPES = {"F64", "F32", "F16", "BF16"}  # as safetensors names them
 STORED_PREFIXES = {"autoencoder.": "coder.", "condition_encoder.": "told."}  # names in files, ours -> the file's
 
 
 def save_weights(
     network: nn.Module, path: Path | str, facts: dict[str, str], dtype: torch.dtype = torch.float16
 ) -> None:
-    """Write a network's weights, by default in half precision. facts: metadata for the header."""
-    values = {_stored_name(name): v.detach().to("cpu", dtype).contiguous() for name, v in network.state_dict().items()}
+    """Write the terrain prior's weights, by default in half precision. facts: metadata for the header."""
+    values = {
+        _replace_prefix(name, STORED_PREFIXES): value.detach().to("cpu", dtype).contiguous()
+        for name, value in network.state_dict().items()
+    }
     with atomic_file(path) as part:
         save_file(values, str(part), metadata=facts)
 
 
 def load_weights(network: nn.Module, path: Path | str) -> dict[str, str]:
-    """Fill a network from a file; returns the metadata in its header.
+    """Fill the terrain prior from a file; returns the metadata in its header.
 
-    Raises: InputError: the file is missing, too large or not safetensors, or a tensor is missing, superfluous, of
-    another shape or not finite, by name.
+    Raises: InputError: the file is missing or too large; see also `fill_weights`.
     """
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: there are no such weights")
     if path.stat().st_size > MOST_BYTES:
         raise InputError(f"{path}: {path.stat().st_size >> 20} MiB are not the weights of this prior")
-    expected = {_stored_name(name): value for name, value in network.state_dict().items()}
+    return fill_weights(network, path, _own_name, "make or copy the weights again")
+
+
+def fill_weights(network: nn.Module, path: Path, rename: Callable[[str], str], remedy: str) -> dict[str, str]:
+    """Load a file's weights into a network, in its own precision; returns the metadata in the file's header.
+
+    rename: from a weight's name in the file to its name in the network. remedy: ends the messages.
+    Raises: InputError: the file is not safetensors, or a tensor is missing, superfluous, of another shape or type, or
+    not finite, by name.
+    """
+    expected = network.state_dict()
     try:
         with safe_open(str(path), "pt") as file:
-            _check_names(path, set(expected), set(file.keys()))
+            names: dict[str, str] = {}
+            for name in sorted(file.keys()):
+                if name.endswith("position_ids"):  # a constant that older transformers kept among the weights
+                    continue
+                if rename(name) not in expected or rename(name) in names:
+                    raise InputError(f"{path}: {name[:80]!r} is not of this network; {remedy}")
+                names[rename(name)] = name
+            if missing := sorted(set(expected) - set(names)):
+                raise InputError(f"{path}: {missing[0]} is missing; these are the weights of another network; {remedy}")
             for name, value in expected.items():
-                shape = tuple(file.get_slice(name).get_shape())
-                if shape != tuple(value.shape):
-                    raise InputError(f"{path}: {name} has the shape {shape}, not {tuple(value.shape)}")
-            values = {name: file.get_tensor(name).to(value.dtype) for name, value in expected.items()}
+                header, stored = file.get_slice(names[name]), names[name]
+                if (shape := tuple(header.get_shape())) != tuple(value.shape):
+                    raise InputError(f"{path}: {stored} has the shape {shape}, not {tuple(value.shape)}; {remedy}")
+                if (dtype := header.get_dtype()) not in FLOAT_TYPES:
+                    raise InputError(f"{path}: {stored} has the type {dtype}, not floating-point numbers; {remedy}")
+            values = {name: file.get_tensor(names[name]).to(value.dtype) for name, value in expected.items()}
             facts = dict(file.metadata() or {})
     except (SafetensorError, *UNREADABLE) as error:
-        why = summarize_error(error)
-        raise InputError(f"{path}: not readable as safetensors ({why}); make or copy the weights again") from error
-    if bad := [name for name, value in values.items() if not torch.isfinite(value.float()).all()]:
-        raise InputError(f"{path}: {bad[0]} holds numbers that are not finite")
-    network.load_state_dict({name: values[_stored_name(name)] for name in network.state_dict()})
+        raise InputError(f"{path}: not readable as safetensors ({summarize_error(error)}); {remedy}") from error
+    if bad := [names[name] for name, value in values.items() if not torch.isfinite(value).all()]:
+        raise InputError(f"{path}: {bad[0]} holds numbers that are not finite; {remedy}")
+    network.load_state_dict(values, assign=True)
     return facts
 
 
-def _stored_name(name: str) -> str:
-    for own, stored in STORED_PREFIXES.items():
-        if name.startswith(own):
-            return stored + name.removeprefix(own)
-    return name
+def _replace_prefix(name: str, prefixes: dict[str, str]) -> str:
+    return next((new + name.removeprefix(old) for old, new in prefixes.items() if name.startswith(old)), name)
 
 
-def _check_names(path: Path, expected: set[str], found: set[str]) -> None:
-    if missing := sorted(expected - found):
-        raise InputError(f"{path}: {missing[0]} is missing; these are the weights of another network")
-    if extra := sorted(found - expected):
-        raise InputError(f"{path}: {extra[0][:80]!r} is not of this network")
+def _own_name(name: str) -> str:
+    return _replace_prefix(name, {stored: own for own, stored in STORED_PREFIXES.items()})

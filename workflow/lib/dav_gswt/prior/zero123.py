@@ -1,8 +1,11 @@
 """Zero-1-to-3 as a prior: given one photo of an object and a change of pose, it generates the view from the new pose.
 
-Liu et al., Zero-1-to-3 (ICCV 2023), with the published weights (`zero123_weights`), 256 x 256. It uses neither the
-field's render nor depth: of a `Condition` it takes the photo and the relative pose. The conventions are those of the
-authors' code (cvlab-columbia/zero123, gradio_new.py and ldm/data/simple.py):
+Liu et al., Zero-1-to-3 (ICCV 2023), 256 x 256. It uses neither the field's render nor depth: of a `Condition` it takes
+the photo and the relative pose. The published weights are in a local folder, in either diffusers layout: unet/, vae/,
+image_encoder/ and a folder of the layer that takes in the pose. Only config.json and one safetensors file are read of
+each network, so no code that comes with the weights is run. Nothing is downloaded.
+
+The conventions are those of the authors' code (cvlab-columbia/zero123, gradio_new.py and ldm/data/simple.py):
 
 - The pose is (polar angle in radians, sine and cosine of the azimuth, radius), each relative to the photo's. The polar
   angle is counted from the zenith, so it falls where elevation rises; azimuth runs from x to y in both.
@@ -14,21 +17,41 @@ authors' code (cvlab-columbia/zero123, gradio_new.py and ldm/data/simple.py):
 - Without a photo: zeros for that latent and for the one token, after the projection.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
+from diffusers.models.autoencoders.autoencoder_kl import AutoencoderKL
+from diffusers.models.unets.unet_2d_condition import UNet2DConditionModel
+from diffusers.schedulers.scheduling_ddim import DDIMScheduler
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional
 
-from dav_gswt.images import image_files
-from dav_gswt.prior import sampler, zero123_weights
+from dav_gswt.errors import InputError
+from dav_gswt.files import read_json
+from dav_gswt.prior import dropout, sampler, weights
+from dav_gswt.prior.dropout import HeldDropout
 from dav_gswt.prior.interface import Condition, DecodedViews
 from dav_gswt.prior.sampler import Sampling
-from dav_gswt.prior.zero123_weights import CHANNELS, Zero123Networks
 
+Network = Any  # of diffusers or transformers, whose annotations are wrong: a config is no dict, an output no tuple
+
+HELP = "docs/prior.md says how to get the weights"
+EXTRA = "transformers==5.23.0"
+MOST_BYTES = 8 * 2**30  # of all weights; the published ones are 5 GiB in single precision
+PROJECTIONS = {"cc_projection": "projection.", "clip_camera_projection": "proj."}  # folder: prefix of its weights
+STEMS = "diffusion_pytorch_model", "model", "pytorch_model"
+VARIANTS = "", ".fp16", ".fp16_ema"  # in order of preference
+POSE = 4  # numbers of a relative pose
+CHANNELS = 4  # of a latent
+LEGACY_NAMES = {"query": "to_q", "key": "to_k", "value": "to_v", "proj_attn": "to_out.0"}  # of old diffusers
+SCHEDULE: dict[str, Any] = {"num_train_timesteps": 1000, "beta_start": 0.00085, "beta_end": 0.012}
+SCHEDULE |= {"beta_schedule": "scaled_linear", "clip_sample": False, "set_alpha_to_one": False, "steps_offset": 1}
 SIZE = 256
 LATENT = (CHANNELS, SIZE // 8, SIZE // 8)
 GUIDANCE = 3.0  # the authors' choice
@@ -38,6 +61,22 @@ CLIP_MEAN, CLIP_STD = (0.48145466, 0.4578275, 0.40821073), (0.26862954, 0.261302
 WHITE = 0.1  # colours nearer to white than this are partly transparent
 VAE_BATCH = 4  # pictures
 DENOISER_BATCH = 8  # latents; with guidance each is there twice
+
+
+@dataclass(frozen=True)
+class Zero123Networks:
+    """The networks, in single precision on the CPU.
+
+    unet: UNet2DConditionModel. vae: AutoencoderKL. image_encoder: CLIPVisionModelWithProjection. projection: of CLIP's
+    embedding and the pose. schedule: DDIMScheduler. layers: dropout behind the attention of `unet`.
+    """
+
+    unet: Network
+    vae: Network
+    image_encoder: Network
+    projection: nn.Linear
+    schedule: Any
+    layers: list[HeldDropout]
 
 
 class Zero123:
@@ -58,8 +97,8 @@ class Zero123:
 
     @classmethod
     def open(cls, folder: Path | str, guidance: float = GUIDANCE, device: str = "cpu") -> "Zero123":
-        """Raises: InputError: see zero123_weights.load_networks. ValueError: see __init__."""
-        return cls(zero123_weights.load_networks(folder), guidance, device)
+        """Raises: InputError: see load_networks. ValueError: see __init__."""
+        return cls(load_networks(folder), guidance, device)
 
     def sample(
         self, condition: Condition, m: int, p_drop: float, steps: int, seed: int, common: bool = True
@@ -80,35 +119,23 @@ class Zero123:
     def decode(self, latents: Float32[Array, "*n c hz wz"]) -> DecodedViews:
         """See `Prior`. There is no depth; opacity follows from the white background."""
         vae = self.networks.vae
+        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT))).to(self.device)
         with torch.inference_mode():
-            parts = [vae.decode(part / vae.config.scaling_factor).sample.cpu() for part in self._split(latents)]
+            parts = [vae.decode(part / vae.config.scaling_factor).sample.cpu() for part in flat.split(VAE_BATCH)]
         pictures = ((torch.cat(parts) + 1) / 2).clamp(0, 1).numpy().transpose(0, 2, 3, 1)
         return DecodedViews(remove_white(pictures).reshape(*latents.shape[:-3], SIZE, SIZE, 4), None)
 
     def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
         """See `Prior`: the render over white, the background of its pictures."""
         over_white = np.clip(condition.colour + (1 - condition.alpha)[..., None], 0, 1)
-        vae, parts = self.networks.vae, resize_photos(over_white).to(self.device).split(VAE_BATCH)
+        vae, parts = self.networks.vae, _to_tensor(over_white).to(self.device).split(VAE_BATCH)
         with torch.inference_mode():
             modes = [vae.encode(2 * part - 1).latent_dist.mode().cpu() for part in parts]
         return (torch.cat(modes) * vae.config.scaling_factor).numpy()
 
-    def estimate_variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
-        """See `Prior`."""
-        vae = self.networks.vae
-        scale = vae.config.scaling_factor
-        with torch.inference_mode():
-            pictures = (vae.decode(part / scale).sample for part in self._split(latents))
-            parts = [vae.encode(picture.clamp(-1, 1)).latent_dist.var.cpu() for picture in pictures]
-        return (torch.cat(parts) * scale**2).numpy().reshape(latents.shape)
-
-    def _split(self, latents: Float32[Array, "*n c hz wz"]) -> tuple[Tensor, ...]:
-        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT))).to(self.device)
-        return flat.split(VAE_BATCH)
-
     def _encode_condition(self, condition: Condition) -> tuple[Tensor, Tensor]:
         """The latents of the photos, and one token each."""
-        photo = resize_photos(condition.photo).to(self.device)
+        photo = _to_tensor(condition.photo).to(self.device)
         pose = (torch.from_numpy(condition.relative) * torch.tensor(POSE_FACTORS)).to(self.device)
         vae, clip = self.networks.vae, self.networks.image_encoder
         with torch.inference_mode():
@@ -131,15 +158,8 @@ class Zero123:
         return without + self.guidance * (conditional - without)
 
 
-def resize_photos(photo: Float32[Array, "b s s 3"]) -> Float[Tensor, "b 3 size size"]:
-    """Photos at the size of the VAE: area means of larger photos, bicubic interpolation of smaller ones."""
-    side = photo.shape[1]
-    if side > SIZE:
-        photo = np.stack([image_files.shrink_image(one, SIZE, SIZE) for one in photo])
-    planes = torch.from_numpy(np.ascontiguousarray(photo.transpose(0, 3, 1, 2)))
-    if side < SIZE:
-        planes = functional.interpolate(planes, (SIZE, SIZE), mode="bicubic", align_corners=False)
-    return planes.clamp(0, 1)
+def _to_tensor(pictures: Float32[Array, "b s s 3"]) -> Float[Tensor, "b 3 s s"]:
+    return torch.from_numpy(np.ascontiguousarray(pictures.transpose(0, 3, 1, 2)))
 
 
 def preprocess_for_clip(photo: Float[Tensor, "b 3 h w"], side: int) -> Float[Tensor, "b 3 side side"]:
@@ -157,3 +177,85 @@ def remove_white(pictures: Float32[Array, "n h w 3"]) -> Float32[Array, "n h w 4
     """
     opacity = np.clip((1 - pictures.min(-1, keepdims=True)) / np.float32(WHITE), 0, 1)
     return np.concatenate([pictures - (1 - opacity), opacity], -1).astype(np.float32).clip(0, 1)
+
+
+def load_networks(folder: Path | str) -> Zero123Networks:
+    """Load the networks in a folder.
+
+    Raises: InputError: there is no such folder or it holds another model; weights are pickles, cut short, missing,
+    superfluous, of another shape or type, not finite, or too large altogether, by name; transformers is missing.
+    """
+    folder = Path(folder)
+    projection_folder = _find_projection(folder)
+    files = {name: _find_weights(folder / name) for name in ("unet", "vae", "image_encoder", projection_folder)}
+    if (size := sum(file.stat().st_size for file in files.values())) > MOST_BYTES:
+        raise InputError(f"{folder}: {size / 2**30:.1f} GiB of weights are not those of Zero-1-to-3; {HELP}")
+    unet = _build_network(folder / "unet", UNet2DConditionModel.from_config)
+    vae = _build_network(folder / "vae", AutoencoderKL.from_config)
+    clip = _build_network(folder / "image_encoder", _clip_factory())
+    with torch.device("meta"):
+        projection = nn.Linear(clip.config.projection_dim + POSE, unet.config.cross_attention_dim)
+    prefix = PROJECTIONS[projection_folder]
+    weights.fill_weights(projection, files[projection_folder], lambda name: name.removeprefix(prefix), HELP)
+    for name, network in (("unet", unet), ("vae", vae), ("image_encoder", clip)):
+        weights.fill_weights(network, files[name], _modernize_name if name == "vae" else str, HELP)
+    for network in (projection, unet, vae, clip):
+        network.eval().requires_grad_(False)
+    embeddings = clip.vision_model.embeddings  # its one buffer is not among the weights
+    embeddings.position_ids = torch.arange(embeddings.position_ids.shape[-1])[None]
+    return Zero123Networks(unet, vae, clip, projection, DDIMScheduler(**SCHEDULE), dropout.replace_dropout(unet))
+
+
+def _find_projection(folder: Path) -> str:
+    if not folder.is_dir():
+        raise InputError(f"{folder}: there is no such folder, and weights are never fetched; {HELP}")
+    for name in PROJECTIONS:
+        if (folder / name).is_dir():
+            return name
+    index = folder / "model_index.json"
+    found = _read_config(index).get("_class_name", "something else") if index.is_file() else "no model of diffusers"
+    either = " or ".join(f"{name}/" for name in PROJECTIONS)
+    raise InputError(f"{folder}: holds {found}, not Zero-1-to-3 (it has no {either}); {HELP}")
+
+
+def _find_weights(folder: Path) -> Path:
+    names = [f"{stem}{variant}.safetensors" for variant in VARIANTS for stem in STEMS]
+    if found := [folder / name for name in names if (folder / name).is_file()]:
+        return found[0]
+    if pickles := sorted(p for kind in ("bin", "pt", "pth", "ckpt") for p in folder.glob(f"*.{kind}")):
+        raise InputError(f"{pickles[0]}: a pickle could run anything and is not read; convert it, {HELP}")
+    raise InputError(f"{folder}: there is no {names[0]} or {names[1]} in it; {HELP}")
+
+
+def _read_config(path: Path) -> dict[str, Any]:
+    values = read_json(path)
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: describes nothing; copy it again")
+    return values
+
+
+def _clip_factory() -> Callable[[dict[str, Any]], Network]:
+    """The function that builds CLIP's image encoder. transformers is imported here: only this prior needs it."""
+    try:
+        from transformers import CLIPVisionConfig, CLIPVisionModelWithProjection
+    except ImportError as error:
+        raise InputError(f"the prior zero123 needs transformers: pip install '{EXTRA}' ({error})") from error
+    return lambda config: CLIPVisionModelWithProjection(CLIPVisionConfig.from_dict(config))
+
+
+def _build_network(folder: Path, make: Callable[[dict[str, Any]], Network]) -> Network:
+    """Build the network of a config without allocating its weights."""
+    path = folder / "config.json"
+    config = _read_config(path)
+    try:
+        with torch.device("meta"):
+            return make(config)
+    except (TypeError, ValueError, KeyError, AttributeError, RuntimeError, ArithmeticError) as error:
+        raise InputError(f"{path}: describes no such network ({error}); copy it again") from error
+
+
+def _modernize_name(name: str) -> str:
+    """The present name of a weight of the VAE: names of its attention have changed in diffusers."""
+    if ".attentions." not in name:
+        return name
+    return ".".join(LEGACY_NAMES.get(part, part) for part in name.split("."))

@@ -31,8 +31,7 @@ class PriorConfig:
     """A prior and its sampling settings.
 
     samples: per pose. steps: of denoising. p_drop: attention dropout. weights: of LPIPS; None leaves its terms out.
-    staged: score all poses with few steps first, then the best in full. posterior: a sample is a distribution with the
-    variance of the coder, instead of a point. independent_noise: independent initial noise for each sample.
+    staged: score all poses with few steps first, then the best in full.
     """
 
     model: Prior
@@ -42,8 +41,6 @@ class PriorConfig:
     seed: int = 0
     weights: Weights | None = None
     staged: bool = True
-    posterior: bool = False
-    independent_noise: bool = False
 
 
 def open_scoring_prior(
@@ -61,9 +58,7 @@ def open_scoring_prior(
             "LPIPS is switched off: scores have no such term; see the keys `lpips` in docs/reference/config.md"
         )
     weights = None if lpips_file is None else read(lpips_file)
-    settings = {
-        name: entry[name] for name in ("samples", "steps", "staged", "posterior", "independent_noise") if name in entry
-    }
+    settings = {name: entry[name] for name in ("samples", "steps", "staged") if name in entry}
     return PriorConfig(load_prior(entry), p_drop=p_drop, seed=seed, weights=weights, **settings)
 
 
@@ -127,17 +122,15 @@ def _copy_for_threads(prior: PriorConfig, batches: int) -> list[PriorConfig]:
 def _sample_batch(
     prior: PriorConfig, condition: Condition, names: list[str], steps: int, masks: Float32[Array, "k s s"]
 ) -> PriorTerms:
-    arguments = condition, prior.samples, prior.p_drop, steps, prior.seed
-    latents = prior.model.sample(*arguments, common=not prior.independent_noise)
-    variances = prior.model.estimate_variances(latents) if prior.posterior else None
-    _, maps = w2_sq(latents, variances, names)
+    latents = prior.model.sample(condition, prior.samples, prior.p_drop, steps, prior.seed)
+    _, maps = w2_sq(latents, None, names)
     pictures = prior.model.decode(latents).rgba[..., :3]
     disagreement = single = None
     if prior.weights is not None:
         from dav_gswt.images import lpips  # not above: torch takes seconds to load, and most scoring does without
 
         disagreement = lpips.pairwise_mean((2 * pictures - 1) * masks[:, None, :, :, None], prior.weights)
-        if prior.p_drop == 0 and not prior.independent_noise:
+        if prior.p_drop == 0:
             one, render = ((2 * p - 1) * masks[..., None] for p in (pictures[:, 0], condition.colour))
             single = lpips.distance(one, render, prior.weights)
     residual = ((latents.mean(1) - prior.model.encode_render(condition)) ** 2).sum(1)

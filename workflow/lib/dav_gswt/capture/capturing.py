@@ -1,0 +1,126 @@
+"""The capture of a round: poses that an agent can attain, its photos, and capture.json."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt.capture.agents import AGENTS
+from dav_gswt.capture.store import PhotoStore
+from dav_gswt.field import GaussianField
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.poses import Pose
+from dav_gswt.geometry.scene_frame import SceneFrame
+from dav_gswt.images import image_files
+from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
+from dav_gswt.photos.lenses import undistort_scene_photo
+from dav_gswt.photos.view_split import ViewSplit
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.views import candidates as pools
+from dav_gswt.views import collision, feasibility
+from dav_gswt.views.candidates import Candidates
+
+RequestedPose = tuple[Pose, Camera]
+
+
+@dataclass(frozen=True)
+class Site:
+    """A scene to photograph.
+
+    name, scene: its name and entry in the config. photos: its photos/ folder. store: photos taken by devices and
+    people. field: the reconstruction so far, a .ply. shot_list_template: of the page that `handheld` writes.
+    requested: the cameras that this round and the earlier ones request; a dropped photo stored for one is in use.
+    """
+
+    name: str
+    scene: dict
+    frame: SceneFrame
+    photos: Path
+    store: PhotoStore
+    field: Path | str | None = None
+    shot_list_template: Path | str | None = None
+    requested: tuple[Camera, ...] = ()
+
+    @property
+    def unit(self) -> float:
+        """The flying height in world units."""
+        return self.frame.flying_height
+
+    def lacks_photo(self, camera: Camera) -> bool:
+        """Whether the store has no photo of a pose."""
+        return not self.store.photos_of(camera)
+
+
+@dataclass(frozen=True)
+class CaptureRequest:
+    """Poses to photograph.
+
+    remaining: all candidates that are not used yet, the requested ones included. folder: where the photos go.
+    """
+
+    site: Site
+    poses: list[RequestedPose]
+    remaining: Candidates
+    folder: Path
+
+
+def view_distance(a: Camera, b: Camera, unit: float) -> float:
+    """Distance of two views: between the centres in units of `unit` (the flying height), plus the angle between the
+    viewing directions in radians."""
+    angle = np.arccos(np.clip(a.forward @ b.forward, -1, 1))
+    return float(np.linalg.norm(a.centre - b.centre) / unit + angle)
+
+
+def filter_attainable(
+    scene: dict, frame: SceneFrame, grid: Ground, field: GaussianField, candidates: Candidates
+) -> Candidates:
+    """Keep the poses that the scene's agent reaches, that are feasible over the ground and not inside an object.
+
+    scene: its entry in the config. Photos that exist are all kept.
+    Raises: InputError: no pose is left.
+    """
+    agent = AGENTS[scene["agent"]]
+    if agent.pool:
+        return candidates
+    if agent.keep_reachable:
+        candidates = agent.keep_reachable(scene, frame, candidates)
+    clearance = feasibility.CLEARANCE * frame.flying_height
+    feasible = feasibility.filter_feasible(candidates, grid, scene.get("feasibility"), clearance)
+    return collision.drop_blocked(feasible, field, grid)
+
+
+def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[Pose], folder: Path) -> None:
+    """Fill `folder` with the photos of the chosen poses and with capture.json.
+
+    split: views.json. before: the capture folders of earlier rounds. chosen: the poses to photograph; if there is none
+    the agent is not called.
+    """
+    remaining = pools.list_remaining(site.scene, site.frame, site.photos / "sparse", split, before)
+    requested = pools.select_by_name(remaining, chosen)
+    earlier = [photo.requested for capture in before for photo in read_capture_record(capture)]
+    site = replace(site, requested=(*earlier, *(camera for _, camera in requested)))
+    folder.mkdir(parents=True, exist_ok=True)
+    photos = take_requested(CaptureRequest(site, requested, remaining, folder)) if requested else []
+    write_capture_record(folder, site.scene["agent"], photos)
+
+
+def take_requested(request: CaptureRequest) -> list[CapturedPhoto]:
+    """Have the scene's agent take photos. A device takes those that the store lacks; all are then undistorted."""
+    site, agent = request.site, AGENTS[request.site.scene["agent"]]
+    if not agent.device:
+        return agent.take(request)
+    with site.store.locked():
+        missing = [(pose, camera) for pose, camera in request.poses if site.lacks_photo(camera)]
+        if missing:
+            agent.take(site, missing)
+        return [_undistort_stored(request, pose, camera) for pose, camera in request.poses]
+
+
+def _undistort_stored(request: CaptureRequest, pose: Pose, camera: Camera) -> CapturedPhoto:
+    """Write a pose's oldest stored photo as its pinhole camera would have taken it."""
+    site, name = request.site, f"{pose.name}.png"
+    stored = site.store.photos_of(camera)[0]
+    picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera)
+    image_files.write_png(request.folder / name, picture)
+    distance = view_distance(camera, stored.camera, site.unit)
+    return CapturedPhoto(name, pose, camera, stored.camera, distance, stored.taken)
