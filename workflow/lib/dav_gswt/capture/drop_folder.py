@@ -12,7 +12,7 @@ from dav_gswt.capture.interface import RequestedPose, view_distance
 from dav_gswt.capture.site import Site
 from dav_gswt.files import digest_files
 from dav_gswt.images import image_files
-from dav_gswt.photos.exif import read_capture_time
+from dav_gswt.photos.photo_files import read_capture_time
 from dav_gswt.photos.sfm.localization import localize_photos
 
 _log = logging.getLogger(__name__)
