@@ -35,52 +35,56 @@ def _has_both(folder: Path, kind: str) -> bool:
 
 def import_colmap(folder: Path, photos: Path) -> ImportedModel:
     """Read a model. Raises: InputError: damaged, or what it says cannot be."""
-    stored = _read_reconstruction(folder)
+    kind = "bin" if _has_both(folder, "bin") else "txt"
+    files = {part: folder / f"{part}.{kind}" for part in _PARTS}
+    stored = _read_reconstruction(files)
     cameras = {
-        number: make_camera(c.model_name, c.width, c.height, tuple(c.params), f"{folder}: camera {number}")
+        number: make_camera(c.model_name, c.width, c.height, tuple(c.params), f"{files['cameras']}: camera {number}")
         for number, c in sorted(stored.cameras.items())
     }
     ids = np.array(sorted(stored.points3D), np.uint64)
     shots, references, owners, pixels = [], [], [], []
     for i, (_, image) in enumerate(sorted(stored.images.items())):
-        name = checks.check_image_name(image.name, photos, str(folder))
-        pose = check_finite(image.cam_from_world().matrix(), f"{folder}: image {name}")
+        name = checks.check_image_name(image.name, photos, str(files["images"]))
+        where = f"{files['images']}: image {name}"
+        pose = check_finite(image.cam_from_world().matrix(), where)
         shots.append(ImportedImage(name, cameras[image.camera_id], pose[:, :3].copy(), pose[:, 3].copy()))
         seen = image.get_observation_points2D() if len(ids) else []
         references.append(np.array([p.point3D_id for p in seen], np.uint64))
-        pixels.append(check_finite(np.array([p.xy for p in seen]).reshape(-1, 2), f"{folder}: image {name}"))
+        pixels.append(check_finite(np.array([p.xy for p in seen]).reshape(-1, 2), where))
         owners.append(np.full(len(seen), i))
-    check_distinct([s.name for s in shots], str(folder))
+    check_distinct([s.name for s in shots], str(files["images"]))
     if not shots or not len(ids):
         return ImportedModel(tuple(shots))
-    missing = ~np.isin(flat := np.concatenate(references), ids)
-    if missing.any():
-        raise InputError(f"{folder}: there is no point {flat[missing][0]}, which an image sees; export the model again")
-    points = check_finite(np.array([stored.points3D[int(i)].xyz for i in ids]), f"{folder}: points")
-    colours = (np.array([stored.points3D[int(i)].color for i in ids]) / 255).astype(np.float32)
-    place, owner = np.searchsorted(ids, flat), np.concatenate(owners)
-    return ImportedModel(tuple(shots), points, colours, place, owner, np.concatenate(pixels))
+    flat, owner = np.concatenate(references), np.concatenate(owners)
+    missing = np.flatnonzero(~np.isin(flat, ids))
+    if len(missing):
+        point, name = flat[missing[0]], shots[owner[missing[0]]].name
+        raise InputError(f"{files['points3D']}: has no point {point}, which {name} sees; export the model again")
+    points = [stored.points3D[int(i)] for i in ids]
+    places = check_finite(np.array([p.xyz for p in points]), str(files["points3D"]))
+    colours = (np.array([p.color for p in points]) / 255).astype(np.float32)
+    return ImportedModel(tuple(shots), places, colours, np.searchsorted(ids, flat), owner, np.concatenate(pixels))
 
 
-def _read_reconstruction(folder: Path) -> pycolmap.Reconstruction:
-    """The model by pycolmap, from a folder of links that has nothing else."""
+def _read_reconstruction(files: dict[str, Path]) -> pycolmap.Reconstruction:
+    """The model by pycolmap, from a folder of links to these files alone."""
     silence_pycolmap()
-    kind = "bin" if _has_both(folder, "bin") else "txt"
     with tempfile.TemporaryDirectory(prefix="colmap-") as links:
-        for part in _PARTS:
-            path, link = folder / f"{part}.{kind}", Path(links) / f"{part}.{kind}"
+        for part, path in files.items():
+            link = Path(links) / path.name
             if part == "points3D" and not path.is_file():
-                link.write_bytes(bytes(8) if kind == "bin" else b"")
+                link.write_bytes(bytes(8) if path.suffix == ".bin" else b"")
                 continue
             checks.check_size(path, checks.LARGEST)
-            if kind == "bin":
+            if path.suffix == ".bin":
                 _check_counts(path, part)
             link.symlink_to(path.absolute())
         try:
             return pycolmap.Reconstruction(links)
         except Exception as error:  # the library raises what its C++ does
-            why = summarize_error(error).replace(links, str(folder))
-            raise InputError(f"{folder}: not readable as a COLMAP model ({why}); copy or export it again") from error
+            where, why = files["images"].with_stem("*"), summarize_error(error).replace(f"{links}/", "")
+            raise InputError(f"{where}: not readable as a COLMAP model ({why}); copy or export it again") from error
 
 
 def _check_counts(path: Path, part: str) -> None:
