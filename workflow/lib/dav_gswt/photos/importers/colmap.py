@@ -48,7 +48,8 @@ def import_colmap(folder: Path, photos: Path) -> ImportedModel:
         name = checks.check_image_name(image.name, photos, str(files["images"]))
         where = f"{files['images']}: image {name}"
         pose = check_finite(image.cam_from_world().matrix(), where)
-        shots.append(ImportedImage(name, cameras[image.camera_id], pose[:, :3].copy(), pose[:, 3].copy()))
+        rotation = checks.nearest_rotation(pose[:, :3], where)
+        shots.append(ImportedImage(name, cameras[image.camera_id], rotation, pose[:, 3].copy()))
         seen = image.get_observation_points2D() if len(ids) else []
         references.append(np.array([p.point3D_id for p in seen], np.uint64))
         pixels.append(check_finite(np.array([p.xy for p in seen]).reshape(-1, 2), where))
@@ -99,13 +100,14 @@ def _check_counts(path: Path, part: str) -> None:
     try:
         for _ in range(take("Q")[0]):
             if part == "cameras":
-                at += 8 * _COUNTS[take("IiQQ")[1]]
+                rest = 8 * _COUNTS[take("IiQQ")[1]]
             elif part == "images":
                 take("I7dI")
                 at = data.index(b"\0", at, at + checks.LONGEST_NAME) + 1
-                at += 24 * take("Q")[0]
+                rest = 24 * take("Q")[0]
             else:
-                at += 8 * take("Q3d3BdQ")[-1]
+                rest = 8 * take("Q3d3BdQ")[-1]
+            at += rest
     except (struct.error, KeyError, ValueError):
         at = -1
     if at != len(data):

@@ -1,7 +1,7 @@
 """Reader of transforms.json of nerfstudio and instant-ngp: OpenGL camera axes, intrinsics for all frames or for each.
 
-Where a program moved the world (`applied_transform`, `applied_scale`), the move is undone, so the world is that of the
-model from which the file was made. Pixel centres are at half integers, as in COLMAP.
+Moves of the world (`applied_transform`, `applied_scale`) are not undone, as the ground frame does not depend on them.
+Pixel centres are at half integers, as in COLMAP.
 """
 
 import math
@@ -43,13 +43,12 @@ def import_nerfstudio(
     size_of: of a photo by its name, for files that give no size. Raises: InputError: with file, frame and key.
     """
     frames = check_entry(values, "frames", list, str(path))
-    world, scale = _read_world_transform(values, path)
     shots, lens_of = [], {}
     for i, frame in enumerate(frames):
         label = check_entry(frame, "file_path", str, f"{path}: frame {i}")
         name = check_image_name(label, photos, f"{path}: frame {i}")
         where = f"{path}: frame {name}"
-        rotation, translation = _pose(frame, world, scale, where)
+        rotation, translation = _pose(frame, where)
         intrinsics = _intrinsics(values, frame, name, size_of, where)
         if intrinsics is not None and intrinsics not in lens_of:
             lens_of[intrinsics] = _lens(dict(intrinsics), where)
@@ -58,43 +57,16 @@ def import_nerfstudio(
     return ImportedModel(tuple(shots))
 
 
-def _read_world_transform(values: dict, path: Path) -> tuple[Float[Array, "4 4"], float]:
-    """What undoes the moves of the world: a rigid matrix after lengths are divided by a scale."""
-    matrix, scale = np.eye(4), 1.0
-    if values.get("applied_transform") is not None:
-        where = f"{path}: applied_transform"
-        matrix = _check_affine(values["applied_transform"], where)
-        determinant = float(np.linalg.det(matrix[:3, :3]))
-        if not determinant > 1e-18:
-            raise InputError(f"{where} mirrors or flattens the world; export the file again")
-        scale = determinant ** (1 / 3)
-        matrix[:3, :3] = nearest_rotation(matrix[:3, :3] / scale, where)
-        matrix[:3, 3] /= scale
-    if values.get("applied_scale") is not None:
-        factor = check_number(values["applied_scale"], f"{path}: applied_scale")
-        if not factor > 1e-9:
-            raise InputError(f"{path}: applied_scale is {factor:g}; it must be positive")
-        scale *= factor
-    back = np.eye(4)
-    back[:3, :3], back[:3, 3] = matrix[:3, :3].T, -matrix[:3, :3].T @ matrix[:3, 3]
-    return back, scale
-
-
-def _check_affine(values, where: str) -> Float[Array, "4 4"]:
-    """A matrix of three rows, or of four of which the last is 0 0 0 1."""
-    rows = 4 if isinstance(values, list) and len(values) == 4 else 3
+def _pose(frame: dict, where: str) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
+    """Rotation and translation into the camera, with x right and y down."""
+    values, where = check_entry(frame, "transform_matrix", list, where), f"{where}: transform_matrix"
+    rows = 4 if len(values) == 4 else 3
     matrix = np.eye(4)
     matrix[:rows] = check_numbers(values, (rows, 4), where)
     if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
         raise InputError(f"{where}: its last row is not 0 0 0 1; export the file again")
-    return matrix
-
-
-def _pose(frame: dict, world: Array, scale: float, where: str) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
-    """Rotation and translation into the camera, with x right and y down, from the undone world."""
-    matrix = _check_affine(check_entry(frame, "transform_matrix", list, where), f"{where}: transform_matrix")
-    turn = world[:3, :3] @ nearest_rotation(matrix[:3, :3], f"{where}: transform_matrix") * OPENGL
-    return turn.T, -turn.T @ (world[:3, :3] @ matrix[:3, 3] / scale + world[:3, 3])
+    turn = nearest_rotation(matrix[:3, :3], where) * OPENGL
+    return turn.T, -turn.T @ matrix[:3, 3]
 
 
 def _intrinsics(values: dict, frame: dict, name: str, size_of: Callable, where: str) -> tuple | None:
