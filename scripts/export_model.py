@@ -3,8 +3,8 @@
 from dav_gswt.export import photo_model
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
+from dav_gswt.photos.capture_record import list_taken_photos
 from dav_gswt.photos.colmap_model import read_colmap_model
-from dav_gswt.photos.taken_photos import list_taken_photos
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction.regression_guard import list_rejected_photos
 

@@ -5,8 +5,7 @@ import numpy as np
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.colmap_model import read_colmap_model
-from dav_gswt.photos.splitting import split_views
-from dav_gswt.photos.view_split import write_view_split
+from dav_gswt.photos.view_split import split_views, write_view_split
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params

@@ -43,11 +43,10 @@ from dav_gswt.files import write_json
 from dav_gswt.geometry.camera_layouts import orbit
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files, lpips_weights
-from dav_gswt.photos import exif, importers
+from dav_gswt.photos import importers, photo_files
 from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
 from dav_gswt.photos.importers.colmap import import_colmap
 from dav_gswt.photos.importers.photo_matching import PhotoFolder
-from dav_gswt.photos.importers.point_ply import read_point_ply
 from dav_gswt.prior import weights
 
 pytestmark = pytest.mark.slow
@@ -89,20 +88,6 @@ def write_fields(folder: Path) -> None:
     PlyData(parts, byte_order=">").write(str(folder / "big.ply"))
 
 
-def write_clouds(folder: Path) -> None:
-    kinds = [*((axis, "f8") for axis in "xyz"), *((colour, "u1") for colour in ("red", "green", "blue"))]
-    rows = np.zeros(20, kinds)
-    for k, axis in enumerate("xyz"):
-        rows[axis] = np.arange(20) * 0.1 + k
-    for text in (False, True):
-        PlyData([PlyElement.describe(rows, "vertex")], text=text).write(str(folder / f"{text}.ply"))
-
-
-def is_cloud(read) -> bool:
-    places, colours = read
-    return all_finite(places, colours) and colours.min(initial=0) >= 0 and colours.max(initial=1) <= 1
-
-
 def write_pictures(folder: Path) -> None:
     """A small picture in every format that photos may have here."""
     pixels = np.arange(24 * 16 * 3, dtype=np.uint8).reshape(16, 24, 3)
@@ -114,8 +99,8 @@ def write_pictures(folder: Path) -> None:
 
 
 def read_header(path: Path):
-    times = exif.read_capture_time(path)
-    return exif.read_focal_length(path), exif.read_gps_position(path), times, image_files.read_size(path)
+    times = photo_files.read_capture_time(path)
+    return photo_files.read_focal_length(path), photo_files.read_gps_position(path), times, image_files.read_size(path)
 
 
 def is_header(found) -> bool:
@@ -179,7 +164,6 @@ def is_network(facts) -> bool:
 
 READERS = [
     Reader("fields (PLY)", write_fields, read_field, is_sound, 900),
-    Reader("point clouds (PLY)", write_clouds, read_point_ply, is_cloud, 300),
     Reader("EXIF", lambda folder: shutil.copy(PHOTO, folder / "a.jpg"), read_header, is_header, 3000),
     Reader(
         "photos",

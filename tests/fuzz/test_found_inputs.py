@@ -25,7 +25,6 @@ from dav_gswt.geometry.poses import Pose
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import read_capture_record
-from dav_gswt.photos.importers.point_ply import read_point_ply
 from dav_gswt.photos.lenses import read_lenses
 from dav_gswt.photos.training_views import read_captured_views
 from dav_gswt.photos.view_split import read_view_split
@@ -44,9 +43,6 @@ SHOT |= {"asked_to_got": 0.0, "taken": None}
 LENS = {"model": "PINHOLE", "width": 8, "height": 6, "params": [9, 9, 4, 3], "pinhole": [9, 9, 4, 3, 8, 6]}
 SELECTION = {"policy": "farthest", "k": 1, "poses": [asdict(POSE)]}
 SCORES = f"{','.join(FIELDS)}\na,{{}},1,1,{{}},,,,,,,{{}},1,,,,,,\n"
-PLY = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
-PLY += "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n1 2 3 0 999 0\n"
-
 
 def read_found(path: Path):
     """Read a file by its name, as the workflow does."""
@@ -58,7 +54,6 @@ def read_found(path: Path):
         "lenses.json": lambda path: read_lenses(path.parent),
         "scores.json": read_frozen_scales,
         "scores.csv": read_scores,
-        "cloud.ply": read_point_ply,
         "config.yaml": lambda path: check_config(read_config([path])),
     }[path.name](path)
 
@@ -93,7 +88,6 @@ def camera(**changes) -> dict:
         ("scores.csv", SCORES.format("nan", 1, 1), "a pose is not finite"),
         ("scores.csv", "pose\udcff", "not a table of scores"),
         ("scores.csv", '"' + "x" * 200_000, "not a table of scores"),
-        ("cloud.ply", PLY, "not readable as a PLY"),
         ("config.yaml", "seeds: 2001-99-99\n", "not YAML"),
         ("config.yaml", "k: 0b_\n", "not YAML"),
         ("config.yaml", "k: " + "[" * 3000 + "\n", "not YAML"),

@@ -7,16 +7,16 @@ import numpy as np
 import pycolmap
 import pytest
 from fixtures import photos as synth
+from plyfile import PlyData
 
 from dav_gswt.errors import InputError
 from dav_gswt.export import photo_model
 from dav_gswt.files import digest_files
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
-from dav_gswt.photos.capture_record import CapturedPhoto, write_capture_record
+from dav_gswt.photos.capture_record import CapturedPhoto, list_taken_photos, write_capture_record
 from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
-from dav_gswt.photos.taken_photos import list_taken_photos
 from dav_gswt.photos.view_split import ViewSplit
 
 HALF = 1.0
@@ -103,8 +103,10 @@ def test_the_importer_reads_the_poses_of_transforms_json_back(written, taken):
         assert shot.translation == pytest.approx(camera.translation, abs=1e-9)
         assert shot.lens.params == pytest.approx(np.array([camera.fx, camera.fy, camera.cx, camera.cy]))
     stored = read_colmap_model(written / "sparse/0")
-    assert read.points == pytest.approx(stored.points, abs=1e-6)
-    assert read.colours == pytest.approx(stored.colours, abs=1e-6)
+    rows = PlyData.read(str(written / "sparse_pc.ply"))["vertex"].data
+    assert np.stack([rows[axis] for axis in "xyz"], -1) == pytest.approx(stored.points, abs=1e-6)
+    colours = np.stack([rows[name] for name in ("red", "green", "blue")], -1)
+    assert colours / 255 == pytest.approx(stored.colours, abs=1e-6)
 
 
 def test_photos_that_test_have_a_folder_of_their_own(written, known):

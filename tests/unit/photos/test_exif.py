@@ -1,4 +1,4 @@
-"""Focal lengths, positions and times from EXIF, by hand."""
+"""Focal lengths, positions and times from EXIF, by hand, and names of pictures."""
 
 import struct
 
@@ -6,7 +6,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from dav_gswt.photos.exif import read_capture_time, read_focal_length, read_gps_position
+from dav_gswt.photos.photo_files import name_pictures, read_capture_time, read_focal_length, read_gps_position
 
 
 def photo(path, width, height, **tags):
@@ -109,3 +109,16 @@ def test_a_position_has_degrees_minutes_and_seconds_and_signs(tmp_path):
 def test_a_time_is_read_where_there_is_one(tmp_path):
     assert read_capture_time(located(tmp_path / "a.jpg")) == "2024-05-17T08:09:10"
     assert read_capture_time(photo(tmp_path / "b.jpg", 4, 3, DateTimeOriginal="yesterday")) is None
+
+
+@pytest.mark.parametrize(
+    ("names", "pictures"),
+    [
+        (["a.jpg", "a.png", "a_png.jpg"], ["a_jpg.png", "a_png.png", "a_png_2.png"]),
+        (["one/a.jpg", "two/a.jpg"], ["one_a_jpg.png", "two_a_jpg.png"]),
+        (["a b.jpg", "a_b.jpg", "#1\t.jpg"], ["a_b_jpg.png", "a_b_jpg_2.png", "_1_.png"]),
+        (["flight.2024.jpg"], ["flight.2024.png"]),
+    ],
+)
+def test_every_photo_has_a_name_of_its_own_in_one_word(names, pictures):
+    assert name_pictures(names) == pictures

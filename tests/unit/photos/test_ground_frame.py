@@ -16,8 +16,8 @@ from dav_gswt.photos.ground_frame import (
     find_largest_square,
     find_visible_points,
     fit_ground_frame,
+    fit_plane,
 )
-from dav_gswt.photos.planes import fit_plane
 
 
 @pytest.fixture
@@ -176,7 +176,7 @@ def test_points_that_fix_no_plane_are_refused(points, rng):
 def test_the_plane_has_the_same_bits_whatever_the_threads_of_blas(root):
     code = """if True:
         import numpy as np
-        from dav_gswt.photos.planes import fit_plane
+        from dav_gswt.photos.ground_frame import fit_plane
         points = np.random.default_rng(1).normal(size=(200_003, 3)) * [1, 1, 0.01]
         normal, offset, spread = fit_plane(points, np.random.default_rng(0))
         print(*(value.hex() for value in (*normal.tolist(), offset, spread)))

@@ -1,7 +1,5 @@
 """Masks: what they hide in pictures and views, and which are refused."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pycolmap
 import pytest
@@ -10,9 +8,8 @@ from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos import masks
-from dav_gswt.photos.folder import write_photo_folder
-from dav_gswt.photos.masks import undistort_masks
+from dav_gswt.photos.photo_set import MARGIN, undistort_masks, write_photo_folder
+from dav_gswt.photos.sfm.registration import Registration
 from dav_gswt.photos.training_views import read_training_view
 
 
@@ -24,7 +21,7 @@ def found(tmp_path):
     params = [camera.fx, camera.fy, camera.cx, camera.cy]
     lens = pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
     one = synth.model([camera], np.zeros((1, 3)))
-    return SimpleNamespace(model=one, sources=(tmp_path / "photo.png",), lenses=(lens,))
+    return Registration(one, (tmp_path / "photo.png",), (lens,), (), None, 0.0)
 
 
 def masked(tmp_path, name="photo.png", shape=(120, 160)):
@@ -39,14 +36,14 @@ def masked(tmp_path, name="photo.png", shape=(120, 160)):
 @pytest.mark.parametrize("name", ["photo.png", "photo.png.png"])
 def test_black_does_not_count_nor_does_its_edge(found, tmp_path, name):
     cover = undistort_masks(found, masked(tmp_path, name))["000.png"]
-    assert not cover[:, : 160 + masks.MARGIN].any()
-    assert cover[:, 160 + masks.MARGIN + 1 :].all()
+    assert not cover[:, : 160 + MARGIN].any()
+    assert cover[:, 160 + MARGIN + 1 :].all()
 
 
 def test_masks_go_with_the_pictures_as_their_alpha_and_views_do_not_count_them(found, tmp_path):
     covers = undistort_masks(found, masked(tmp_path))
     picture = np.random.default_rng(0).uniform(0, 1, (240, 320, 3)).astype(np.float32)
-    write_photo_folder(tmp_path / "photos", found.model, [("000.png", picture)], scene_frame(), None, covers)
+    write_photo_folder(tmp_path / "photos", found.model, [("000.png", picture)], scene_frame(), (), covers)
     path = tmp_path / "photos" / "images" / "000.png"
     np.testing.assert_allclose(image_files.read_photo(path), picture, atol=0.5 / 255 + 1e-6)  # also under the mask
     for size in (320, 160):

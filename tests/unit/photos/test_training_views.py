@@ -1,15 +1,18 @@
 """Training views: their pixels, in memory and in files."""
 
+import gc
+import os
 from dataclasses import replace
 
 import numpy as np
+import psutil
 import pytest
 from fixtures import ground as made
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos.array_file import ArrayFile
-from dav_gswt.photos.training_views import mask_outside_ground, read_training_view
+from dav_gswt.photos import training_views
+from dav_gswt.photos.training_views import ArrayFile, mask_outside_ground, read_training_view, release_pages
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.fit_settings import CoarseSettings
 
@@ -58,3 +61,59 @@ def test_a_fit_is_the_same_from_files_to_the_bit(filed):
     ]
     for name, array in vars(fields[0]).items():
         assert np.array_equal(array, getattr(fields[1], name)), name
+
+
+@pytest.fixture
+def arrays(tmp_path):
+    return ArrayFile(tmp_path / "made")
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.random.default_rng(0).normal(size=(7, 5, 3)).astype(np.float32),
+        np.zeros((0, 3), np.float32),
+        np.arange(12).reshape(3, 4).T,
+        np.array([True, False]),
+    ],
+)
+def test_an_array_of_any_kind_comes_back_as_it_was(arrays, array):
+    stored = arrays.store(array)
+    assert stored.dtype == array.dtype and np.array_equal(stored, array)
+    assert not stored.size or not stored.flags.writeable
+
+
+def test_arrays_larger_than_a_segment_have_files_of_their_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(training_views, "SEGMENT", 1 << 16)
+    arrays = ArrayFile(tmp_path)
+    given = [np.full(size, size, np.int64) for size in (100, 40_000, 200)]
+    stored = [arrays.store(array) for array in given]
+    assert all(np.array_equal(a, b) for a, b in zip(stored, given, strict=True))
+
+
+def test_the_room_of_an_array_that_is_gone_is_used_again(arrays):
+    first = arrays.store(np.zeros(5000))
+    view = first[:3]
+    del first
+    gc.collect()
+    second = arrays.store(np.ones(5000))  # a view of the first one is left
+    assert view.max() == 0
+    del view
+    gc.collect()
+    end = arrays._segments[0].end
+    third = arrays.store(np.full(5000, 2.0))
+    assert arrays._segments[0].end == end and second.min() == 1 and third.max() == 2
+
+
+def test_released_pages_take_no_memory_and_read_as_before(arrays):
+    stored = [arrays.store(np.full(1_000_000, i, np.float64)) for i in range(20)]
+    process = psutil.Process(os.getpid())
+    assert [array.sum() for array in stored] == [i * 1e6 for i in range(20)]
+    full = process.memory_info().rss
+    for array in stored:
+        release_pages(array[10:20])  # by any view of it
+    assert full - process.memory_info().rss > 100e6
+    assert [array[-1] for array in stored] == list(range(20))
+    array = np.arange(5.0)
+    release_pages(array[1:])
+    assert array.sum() == 10

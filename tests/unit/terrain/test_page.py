@@ -10,7 +10,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, read_scene_frame, write_scene_frame
 from dav_gswt.images import image_files
-from dav_gswt.photos.taken_photos import TakenPhoto
+from dav_gswt.photos.capture_record import TakenPhoto
 from dav_gswt.terrain import page, page_front, page_story
 from dav_gswt.terrain.heights import HeightMap
 from dav_gswt.terrain.page import write_page

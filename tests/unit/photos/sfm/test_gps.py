@@ -9,8 +9,9 @@ from fixtures import photos as synth
 
 from dav_gswt.errors import InputError
 from dav_gswt.photos.colmap_model import measure_parallax, triangulate_model, write_colmap_model
-from dav_gswt.photos.sfm import focal_length, gps
-from dav_gswt.photos.sfm.registration import _find_up
+from dav_gswt.photos.sfm import gps
+from dav_gswt.photos.sfm.mapping import OBLIQUE, settle_focal_length
+from dav_gswt.photos.sfm.registration import _find_up, require_parallax
 
 HEIGHT = 40.0  # metres: a flying height
 
@@ -112,13 +113,13 @@ def oblique(count=9):
 
 
 def settle(best, held, hold=False):
-    return focal_length.settle_focal_length(best, held, np.random.default_rng(0), hold)
+    return settle_focal_length(best, held, np.random.default_rng(0), hold)
 
 
 def test_oblique_views_fix_a_focal_length_that_exif_has_wrong(reconstruct):
     best = reconstruct(oblique(), 1.08 * synth.FOCAL)
     found = settle(best, {1: 1.08 * synth.FOCAL})
-    assert "from the side" in found.decision and found.tilt > focal_length.OBLIQUE
+    assert "from the side" in found.decision and found.tilt > OBLIQUE
     assert found.used == found.free == best.cameras[1].focal_length == pytest.approx(synth.FOCAL, rel=1e-3)
     assert found.exif == pytest.approx(1.08 * synth.FOCAL)
     assert best.compute_mean_reprojection_error() < 0.01  # points and poses went with it
@@ -146,7 +147,7 @@ def test_photos_from_one_spot_are_refused():
     for step, fits in ((0.2, True), (0.005, False)):
         spread = measure_parallax(synth.model(synth.flight(2, 2, step), synth.plain(50, 0.3, np.random.default_rng(0))))
         if fits:
-            focal_length.require_parallax(spread)
+            require_parallax(spread)
         else:
             with pytest.raises(InputError, match="one spot"):
-                focal_length.require_parallax(spread)
+                require_parallax(spread)

@@ -11,10 +11,17 @@ from fixtures import photos as synth
 from dav_gswt.files import write_json
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import write_colmap_model
-from dav_gswt.photos.sfm import features, localization, pairs
-from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
+from dav_gswt.photos.sfm import features, localization
+from dav_gswt.photos.sfm.features import (
+    compare_descriptions,
+    describe_photos,
+    enter_camera,
+    enter_image,
+    extract_features,
+    match_photos,
+    select_pairs,
+)
 from dav_gswt.photos.sfm.localization import localize_photos
-from dav_gswt.photos.sfm.pairs import compare_descriptions, describe_photos, select_pairs
 
 
 @pytest.fixture
@@ -36,7 +43,7 @@ def find_and_match(photos, name):
     database = photos / name / "database.db"
     database.write_bytes((photos / "database.db").read_bytes())
     extract_features(photos, database, 320, 300, 1)
-    match_photos(4, database, 0, 1, 0)
+    match_photos(4, database, 9, 1, 0)
     with closing(pycolmap.Database.open(database)) as store:
         found = [store.read_keypoints(i) for i in range(1, 5)]
         return found + [store.read_two_view_geometry(i, j).inlier_matches for i in range(1, 5) for j in range(i + 1, 5)]
@@ -72,7 +79,7 @@ def test_photos_that_overlap_are_matched_whatever_their_names():
 def test_all_photos_hang_together(monkeypatch):
     rng = np.random.default_rng(1)
     apart = [rng.integers(0, 255, (60, 128)).astype(np.uint8) for _ in range(25)]
-    monkeypatch.setattr(pairs, "NEXT", 0)  # whatever their names
+    monkeypatch.setattr(features, "NEXT", 0)  # whatever their names
     found = select_pairs(apart, 1, 0)
     group = {0}
     for _ in range(25):

@@ -16,10 +16,9 @@ from dav_gswt.geometry.scene_frame import SfmSign, SfmVerdict, read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
 from dav_gswt.photos.photo_set import prepare_photos
-from dav_gswt.photos.sfm import gps, registration, solution
-from dav_gswt.photos.sfm.mapping import Approach
+from dav_gswt.photos.sfm import gps, mapping, registration
+from dav_gswt.photos.sfm.mapping import Approach, SfmPhoto
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_image
-from dav_gswt.photos.sfm.solution import SfmPhoto
 
 HALF = 1.0  # of the made-up ground
 FILM = synth.FOCAL / np.hypot(synth.WIDTH, synth.HEIGHT) * 43.2666  # 35 mm equivalent of the made-up camera
@@ -96,7 +95,7 @@ def test_all_photos_find_the_places_they_were_taken_from(registered, photos):
     assert apart(registered.model.cameras, flight()) < 0.005
     assert registered.error < 0.7 and np.median(reprojection_errors(registered.model)) < 0.7
     assert registered.verdict.grade == "good" and registered.verdict.tried == ("incremental mapping: good",)
-    assert registered.focal_ratio == pytest.approx(1, abs=1e-12)
+    assert registered.focal.ratio == pytest.approx(1, abs=1e-12)
     assert registered.model.cameras[0].fx == pytest.approx(synth.FOCAL * round(FILM) / FILM, rel=1e-4)
 
 
@@ -152,7 +151,7 @@ def test_photos_with_and_without_exif_go_together(tmp_path, ground):
     for i, camera in enumerate(flight()):
         as_jpeg(tmp_path / f"{i:03d}.jpg", camera, ground, exif=bool(i % 2))
     found = register_photos(tmp_path, replace(OPTIONS, features=1024))
-    assert found.focal_ratio == pytest.approx(1, abs=0.02) and found.model.names == NAMES
+    assert found.focal.ratio == pytest.approx(1, abs=0.02) and found.model.names == NAMES
     assert [c.fx for c in found.model.cameras] == pytest.approx([synth.FOCAL] * 8, rel=0.02)
     assert all(lens.params[3] != 0 for lens in found.lenses)
 
@@ -222,7 +221,7 @@ def test_positions_are_priors_of_mapping_unless_they_contradict_the_photos(photo
     locate(at)
     priors = Approach("incremental", hold_focal=True, use_gps=True)
     with monkeypatch.context() as patch:
-        patch.setattr(registration, "find_solution", lambda scene, _, seed: solution._solve(priors, scene, seed))
+        patch.setattr(registration, "find_solution", lambda scene, _, seed: mapping._solve(priors, scene, seed))
         found = register_photos(photos, OPTIONS)
     assert found.model.names == NAMES and found.verdict.grade == "good"
     back = WORLD.to_world(found.positions.about.to_earth(np.array([c.centre for c in found.model.cameras])))
@@ -253,4 +252,4 @@ def test_without_exif_the_focal_length_is_found_and_a_photo_of_something_else_is
     ((name, reason),) = found.left_out
     assert name == "other.png" and "matches no photo" in reason and found.model.names == NAMES
     # The guess is 28 % long; heights that differ by a fifth fix it to about the noise of features.
-    assert found.focal_ratio is None and found.model.cameras[0].fx == pytest.approx(synth.FOCAL, rel=0.02)
+    assert found.focal.ratio is None and found.model.cameras[0].fx == pytest.approx(synth.FOCAL, rel=0.02)

@@ -7,8 +7,8 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import FocalLength, SfmSign, SfmVerdict
-from dav_gswt.photos.sfm import solution
-from dav_gswt.photos.sfm.mapping import Approach, list_alternatives
+from dav_gswt.photos.sfm import mapping
+from dav_gswt.photos.sfm.mapping import Approach, SfmPhoto, SfmScene, SfmSolution, list_alternatives
 
 
 def verdict(grade: str, *names: str) -> SfmVerdict:
@@ -40,11 +40,11 @@ def solutions(monkeypatch):
             if verdicts[len(asked) - 1] is None:
                 raise InputError(f"way {len(asked)} places nothing")
             focal = FocalLength(300.0, 330.0, 330.0, 30.0, "freed")
-            return solution.SfmSolution(Placed(placed[len(asked) - 1]), (), focal, verdicts[len(asked) - 1], unsure)
+            return SfmSolution(Placed(placed[len(asked) - 1]), (), focal, verdicts[len(asked) - 1], unsure)
 
-        monkeypatch.setattr(solution, "_solve", solve)
-        scene = solution.SfmScene("folder", [], {1: 300.0}, None, Path("database.db"))
-        return solution.find_solution(scene, "incremental", 0), asked
+        monkeypatch.setattr(mapping, "_solve", solve)
+        scene = SfmScene("folder", [], {1: 300.0}, None, Path("database.db"))
+        return mapping.find_solution(scene, "incremental", 0), asked
 
     return give
 
@@ -72,7 +72,7 @@ def test_the_other_mapper_does_not_win_with_a_worse_model(solutions):
 
 
 def test_where_the_first_way_gives_no_model_others_are_tried(solutions, monkeypatch):
-    monkeypatch.setattr(solution, "_read_pairs", lambda _: [(0, 1, 50)])
+    monkeypatch.setattr(mapping, "_read_pairs", lambda _: [(0, 1, 50)])
     found, asked = solutions(None, verdict("doubtful", "tilt"), verdict("good"))
     assert asked[1:] == [Approach("incremental", hold_focal=True), Approach("global", hold_focal=True)]
     assert found.verdict.grade == "good" and found.verdict.tried[0] == "incremental mapping: way 1 places nothing"
@@ -83,16 +83,16 @@ def test_photos_left_out_alone_ask_for_no_other_way(solutions):
 
 
 def test_photos_none_of_which_match_are_mapped_once(solutions, monkeypatch):
-    monkeypatch.setattr(solution, "_read_pairs", lambda _: [(0, 1, 12)])
+    monkeypatch.setattr(mapping, "_read_pairs", lambda _: [(0, 1, 12)])
     with pytest.raises(InputError, match="way 1 places nothing"):
         solutions(None)
 
 
 def test_photos_without_a_place_are_named_with_what_they_share():
-    photos = [solution.SfmPhoto(Path(f"{i}.jpg"), f"{i}.png", (4, 3), 4, 3, None) for i in range(5)]
-    shared = solution._count_shared(Placed(2), [(0, 1, 90), (0, 2, 40), (2, 1, 50), (2, 3, 70), (4, 0, 1)])
-    assert shared == {2: 50, 4: 1}
-    (two, three, four) = solution._left_out(photos, Placed(2), shared)
+    photos = [SfmPhoto(Path(f"{i}.jpg"), f"{i}.png", (4, 3), 4, 3, None) for i in range(5)]
+    pairs = [(0, 1, 90), (0, 2, 40), (2, 1, 50), (2, 3, 70), (4, 0, 1)]
+    (two, three, four), unsure = mapping.explain_left_out(photos, {0, 1}, pairs)
+    assert unsure == 1
     assert two[0] == "2.jpg" and "shares 50 points" in two[1]
     assert three[0] == "3.jpg" and "matches no photo" in three[1] and "shares 1 points" in four[1]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from dav_gswt.capture.capturing import RequestedPose, Site, view_distance
 from dav_gswt.files import digest_files
 from dav_gswt.images import image_files
-from dav_gswt.photos.exif import read_capture_time
+from dav_gswt.photos.photo_files import read_capture_time
 from dav_gswt.photos.sfm.localization import localize_photos
 
 _log = logging.getLogger(__name__)

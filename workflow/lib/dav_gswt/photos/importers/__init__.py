@@ -1,7 +1,8 @@
 """Import of camera models, which take the place of structure from motion.
 
 `import_model` takes a folder of COLMAP, a transforms.json (nerfstudio, instant-ngp) or a reconstruction.json (OpenSfM,
-OpenDroneMap), and returns a `Registration`. Positions stay in the world of the model, metric if it is.
+OpenDroneMap), and returns a `Registration`. Positions stay in the world of the model. A further format needs a reader
+that returns an `ImportedModel`, and a line in `_read_model`.
 """
 
 import logging
@@ -10,44 +11,32 @@ from pathlib import Path
 
 import numpy as np
 import pycolmap
-from jaxtyping import Float, Float32
-from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.photos.colmap_model import ColmapModel
-from dav_gswt.photos.importers.checks import read_untrusted_json
+from dav_gswt.photos.importers.checks import ImportedModel, read_untrusted_json
 from dav_gswt.photos.importers.colmap import find_colmap_folder, import_colmap
-from dav_gswt.photos.importers.imported_model import ImportedModel
 from dav_gswt.photos.importers.lens_models import camera_key, undistort_camera
 from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.opensfm import import_opensfm
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder, match_photos_to_images
-from dav_gswt.photos.importers.points import (
-    Observations,
-    collect_observations,
-    find_visible_points,
-    keep_observations,
-    triangulate_features,
-)
+from dav_gswt.photos.importers.points import Observations, collect_observations, triangulate_features
 from dav_gswt.photos.sfm.gps import GpsPositions
+from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions
-from dav_gswt.photos.sfm.solution import LEAST_PHOTOS
 
 __all__ = ["import_model"]
 
 _log = logging.getLogger(__name__)
-
-MOST_LOOSE = 50_000  # points that no image is known to see
 
 
 def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> Registration:
     """The photos of a folder with the cameras of a model.
 
     A photo belongs to the image of the same name: the path below the folder, else the file name, else the stem. It may
-    be a scaled copy. Where the model says who sees which point, these are its points; else they are triangulated from
-    features under the given cameras, and points that the model gives without observations follow as they are, for they
-    tell where ground is.
+    be a scaled copy. The points are those of the model if it says which image sees them. Otherwise they are
+    triangulated from features under the given cameras.
     Raises: InputError: not a model, damaged, one that is not read, or fewer than three photos have a camera in it.
     """
     path, photos = Path(path), PhotoFolder(Path(folder))
@@ -68,8 +57,6 @@ def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> R
             f"{path}: under its cameras the photos share no point; either they are not those that the model was made "
             "of, or they show too little texture"
         )
-    if not len(given.point_of):
-        model = _with_loose(model, *_thin_points(given.points, given.colours, placed))
     centres = np.stack([camera.centre for camera in model.cameras])
     return Registration(
         model=model,
@@ -121,51 +108,23 @@ def _make_sparse_model(
         np.array(column, float)
         for column in zip(*((p.params[:2], p.params[2:], (p.width, p.height)) for p in pinholes), strict=True)
     )
-    own = seen.image_of
-    pixels = seen.rays * focal[own] + middle[own]
+    pixels = seen.rays * focal[seen.image_of] + middle[seen.image_of]
     with np.errstate(invalid="ignore"):
-        inside = np.asarray((pixels >= 0).all(1) & (pixels <= size[own]).all(1))
-    kept = keep_observations(seen, inside)
-    order = np.lexsort((kept.image_of, kept.point_of))
+        inside = np.asarray((pixels >= 0).all(1) & (pixels <= size[seen.image_of]).all(1))
+    order = np.flatnonzero(inside)
+    order = order[np.lexsort((seen.image_of[order], seen.point_of[order]))]
+    own, point_of = np.unique(seen.point_of[order], return_inverse=True)
     cameras = (
         Camera(p.rotation, p.translation, fx, fy, cx, cy, h.width, h.height)
         for p, h in zip(placed, pinholes, strict=True)
         for fx, fy, cx, cy in [h.params.tolist()]
     )
-    names = tuple(p.key for p in placed)
     return ColmapModel(
-        names,
+        tuple(p.key for p in placed),
         tuple(cameras),
-        kept.points,
-        kept.colours,
-        kept.point_of[order],
-        kept.image_of[order],
-        pixels[inside][order],
-    )
-
-
-def _thin_points(
-    places: Float[Array, "n 3"], colours: Float32[Array, "n 3"], placed: Sequence[MatchedPhoto]
-) -> tuple[Float[Array, "k 3"], Float32[Array, "k 3"]]:
-    """The points that lie in two photos or more, every n-th where there are many."""
-    step = -(-len(places) // MOST_LOOSE) or 1
-    places, colours = places[::step], colours[::step]
-    count = np.zeros(len(places), int)
-    for place in placed:
-        count += find_visible_points(place.lens, place.rotation, place.translation, places)
-    if len(places) and (count < 2).mean() > 0.5:
-        _log.warning("%d of the model's %d points lie in no two photos", int((count < 2).sum()), len(places))
-    return places[count >= 2], colours[count >= 2]
-
-
-def _with_loose(model: ColmapModel, places: Float[Array, "k 3"], colours: Float32[Array, "k 3"]) -> ColmapModel:
-    """The model and further points that nothing observes."""
-    return ColmapModel(
-        model.names,
-        model.cameras,
-        np.concatenate([model.points, places]),
-        np.concatenate([model.colours, colours]),
-        model.point_of,
-        model.image_of,
-        model.pixels,
+        seen.points[own],
+        seen.colours[own],
+        point_of,
+        seen.image_of[order],
+        pixels[order],
     )

@@ -1,27 +1,63 @@
-"""Checks of untrusted files: size of JSON, finite numbers, proper rotations, names that stay in their folder.
+"""Imported models, and checks of the untrusted files that they come from.
 
-Errors name the file, and the key or image within it.
+Sizes, finite numbers, proper rotations, and names that stay in their folder are checked. Errors name the file, and the
+key or image within it.
 """
 
 import json
 import math
 import re
 from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-from jaxtyping import Float
+import pycolmap
+from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.geometry.georeference import Georeference
 
 LARGEST_JSON = 1 << 28  # bytes; as Python objects a file takes about ten times its size
 LARGEST = 1 << 31  # bytes of any other file
 LONGEST_NAME = 1024
 MOST_SHOTS = 20_000
-MOST_POINTS = 20_000_000
 ORTHONORMAL = 1e-3  # greatest entry of R R^T - I: files with few digits pass, sheared and scaled axes do not
 _DRIVE = re.compile(r"^[A-Za-z]:")
+
+
+@dataclass(frozen=True)
+class ImportedImage:
+    """One image of a model. A world point p has camera coordinates rotation @ p + translation (x right, y down).
+
+    name: relative to the photos' folder, with slashes. lens: at the size that the model gives, of the picture as it is
+    stored; None where no size is known because there is no such photo.
+    """
+
+    name: str
+    lens: pycolmap.Camera | None
+    rotation: Float[Array, "3 3"]
+    translation: Float[Array, "3"]
+
+
+@dataclass(frozen=True)
+class ImportedModel:
+    """The images of a model. If the file has observations, image image_of[k] sees point point_of[k] at pixels[k].
+
+    colours: sRGB in [0, 1]. reasons: of images that the file has, but that cannot be used with the others.
+    about: the place of the world's origin, if the world is known to be in metres east, north and up.
+    """
+
+    shots: tuple[ImportedImage, ...]
+    points: Float[Array, "n 3"] = field(default_factory=lambda: np.zeros((0, 3)))
+    colours: Float32[Array, "n 3"] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
+    point_of: Int[Array, "m"] = field(default_factory=lambda: np.zeros(0, int))
+    image_of: Int[Array, "m"] = field(default_factory=lambda: np.zeros(0, int))
+    pixels: Float[Array, "m 2"] = field(default_factory=lambda: np.zeros((0, 2)))
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    about: Georeference | None = None
 
 
 def check_size(path: Path, most: int) -> int:

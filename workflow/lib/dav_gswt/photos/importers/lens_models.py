@@ -1,7 +1,5 @@
 """Lens models: distorted cameras from the numbers in a file, fitted to photos, and the pinholes that replace them."""
 
-import math
-
 import numpy as np
 import pycolmap
 from jaxtyping import Float
@@ -162,10 +160,3 @@ def _turn_camera(camera: pycolmap.Camera) -> pycolmap.Camera:
             new[right], new[down] = -old[down], old[right]
     params = [new[n] for n in names]
     return pycolmap.Camera(model=camera.model_name, width=camera.height, height=camera.width, params=params)
-
-
-def angle_to_focal(angle: float, side: int, where: str) -> float:
-    """Focal length in pixels of a field of view in radians across a side."""
-    if not 0 < angle < math.pi:
-        raise InputError(f"{where} is {angle:g}; a field of view in radians lies between 0 and 3.14")
-    return 0.5 * side / math.tan(0.5 * angle)

@@ -9,21 +9,19 @@ from pathlib import Path
 
 import numpy as np
 import pycolmap
-from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.photos.importers import checks
 from dav_gswt.photos.importers.checks import (
+    ImportedImage,
+    ImportedModel,
     check_distinct,
     check_entry,
-    check_finite,
     check_image_name,
     check_number,
     check_numbers,
 )
-from dav_gswt.photos.importers.imported_model import ImportedImage, ImportedModel
 from dav_gswt.photos.importers.lens_models import make_fisheye_camera, make_perspective_camera
 
 _log = logging.getLogger(__name__)
@@ -35,7 +33,7 @@ _ONE_FOCAL = ("perspective", "fisheye")
 
 
 def import_opensfm(path: Path, values: list, photos: Path) -> ImportedModel:
-    """The largest of the file's reconstructions; its points are known, but not which image sees them.
+    """The largest of the file's reconstructions. Its points are not read, as the file does not say who sees them.
 
     Raises: InputError: with file, camera or shot, and key.
     """
@@ -57,9 +55,7 @@ def import_opensfm(path: Path, values: list, photos: Path) -> ImportedModel:
     }
     shots = tuple(_read_shot(name, shot, cameras, photos, path) for name, shot in chosen["shots"].items())
     check_distinct([s.name for s in shots], str(path))
-    return ImportedModel(
-        shots, *_points(chosen.get("points"), path), reasons=others, about=_read_georeference(chosen, path)
-    )
+    return ImportedModel(shots, reasons=others, about=_read_georeference(chosen, path))
 
 
 def _read_georeference(chosen: dict, path: Path) -> Georeference | None:
@@ -121,20 +117,3 @@ def _read_shot(label: str, shot, cameras: dict[str, pycolmap.Camera], photos: Pa
             f"{where}: rotation {axis.tolist()} is no axis times an angle in radians; export the file again"
         )
     return ImportedImage(name, cameras[camera], Rotation.from_rotvec(axis).as_matrix(), shift)
-
-
-def _points(points, path: Path) -> tuple[Array, Array]:
-    where = f"{path}: points"
-    if points is None:
-        return np.zeros((0, 3)), np.zeros((0, 3), np.float32)
-    if not isinstance(points, dict) or len(points) > checks.MOST_POINTS:
-        raise InputError(f"{where}: not an object of at most {checks.MOST_POINTS} points; export the file again")
-    try:
-        rows = [(*point["coordinates"], *point.get("color", (128, 128, 128))) for point in points.values()]
-        table = np.array(rows, float).reshape(len(rows), 6)
-    except (ValueError, TypeError, KeyError, AttributeError, OverflowError):
-        raise InputError(
-            f"{where}: one has not 3 coordinates and a color of 3 numbers; export the file again"
-        ) from None
-    check_finite(table, where)
-    return table[:, :3], (np.clip(table[:, 3:], 0, 255) / 255).astype(np.float32)

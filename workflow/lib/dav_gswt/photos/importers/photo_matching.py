@@ -1,9 +1,7 @@
 """Matching of the photos in a folder with the images of an imported model, by their names."""
 
-import logging
 import os
 from collections import defaultdict
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -15,11 +13,9 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos.importers import lens_models
-from dav_gswt.photos.importers.imported_model import ImportedImage, ImportedModel
+from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel
 from dav_gswt.photos.importers.lens_models import fit_camera_to_photo
-from dav_gswt.photos.picture_names import name_pictures, split_name
-
-_log = logging.getLogger(__name__)
+from dav_gswt.photos.photo_files import name_pictures, split_name
 
 MOST_FILES = 200_000  # looked through for photos
 
@@ -60,7 +56,7 @@ class PhotoFolder:
                     self.photos[(Path(root) / file).relative_to(folder).as_posix()] = Path(root) / file
         if not self.photos:
             raise InputError(f"{folder}: no photos in this folder; put .jpg, .png or .tif files into it")
-        self._tables: list[Mapping[str, list[str]]] = [defaultdict(list) for _ in range(3)]
+        self._tables: list[dict[str, list[str]]] = [defaultdict(list) for _ in range(3)]
         for name in self.photos:
             for table, label in zip(self._tables, split_name(name), strict=True):
                 table[label].append(name)
@@ -108,11 +104,6 @@ def match_photos_to_images(
         _match_photo(given.shots[owners[name]], owners[name], folder.photos[name], key, source)
         for name, key in zip(names, name_pictures(names), strict=True)
     ]
-    if scaled := [p for p in out if _scaled_pinhole(given.shots[p.index].lens, p.lens)]:
-        _log.warning(
-            "%s: its size is not that of its pinhole camera; if the model is of undistorted pictures, use these",
-            scaled[0].path.name,
-        )
     return sorted(out, key=lambda p: p.key), tuple(left_out)
 
 
@@ -122,10 +113,3 @@ def _match_photo(shot: ImportedImage, index: int, path: Path, key: str, source: 
     lens, turns = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
     turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
     return MatchedPhoto(path, key, index, lens, turns, turn @ shot.rotation, turn @ shot.translation)
-
-
-def _scaled_pinhole(model: pycolmap.Camera | None, photo: pycolmap.Camera) -> bool:
-    if model is None:
-        return False
-    same = {model.width, model.height} == {photo.width, photo.height}
-    return model.model_name in ("PINHOLE", "SIMPLE_PINHOLE") and not same

@@ -13,10 +13,15 @@ from scipy.special import expit
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
-from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
+from dav_gswt.geometry.scene_frame import SceneFrame, Square
 from dav_gswt.photos import ground_frame
-from dav_gswt.photos.ground_frame import find_largest_square
-from dav_gswt.photos.planes import fit_plane, make_upright_rotation
+from dav_gswt.photos.ground_frame import (
+    find_extent,
+    fit_plane,
+    make_upright_rotation,
+    place_square,
+    rotate_about_z,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -55,20 +60,14 @@ def fit_field_frame(
     field = field[_select_near(field)]
     field, relief = _level_field(field, direction, rng)
     field, side, height = _center_on_exemplar(field)
-    mask, west, south, cell = _opaque_ground(*_project_discs(field), CELLS)
-    rows, columns = np.nonzero(mask)
+    extent = find_extent(*_opaque_ground(*_project_discs(field), CELLS))
     side, relief = float(side / height), float(relief / height)
     frame = SceneFrame(
         kind="field",
         unit="flying height",
         flying_height=1.0,
         exemplar=Square(-side / 2, -side / 2, side),
-        extent=Extent(
-            west=float(west + columns.min() * cell),
-            south=float(south + rows.min() * cell),
-            east=float(west + (columns.max() + 1) * cell),
-            north=float(south + (rows.max() + 1) * cell),
-        ),
+        extent=extent,
         relief=relief,
         gaussians=len(field),
         removed=before - len(field),
@@ -82,9 +81,12 @@ def _center_on_exemplar(field: GaussianField) -> tuple[GaussianField, float, flo
     as unit; the square's side and the flying height in the old unit."""
     turns = np.arange(0.0, 90.0, ground_frame.TURN)
     places, widths = _project_discs(field)
-    sides = [_find_square(places @ _rotation_about_z(turn)[:2, :2].T, widths, COARSE_CELLS)[2] for turn in turns]
-    turn = _rotation_about_z(turns[np.argmax(sides)])
-    west, south, side = _find_square(places @ turn[:2, :2].T, widths, CELLS)
+    sides = [
+        place_square(*_opaque_ground(places @ rotate_about_z(turn)[:2, :2].T, widths, COARSE_CELLS))[2]
+        for turn in turns
+    ]
+    turn = rotate_about_z(turns[np.argmax(sides)])
+    west, south, side = place_square(*_opaque_ground(places @ turn[:2, :2].T, widths, CELLS))
     height = 0.5 * side / np.tan(np.radians(0.5 * VIEW))
     middle = np.array([west + side / 2, south + side / 2, 0.0])
     return _transform_field(field, turn, 1 / height, -middle / height), side, height
@@ -132,11 +134,6 @@ def _transform_field(
     )
 
 
-def _rotation_about_z(degrees: float) -> Float[Array, "3 3"]:
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
-
-
 def _project_discs(field: GaussianField) -> tuple[Float[Array, "m 2"], Float[Array, "m"]]:
     """Where the opaque Gaussians are over the ground, and the geometric means of their two larger deviations."""
     opaque = expit(field.opacity_logits) >= OPAQUE
@@ -167,11 +164,3 @@ def _opaque_ground(
             mask |= distance_transform_edt(empty) <= r
     padded = binary_closing(np.pad(mask, 3), np.ones((3, 3), bool), iterations=2)
     return padded[3:-3, 3:-3], float(low[0]), float(low[1]), cell
-
-
-def _find_square(places: Float[Array, "m 2"], widths: Float[Array, "m"], cells: int) -> tuple[float, float, float]:
-    """West, south and side of the largest square of opaque ground, a little inside it."""
-    mask, west, south, cell = _opaque_ground(places, widths, cells)
-    row, column, side = find_largest_square(mask)
-    inset = ground_frame.INSET * side * cell
-    return west + column * cell + inset, south + row * cell + inset, side * cell - 2 * inset

@@ -1,238 +1,222 @@
-"""The report on a scene's photos: one HTML page with the registration, the photos left out, and the weak ones.
+"""The report on a scene's photos: which were used, which were not and why, and what to photograph next.
 
-The page loads nothing: pictures are data URIs, plans are inline SVG. The same photos/ folder and template give the same
-bytes.
+The page is one HTML file that loads nothing. The same photos/ folder and template give the same bytes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-from markupsafe import Markup
+from jaxtyping import Int
+from numpy import ndarray as Array
 
 from dav_gswt.files import atomic_file
-from dav_gswt.photos import splitting
-from dav_gswt.photos.report import figures
-from dav_gswt.photos.report.facts import (
-    PhotoFacts,
-    ReportFacts,
-    collect_facts,
-    crop_to_exemplar,
-    list_weak_spots,
-    mean_reprojection_error,
-    min_median_max,
+from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
+from dav_gswt.logs import progress
+from dav_gswt.photos import view_split
+from dav_gswt.photos.colmap_model import (
+    ColmapModel,
+    count_shared_points,
+    read_colmap_model,
+    reprojection_errors,
+    transform_model,
 )
-from dav_gswt.photos.report.figures import Thumbnail, bin_coverage, draw_coverage, draw_plan, make_thumbnails
-from dav_gswt.photos.report.mosaic import GroundKinds, Segment, find_kinds
-from dav_gswt.photos.splitting import ground_bounds, measure_visible_share, shows_enough
+from dav_gswt.photos.ground_frame import Coverage, count_coverage
+from dav_gswt.photos.report.figures import draw_map, make_thumbnail
+from dav_gswt.photos.sfm import mapping
 from dav_gswt.templates import render_template
 
-
-class Fact(NamedTuple):
-    """A row of the table of facts."""
-
-    name: str
-    value: str
-    meaning: str
+LEAST_POINTS, LEAST_SHARE = 100, 0.2  # points that hold a photo: as a number, and as a share of the set's median
+WORST_ERROR = 2.0  # pixels: a photo's mean error, above which its place is doubtful or its lens is another
+WORST_MEAN = 1.0  # pixels: the set's mean error, likewise
+LEAST_SIDE = 0.5  # flying heights: side of an exemplar with room for tiles that differ
+TOO_FEW = 0.02  # share of the exemplar that may be seen by fewer photos than are needed
+NAMES = ("upper", "upper right", "right", "lower right", "lower", "lower left", "left", "upper left")
 
 
 @dataclass(frozen=True)
-class PhotoRow:
-    """A photo as the page lists it. numbers: points, error, height and tilt, as text. weak: has a weakness."""
+class PhotoFacts:
+    """A photo of the model. tests: it is used for testing alone. weak: reasons to doubt its place."""
 
-    index: int
     name: str
-    uri: str
-    width: int
-    height: int
-    above_ground: str
-    weak: bool
-    numbers: tuple[str, ...]
-    overlap: str
-    verdict: str
+    tests: bool
+    weak: tuple[str, ...]
 
 
-def write_report(folder: Path | str, template: Path | str, scene: str, out: Path | str, segment: Segment) -> None:
+@dataclass(frozen=True)
+class ReportFacts:
+    """A scene's photos.
+
+    need: how many photos must see a place. cover: in world units, without test photos. error: mean reprojection error
+    in pixels; None where it is unknown.
+    """
+
+    frame: SceneFrame
+    model: ColmapModel
+    photos: tuple[PhotoFacts, ...]
+    need: int
+    cover: Coverage
+    error: float | None
+
+    def length(self, of: float) -> str:
+        """A length of the world, with its unit."""
+        if self.frame.unit == "flying height":
+            return f"{of:.2f} flying heights"
+        return f"{of:.0f} m" if abs(of) >= 20 else f"{of:.1f} m"
+
+
+def write_report(folder: Path | str, template: Path | str, scene: str, out: Path | str) -> None:
     """Write the report on a photos/ folder (images/, sparse/, ground.json) to `out`.
 
-    segment: tells kinds of ground apart, see `mosaic.find_kinds`.
-    Raises: InputError: the folder is not readable, or the template asks for what is not there.
+    Raises: InputError: the folder is not readable, or the template uses a name that has no value.
     """
-    found = collect_facts(folder, scene)
-    thumbnails = make_thumbnails(Path(folder) / "images", [photo.name for photo in found.photos])
-    kinds = find_kinds(Path(folder) / "images", found, segment)
-    text = render_template(template, make_template_values(found, thumbnails, kinds))
-    with atomic_file(out) as part:
-        part.write_text(text, encoding="utf-8")
-
-
-def make_template_values(
-    found: ReportFacts, thumbnails: list[Thumbnail], kinds: GroundKinds | None
-) -> dict[str, object]:
-    """What the template's names stand for. Photos that only test come last."""
-    rows = [_make_photo_row(i, *pair, found) for i, pair in enumerate(zip(found.photos, thumbnails, strict=True))]
-    return {
-        "scene": found.scene,
-        "summary": summarize(found),
-        "weak_spots": list_weak_spots(found),
-        "plan": Markup(draw_plan(found, thumbnails)),
-        "plan_notes": explain_plan(found),
-        "coverage": Markup(draw_coverage(found)),
-        "bins": bin_coverage(found),
-        "need": found.need,
-        "facts": [*list_registration_facts(found), *list_camera_facts(found), *list_mask_facts(thumbnails)],
-        "kinds": describe_kinds(kinds),
-        "kinds_picture": figures.encode_data_uri(kinds.picture, "png") if kinds else None,
-        "verdict": found.frame.verdict,
-        "left_out": found.frame.left_out,
-        "photos": sorted(rows, key=lambda row: found.photos[row.index].tests),
-        "height_unit": "m" if found.frame.unit == "metre" else "flying heights",
-        "link": splitting.LINK,
+    found = collect_facts(folder)
+    names = progress([photo.name for photo in found.photos], "shrink photos")
+    pictures = [make_thumbnail(Path(folder) / "images" / name) for name in names]
+    frame = found.frame
+    values = {
+        "scene": scene,
+        "summary": _summarize(found),
+        "advice": list_advice(found),
+        "map": draw_map(found),
+        "facts": _list_facts(found),
+        "verdict": frame.verdict,
+        "left_out": frame.left_out,
+        "photos": sorted(zip(found.photos, pictures, strict=True), key=lambda pair: pair[0].tests),
     }
+    with atomic_file(out) as part:
+        part.write_text(render_template(template, values), encoding="utf-8")
 
 
-def summarize(found: ReportFacts) -> str:
-    """The page's first sentences."""
-    frame, side = found.frame, found.length(found.exemplar[2])
+def collect_facts(folder: Path | str) -> ReportFacts:
+    """The facts of a photos/ folder. Raises: InputError: what it holds is not readable."""
+    folder = Path(folder)
+    frame, model = read_scene_frame(folder / "ground.json"), read_colmap_model(folder / "sparse")
+    tests, unit = set(frame.test or ()), frame.flying_height
+    flat = transform_model(model, 1 / unit, np.eye(3), np.zeros(3))
+    cameras = tuple(c for name, c in zip(model.names, flat.cameras, strict=True) if name not in tests)
+    empty = Coverage(0.0, 0.0, 1.0, np.zeros((1, 1), int))
+    grid = count_coverage(cameras, flat.points) if len(flat.points) else empty
+    cover = replace(grid, west=unit * grid.west, south=unit * grid.south, cell=unit * grid.cell)
+    need = frame.photos_per_cell or (3 if len(cameras) >= 9 else 2)
+    off = reprojection_errors(model)
+    error = float(off.mean()) if frame.reprojection_error is None and len(off) else frame.reprojection_error
+    return ReportFacts(frame, model, _assess_photos(model, off, tests), need, cover, error)
+
+
+def _assess_photos(model: ColmapModel, off: Array, tests: set[str]) -> tuple[PhotoFacts, ...]:
+    """Each photo of the model, and what is weak about it. off: reprojection errors of the observations."""
+    shared = count_shared_points(model)
+    points = np.diag(shared).copy()
+    np.fill_diagonal(shared, 0)
+    usual = float(np.median([n for n, name in zip(points, model.names, strict=True) if name not in tests] or [0]))
+    found = []
+    for i, name in enumerate(model.names):
+        own = off[model.image_of == i]
+        error = float(own.mean()) if len(own) else 0.0
+        weak = () if name in tests else find_weaknesses(int(points[i]), error, int(shared[i].max()), usual)
+        found.append(PhotoFacts(name, name in tests, weak))
+    return tuple(found)
+
+
+def find_weaknesses(points: int, error: float, shared: int, usual: float) -> tuple[str, ...]:
+    """What is weak about a photo, in words.
+
+    points: how many it sees; `usual` is the median over the set. error: their mean distance from where they should be,
+    pixels. shared: points in common with the photo that shares most.
+    """
+    said = []
+    if points < max(LEAST_POINTS, LEAST_SHARE * usual):
+        said.append(f"sees only {points} points; the median is {usual:.0f}")
+    if not error <= WORST_ERROR:
+        said.append(f"its points are {error:.1f} px off on average")
+    if shared < view_split.LINK:
+        said.append(f"shares at most {shared} points with any other photo")
+    return tuple(said)
+
+
+def _summarize(found: ReportFacts) -> str:
+    frame, side = found.frame, found.length(found.frame.exemplar.side)
+    tests = sum(photo.tests for photo in found.photos)
     if frame.kind == "synthetic":
-        tests = len(found.photos) - len(found.placed)
-        first = f"{len(found.placed)} photos were rendered, and {tests} that only test; their cameras are exact."
+        first = f"{len(found.photos) - tests} photos were rendered, and {tests} for testing; their cameras are exact."
     else:
-        first = f"{frame.registered} of {frame.images} photos found their place over the ground."
-    return f"{first} Tiles are made of a square of ground {side} wide: the exemplar, framed on both maps."
+        first = f"{frame.registered} of {frame.images} photos were placed."
+    return f"{first} Tiles are cut from a square of ground that is {side} wide, the exemplar (dashed on the map)."
 
 
-def describe_kinds(kinds: GroundKinds | None) -> str:
-    """What the ground consists of, and what that means for tiles, in sentences."""
-    if kinds is None:
-        return "No photo looks down at the exemplar, so the kinds of its ground are not known before it is fitted."
-    if len(kinds.shares) < 2:
-        return "The ground looks like one material: its tiles are cut from all of it."
-    shares = ", ".join(f"{100 * share:.0f} %" for share in kinds.shares)
-    return (
-        f"The ground is mixed: it has {len(kinds.shares)} kinds that look unlike ({shares} of the exemplar). Tiles of "
-        "all of it as one texture would repeat its borders. With `materials: auto` those that are wide enough get "
-        "tiles of their own; the report on materials, made after the fit, has the verdict."
-    )
-
-
-def explain_plan(found: ReportFacts) -> str:
-    """What the plan's signs mean, as far as it has them."""
-    notes = ["Each dot is a camera. Point at it for its name and what it sees (thin outline); select it for its row."]
-    if any(photo.tilt >= figures.DOWN for photo in found.photos):
-        notes.append("Arrows point to where it looks; a camera without one looks straight down.")
-    else:
-        notes.append("All look nearly straight down.")
-    if any(photo.weak for photo in found.photos):
-        notes.append("Orange: weakly placed.")
-    if any(photo.tests for photo in found.photos):
-        notes.append("Hollow: it only tests.")
-    notes.append("Behind them are the points that the photos agree on, in their colours. Dashed square: the exemplar.")
-    return " ".join(notes)
-
-
-def list_registration_facts(found: ReportFacts) -> list[Fact]:
-    """How well the photos fit together."""
-    frame, error = found.frame, mean_reprojection_error(found)
-    counts = crop_to_exemplar(found)
-    low, usual, high = min_median_max(counts.ravel()) if counts.size else (0, 0, 0)
-    pairs, bounds = zip(found.photos, found.model.cameras, strict=True), ground_bounds(frame, whole=False)
-    cameras = [camera for photo, camera in pairs if not photo.tests]
-    shares = [measure_visible_share(camera, bounds) for camera in cameras]
-    count = sum(shows_enough(camera, bounds) for camera in cameras)
-    others = "all of them" if count == len(shares) else "the others show too little of it to take part"
-    if frame.kind == "synthetic":
-        first = Fact("Photos", f"{len(found.placed)} and {len(found.photos) - len(found.placed)} tests", "rendered")
-    else:
-        first = Fact("Photos in the folder", f"{frame.images}", f"{frame.registered} of them found their place")
-    return [
-        first,
-        Fact("Photos of the exemplar", f"{count}", others),
-        Fact("Photos of each place", f"{low:.0f} to {high:.0f}, mostly {usual:.0f}", "over the exemplar"),
-        Fact("Points", f"{len(found.model.points):,}", "places on the ground that several photos agree on"),
-        Fact(
-            "Reprojection error",
-            "not known" if error is None else f"{error:.2f} px",
-            "how far a point lies from where its photos show it: below 1 is good",
-        ),
-        Fact("Focal length", *describe_focal_length(found)),
-    ]
-
-
-def describe_focal_length(found: ReportFacts) -> tuple[str, str]:
-    """The focal length over EXIF's, and what was decided about it."""
-    frame, lens = found.frame, found.frame.focal
-    if frame.kind == "synthetic":
-        return "exact", "as rendered"
-    ratio = frame.focal_ratio
-    value = "EXIF has none" if ratio is None else f"{ratio:.3f} times EXIF's"
-    if not lens:
-        return (value, "as it was solved with") if ratio else ("as given", "from the model of another program")
-    free = (
-        f"; the photos alone say {lens.free / lens.exif:.3f} times EXIF's" if lens.free and lens.exif and ratio else ""
-    )
-    return value, f"{lens.decision}{free if 'alone' not in lens.decision else ''}"
-
-
-def list_camera_facts(found: ReportFacts) -> list[Fact]:
-    """Where the cameras are, and where the place is."""
-    frame, cameras = found.frame, found.photos
-    low, usual, high = min_median_max(np.array([c.height for c in cameras]))
-    least, middle, most = min_median_max(np.array([c.tilt for c in cameras]))
-    metric = frame.unit == "metre"
-    flying = found.length(frame.flying_height) if metric else "the unit of length: metres are not known"
-    facts = [
-        Fact("Exemplar", found.length(found.exemplar[2]), "side of the square of ground that tiles are made of"),
-        Fact("Flying height", flying, "median height of the cameras above the ground"),
-        Fact("Heights", found.range(low, high), f"of the cameras; median {found.length(usual)}"),
-        Fact(
-            "Tilt",
-            f"{least:.0f} to {most:.0f} degrees",
-            f"median {middle:.0f}; 0 looks straight down, 90 to the horizon",
-        ),
-    ]
-    if frame.relief is not None:
-        facts.append(
-            Fact("Relief", f"{frame.relief:.3f} flying heights", "how far points lie off the plane of the ground")
+def list_advice(found: ReportFacts) -> list[str]:
+    """What is weak about the set, and what to do about it."""
+    frame, said = found.frame, []
+    if frame.verdict and frame.verdict.grade != "good":
+        reasons = "; ".join(sign.reason for sign in frame.verdict.objections)
+        said.append(f"The cameras are {frame.verdict.grade}: {reasons}.")
+    if frame.left_out:
+        said.append(
+            f"{len(frame.left_out)} of {frame.images} photos were left out for the reasons below. Photos taken between "
+            "them and the others can help."
         )
-    if found.place:
-        where = f"{found.place.latitude:.6f}, {found.place.longitude:.6f}"
-        turned = f"latitude and longitude of the origin; up on the maps is {found.place.north:.0f} degrees from north"
-        return [*facts, Fact("Place", where, turned)]
-    if frame.kind == "photos":
-        facts.append(Fact("Place", "not known", "the photos have no GPS positions, or none that agree with them"))
+    said += _advise_on_coverage(found)
+    if weak := [photo.name for photo in found.photos if photo.weak]:
+        names = ", ".join(weak[:5]) + (f" and {len(weak) - 5} more" if len(weak) > 5 else "")
+        said.append(f"Weakly placed photos: {names}. If the field looks blurred there, leave them out.")
+    if found.error is not None and found.error > WORST_MEAN:
+        said.append(f"Points are {found.error:.1f} px off on average: use sharp photos of one camera at one zoom.")
+    lens = frame.focal
+    if lens and lens.exif is None and lens.tilt < mapping.OBLIQUE:
+        said.append("The focal length is unsure, and heights with it: set the scene's `focal`, or add oblique photos.")
+    elif lens and lens.exif and lens.free and abs(lens.free / lens.exif - 1) > mapping.HELD:
+        said.append(
+            f"The photos alone suggest {lens.free / lens.exif:.2f} times the focal length of EXIF: check the heights."
+        )
+    side = frame.exemplar.side / frame.flying_height
+    if side < LEAST_SIDE:
+        said.append(
+            f"The exemplar is only {side:.2f} flying heights wide, so tiles repeat soon. Photograph more ground."
+        )
+    return said
+
+
+def _advise_on_coverage(found: ReportFacts) -> list[str]:
+    """Parts of the exemplar that few photos see."""
+    counts, said = crop_to_exemplar(found), []
+    if min(counts.shape) < 3:
+        return ["The exemplar is too small on the map to say how often its parts are seen. Photograph more ground."]
+    for i, band in enumerate(np.array_split(counts, 3, axis=0)):
+        for j, part in enumerate(np.array_split(band, 3, axis=1)):
+            if (typical := int(np.median(part))) <= found.need:
+                place = "middle" if i == j == 1 else NAMES[round(np.degrees(np.arctan2(j - 1, i - 1)) / 45) % 8]
+                said.append(f"{place} ({typical})")
+    if said:
+        return [f"Photograph these parts of the exemplar again, which few photos see: {', '.join(said)}."]
+    if (short := float((counts < found.need).mean())) > TOO_FEW:
+        return [
+            f"{100 * short:.0f} % of the exemplar is seen by fewer than {found.need} photos. Take more photos of it."
+        ]
+    return []
+
+
+def crop_to_exemplar(found: ReportFacts) -> Int[Array, "rows columns"]:
+    """How many photos see each cell of the exemplar."""
+    square, cover = found.frame.exemplar, found.cover
+    rows, columns = cover.counts.shape
+    y = cover.south + (np.arange(rows) + 0.5) * cover.cell
+    x = cover.west + (np.arange(columns) + 0.5) * cover.cell
+    return cover.counts[np.ix_((y > square.south) & (y < square.north), (x > square.west) & (x < square.east))]
+
+
+def _list_facts(found: ReportFacts) -> list[tuple[str, str]]:
+    """Numbers that help to judge the set: names and values."""
+    frame, facts = found.frame, []
+    if found.error is not None:
+        facts.append(("Reprojection error", f"{found.error:.2f} px (good: below 1)"))
+    if frame.focal:
+        ratio = f"{frame.focal_ratio:.3f} times EXIF's; " if frame.focal_ratio else ""
+        facts.append(("Focal length", ratio + frame.focal.decision))
+    if frame.unit == "metre":
+        facts.append(("Flying height", found.length(frame.flying_height)))
+    if frame.georeference:
+        facts.append(("Place", f"{frame.georeference.latitude:.6f}, {frame.georeference.longitude:.6f}"))
+    elif frame.kind == "photos":
+        facts.append(("Place", "unknown: the photos have no GPS positions, or none that agree with them"))
     return facts
-
-
-def list_mask_facts(thumbnails: list[Thumbnail]) -> list[Fact]:
-    """How many photos are masked, and how much of them."""
-    shares = [thumbnail.masked for thumbnail in thumbnails if thumbnail.masked > 0]
-    if not shares:
-        return []
-    many = "1 photo" if len(shares) == 1 else f"{len(shares)} photos"
-    return [Fact("Masks", many, f"{100 * np.mean(shares):.1f} % does not count there (pink below)")]
-
-
-def _make_photo_row(index: int, photo: PhotoFacts, thumbnail: Thumbnail, found: ReportFacts) -> PhotoRow:
-    unit = "" if found.frame.unit == "flying height" else " m"
-    overlap = "–"
-    if photo.partner:
-        share = 100 * photo.shared / max(photo.points, 1)
-        overlap = f"{photo.shared:,} with {photo.partner} ({share:.0f} %), {photo.linked} linked"
-    notes = [*photo.weak] or ["only tests" if photo.tests else "good"]
-    notes += [f"{100 * thumbnail.masked:.0f} % masked"] if thumbnail.masked > 0 else []
-    error = "–" if photo.error is None else f"{photo.error:.2f}"
-    height, width = thumbnail.image.shape[:2]
-    return PhotoRow(
-        index=index,
-        name=photo.name,
-        uri=thumbnail.uri,
-        width=width,
-        height=height,
-        above_ground=found.length(photo.height),
-        weak=bool(photo.weak),
-        numbers=(f"{photo.points:,}", error, f"{photo.height:.2f}{unit}", f"{photo.tilt:.0f}"),
-        overlap=overlap,
-        verdict="; ".join(notes),
-    )

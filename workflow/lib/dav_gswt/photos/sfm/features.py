@@ -1,4 +1,4 @@
-"""Features of photos and their matches, in a COLMAP database: the first half of structure from motion."""
+"""Features of photos, the pairs that look alike, and their matches, in a COLMAP database."""
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
@@ -7,17 +7,27 @@ from contextlib import closing
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
 import pycolmap
+from jaxtyping import Float, Float32, UInt8
+from numpy import ndarray as Array
+from scipy.cluster.vq import kmeans2, vq
+from scipy.sparse.csgraph import minimum_spanning_tree
 
 from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import silence_pycolmap
-from dav_gswt.photos.sfm.pairs import select_pairs
 
 _log = logging.getLogger(__name__)
 
 # How many photos and pairs COLMAP is given at once. Progress is counted between two batches: while COLMAP writes,
 # nothing else may open its database, since a writer that finds it locked aborts the process.
 PHOTOS, PAIRS = 16, 200
+
+WORDS = 48
+SAMPLE = 20_000  # features that the vocabulary is learned from
+EACH = 1200  # features of a photo that describe it
+NEXT = 2  # photos before and after a photo by name: flights are named in their order
+ALL = 20  # photos up to which every pair is matched
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -61,14 +71,11 @@ def extract_features(folder: Path, database: Path, size: int, features: int, thr
 
 
 def match_photos(count: int, database: Path, neighbours: int, threads: int, seed: int) -> None:
-    """Match photos that look alike and keep what one rigid scene explains. neighbours: see `select_pairs`; 0: all."""
+    """Match photos that look alike and keep what one rigid scene explains. neighbours: see `select_pairs`."""
     with closing(pycolmap.Database.open(database)) as store:
         names = {image.image_id: image.name for image in store.read_all_images()}
-        found = [store.read_descriptors(i).data for i in range(1, count + 1)] if neighbours else []
-    if neighbours:
-        some = select_pairs(found, neighbours, seed)
-    else:
-        some = [(i, j) for i in range(count) for j in range(i + 1, count)]
+        found = [store.read_descriptors(i).data for i in range(1, count + 1)]
+    some = select_pairs(found, neighbours, seed)
     if len(some) < count * (count - 1) // 2:
         _log.info("match %d of %d pairs of photos: those that look alike", len(some), count * (count - 1) // 2)
     match_image_pairs([(names[i + 1], names[j + 1]) for i, j in some], database, threads, seed)
@@ -113,3 +120,63 @@ def run_cancellable(work: Callable[[pycolmap.CancellationToken], Result]) -> Res
         except BaseException:
             token.cancel()
             raise
+
+
+def select_pairs(descriptors: list[UInt8[Array, "_ 128"]], neighbours: int, seed: int) -> list[tuple[int, int]]:
+    """Pairs i < j of photos to match. neighbours: of each photo; every pair is taken if there are few photos.
+
+    A photo is matched with those whose descriptors are most similar, with those before and after it by name, and along
+    a spanning tree of all photos.
+    """
+    count = len(descriptors)
+    if count <= ALL or neighbours >= count - 1:
+        return [(i, j) for i in range(count) for j in range(i + 1, count)]
+    alike = compare_descriptions(describe_photos(descriptors, seed))
+    pairs = {(i, i + step) for step in range(1, NEXT + 1) for i in range(count - step)}
+    for i in range(count):
+        order = np.argsort(-alike[i], kind="stable")
+        near = [int(j) for j in order if j != i][:neighbours]
+        pairs |= {(min(i, j), max(i, j)) for j in near}
+    tree = minimum_spanning_tree(np.triu(2.0 - alike, 1)).tocoo()  # positive, so that no edge counts as missing
+    return sorted(pairs | {(min(i, j), max(i, j)) for i, j in zip(tree.row.tolist(), tree.col.tolist(), strict=True)})
+
+
+def describe_photos(descriptors: list[UInt8[Array, "_ 128"]], seed: int) -> Float32[Array, "photos d"]:
+    """A global descriptor for each photo: a unit vector, or zero for a photo without features.
+
+    It is VLAD of the SIFT features over a small vocabulary learned from the set itself (Jegou et al. 2010, with
+    RootSIFT and intra-normalisation: Arandjelovic and Zisserman 2013), so that nothing is downloaded.
+    """
+    rng = np.random.default_rng(seed)
+    some = [_root_features(_thin_evenly(d, EACH)) for d in descriptors]
+    pooled = np.concatenate(some)
+    if len(pooled) < WORDS:
+        return np.zeros((len(some), WORDS * 128), np.float32)
+    sample = pooled[rng.choice(len(pooled), min(SAMPLE, len(pooled)), replace=False)]
+    words, _ = kmeans2(sample, WORDS, minit="++", rng=np.random.default_rng(seed))
+    return np.stack([_aggregate_features(photo, words) for photo in some])
+
+
+def compare_descriptions(described: Float32[Array, "photos d"]) -> Float[Array, "photos photos"]:
+    """Cosines, -1 to 1."""
+    return np.clip(described.astype(float) @ described.T.astype(float), -1, 1)
+
+
+def _aggregate_features(features: Float32[Array, "n 128"], words: Float[Array, "w 128"]) -> Float32[Array, "d"]:
+    """Per word the sum of what its features differ from it, each word's of length 1, and the whole."""
+    out = np.zeros((len(words), 128))
+    if len(features):
+        which, _ = vq(features, words)
+        np.add.at(out, which, features - words[which])
+    out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
+    return (out / max(np.linalg.norm(out), 1e-12)).ravel().astype(np.float32)
+
+
+def _root_features(features: UInt8[Array, "n 128"]) -> Float32[Array, "n 128"]:
+    """Square roots of features that sum to 1: their distance is then Hellinger's."""
+    f = features.astype(np.float32)
+    return np.sqrt(f / np.maximum(f.sum(1, keepdims=True), 1e-12))
+
+
+def _thin_evenly(rows: Array, count: int) -> Array:
+    return rows if len(rows) <= count else rows[np.linspace(0, len(rows) - 1, count).astype(int)]

@@ -15,8 +15,8 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.photos.colmap_model import bundle_adjust_with_priors
-from dav_gswt.photos.exif import read_gps_position
-from dav_gswt.photos.planes import make_upright_rotation
+from dav_gswt.photos.ground_frame import make_upright_rotation
+from dav_gswt.photos.photo_files import read_gps_position
 
 _log = logging.getLogger(__name__)
 

@@ -18,8 +18,14 @@ from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.lenses import find_main_camera, undistort_scene_photo
-from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_image_pairs
-from dav_gswt.photos.sfm.pairs import compare_descriptions, describe_photos
+from dav_gswt.photos.sfm.features import (
+    compare_descriptions,
+    describe_photos,
+    enter_camera,
+    enter_image,
+    extract_features,
+    match_image_pairs,
+)
 
 _log = logging.getLogger(__name__)
 

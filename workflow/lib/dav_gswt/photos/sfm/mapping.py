@@ -1,9 +1,17 @@
-"""Mapping: features and matches of a database become cameras and points, by COLMAP in one thread."""
+"""Mapping: features and matches become cameras and points, by COLMAP in one thread.
+
+Photos are mapped in one way. If that fails, or if signs contradict the model (see `verdict`), they are mapped in other
+ways too, and the best model is taken.
+
+Photos of flat ground from straight above hardly determine the focal length: a longer lens higher up gives the same
+pictures. So EXIF's focal length is held there. Oblique photos determine it, and then the adjusted one is used.
+"""
 
 import logging
+from collections import defaultdict
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -12,12 +20,24 @@ import pycolmap
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.scene_frame import FocalLength, SfmVerdict
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import bundle_adjust
+from dav_gswt.photos.colmap_model import bundle_adjust, model_from_reconstruction
+from dav_gswt.photos.ground_frame import fit_plane
 from dav_gswt.photos.sfm.features import run_cancellable
-from dav_gswt.photos.sfm.gps import make_pose_prior
+from dav_gswt.photos.sfm.gps import GpsPositions, make_pose_prior
+from dav_gswt.photos.sfm.verdict import COVERAGE, LEAST_INLIERS, SfmEvidence, find_groups, judge_model
 
 _log = logging.getLogger(__name__)
+
+LEAST_PHOTOS = 3
+UNSURE = 0.1  # share of the photos that are left out though they match: above it the other mapper is tried
+LEAST_PLACED = 0.8  # of the photos that the first way of mapping places: as many another must place
+OBLIQUE = 20.0  # degrees off the vertical from which a view helps to fix the focal length
+LEAST_OBLIQUE, LEAST_SHARE = 3, 0.15  # oblique views that fix it: a number, and a share of all
+HELD = 0.03  # an adjusted focal length this close to EXIF's confirms it
+LENSES = 0.35, 6.0  # focal length in longer sides of the picture: a fisheye's to a long telescope's
 
 Mapper = Literal["incremental", "global"]
 
@@ -34,31 +54,198 @@ class Approach:
         held = ", EXIF's focal length held" if self.hold_focal else ""
         return f"{self.mapper} mapping{', GPS as priors' if self.use_gps else ''}{held}"
 
+    @property
+    def other_mapper(self) -> Mapper:
+        return "incremental" if self.mapper == "global" else "global"
+
+
+@dataclass(frozen=True)
+class SfmPhoto:
+    """A photo that structure from motion is given.
+
+    key: name of the picture that is made of it. full: its size. width, height, focal: at the size at which features are
+    searched; focal is EXIF's.
+    """
+
+    path: Path
+    key: str
+    full: tuple[int, int]
+    width: int
+    height: int
+    focal: float | None
+
+
+@dataclass(frozen=True)
+class SfmScene:
+    """The input of mapping. held: EXIF's focal lengths by camera. database: COLMAP's, of features and matches."""
+
+    folder: Path | str
+    photos: list[SfmPhoto]
+    held: dict[int, float]
+    positions: GpsPositions | None
+    database: Path
+
+    @property
+    def gps(self) -> dict[str, Float[Array, "3"]]:
+        """GPS positions by the images' names; empty if the photos have none."""
+        if self.positions is None:
+            return {}
+        return {photo.key: at for photo, at in zip(self.photos, self.positions.at, strict=True)}
+
+
+@dataclass(frozen=True)
+class SfmSolution:
+    """A model with its settled focal length, and the verdict on it. left_out: names and reasons.
+
+    unsure: the number of photos left out that match a placed photo well.
+    """
+
+    best: pycolmap.Reconstruction
+    left_out: tuple[tuple[str, str], ...]
+    focal: FocalLength
+    verdict: SfmVerdict
+    unsure: int = 0
+
+
+def find_solution(scene: SfmScene, mapper: Mapper, seed: int) -> SfmSolution:
+    """Map the photos, in several ways if the first one fails, if signs contradict its model, or if it leaves out many
+    photos that match others. The best by the signs is taken, then by the number of placed photos.
+
+    Raises: InputError: of the first way, if none gives a model.
+    """
+    solved: list[SfmSolution] = []
+    tried: list[str] = []
+
+    def attempt(approach: Approach) -> InputError | None:
+        try:
+            solved.append(_solve(approach, scene, seed))
+        except InputError as error:
+            tried.append(f"{approach}: {error}")
+            return error
+        verdict = solved[-1].verdict
+        reasons = "; ".join(sign.reason for sign in verdict.objections)
+        tried.append(f"{approach}: {verdict.grade}" + (f" ({reasons})" if reasons else ""))
+        return None
+
+    def rank(solution: SfmSolution) -> tuple[int, ...]:
+        """The lower, the better."""
+        objections = solution.verdict.objections
+        refused = sum(sign.grade == "refused" for sign in objections)
+        grade = ("good", "doubtful", "refused").index(solution.verdict.grade)
+        return grade, refused, len(objections), -solution.best.num_reg_images()
+
+    first = Approach(mapper)
+    failure = attempt(first)
+    for approach in _list_other_ways(first, solved[0] if solved else None, scene):
+        _log.info("try %s", approach)
+        attempt(approach)
+    if failure and not solved:
+        raise failure
+    least = LEAST_PLACED * solved[0].best.num_reg_images()
+    best = min((solution for solution in solved if solution.best.num_reg_images() >= least), key=rank)
+    return replace(best, verdict=replace(best.verdict, tried=tuple(tried)))
+
+
+def _list_other_ways(first: Approach, solution: SfmSolution | None, scene: SfmScene) -> list[Approach]:
+    """Other ways of mapping that may give a better model than the first did. solution: None if it gave no model."""
+    gps = scene.positions is not None
+    if solution is None:
+        matches = any(inliers >= LEAST_INLIERS for *_, inliers in _read_pairs(scene.database))
+        return list_alternatives(first, bool(scene.held), gps) if matches else []
+    against = [sign.reason for sign in solution.verdict.objections if sign.name not in COVERAGE]
+    if against:
+        _log.info("the model may be wrong: %s", against[0])
+        ratio = solution.focal.ratio
+        return list_alternatives(first, ratio is not None and not np.isclose(ratio, 1, rtol=1e-9), gps)
+    if solution.unsure and solution.unsure >= UNSURE * len(scene.photos):
+        _log.info("photos without a place, though they match others: %d", solution.unsure)
+        return [Approach(first.other_mapper)]
+    return []
+
 
 def list_alternatives(first: Approach, freed: bool, gps: bool) -> list[Approach]:
     """Other ways for photos whose model may be wrong. freed: EXIF's focal length was given up. gps: with positions."""
     out = [Approach(first.mapper, hold_focal=True)] if freed else []
     out += [Approach("incremental", hold_focal=True, use_gps=True)] if gps else []
-    return [*out, Approach(other_mapper(first.mapper), hold_focal=True)]
+    return [*out, Approach(first.other_mapper, hold_focal=True)]
 
 
-def other_mapper(mapper: Mapper) -> Mapper:
-    """The one of the two that `mapper` is not."""
-    return "incremental" if mapper == "global" else "global"
+def _solve(approach: Approach, scene: SfmScene, seed: int) -> SfmSolution:
+    """Map in one way. Raises: InputError: too few photos found a place, or a focal length that no lens has."""
+    photos, gps = scene.photos, scene.gps
+    _write_pose_priors(scene.database, gps if approach.use_gps else {})
+    found = _run_mapping(approach, scene, seed)
+    best = max(found, key=lambda r: (r.num_reg_images(), r.num_points3D()), default=None)
+    pairs = _read_pairs(scene.database)
+    placed = {number - 1 for number in best.reg_image_ids()} if best else set()
+    left_out, unsure = explain_left_out(photos, placed, pairs)
+    if best is None or len(placed) < LEAST_PHOTOS:
+        raise InputError(
+            f"{scene.folder}: {len(placed)} of {len(photos)} photos could be placed relative to each other; they must "
+            "overlap by more than half and show texture: take more from closer positions, or remove what shows "
+            "something else"
+        )
+    settled = settle_focal_length(best, scene.held, np.random.default_rng(seed), approach.hold_focal)
+    model = model_from_reconstruction(best)
+    evidence = SfmEvidence(
+        error=float(best.compute_mean_reprojection_error()),
+        images=len(photos),
+        focal_ratio=settled.free / settled.exif if settled.free and settled.exif else None,
+        positions=np.stack([gps[name] for name in model.names]) if gps else None,
+        groups=find_groups([photo.path.name for photo in photos], pairs, [i - 1 for i in best.reg_image_ids()]),
+    )
+    verdict = judge_model(model, evidence, np.random.default_rng(seed))
+    return SfmSolution(best, left_out, settled, verdict, unsure)
 
 
-def run_mapping(
-    approach: Approach, database: Path, scratch: Path, held: Mapping[int, float], seed: int
-) -> list[pycolmap.Reconstruction]:
-    """The models that photos of a database give, of any number of photos. held: focal lengths of EXIF by camera.
+def _read_pairs(database: Path) -> list[tuple[int, int, int]]:
+    """The indices of the photos of each verified pair, and how many matches one rigid scene explains."""
+    with closing(pycolmap.Database.open(database)) as store:
+        rows = list(zip(*store.read_two_view_geometry_num_inliers(), strict=True))
+    pairs = ((*pycolmap.pair_id_to_image_pair(pair), inliers) for pair, inliers in rows)
+    return [(one - 1, two - 1, inliers) for one, two, inliers in pairs]
 
-    Where only some cameras have a known focal length, those stay as they are until the end.
+
+def explain_left_out(
+    photos: list[SfmPhoto], placed: set[int], pairs: list[tuple[int, int, int]]
+) -> tuple[tuple[tuple[str, str], ...], int]:
+    """Names of the photos that found no place, with the reason; and how many of them match a placed photo well."""
+    most = defaultdict(int)  # points shared with a placed photo
+    for one, two, inliers in pairs:
+        for index, other in ((one, two), (two, one)):
+            if other in placed and index not in placed:
+                most[index] = max(most[index], inliers)
+    out = []
+    for index, photo in enumerate(photos):
+        if index not in placed:
+            unsure = f"it shares {most[index]} points with a placed photo, but its position stays unsure"
+            out.append((photo.path.name, unsure if most[index] else "it matches no photo that could be placed"))
+    return tuple(out), sum(count >= LEAST_INLIERS for count in most.values())
+
+
+def _write_pose_priors(database: Path, at: Mapping[str, Float[Array, "3"]]) -> None:
+    """Enter GPS positions into a database, in place of those that it has.
+
+    at: metres east, north and up by the images' names; NaN where unknown.
     """
+    with closing(pycolmap.Database.open(database)) as store:
+        store.clear_pose_priors()
+        for image in store.read_all_images():
+            if image.name in at and np.isfinite(at[image.name]).all():
+                store.write_pose_prior(make_pose_prior(image, at[image.name]))
+
+
+def _run_mapping(approach: Approach, scene: SfmScene, seed: int) -> list[pycolmap.Reconstruction]:
+    """The models that the photos give, of any number of photos.
+
+    If only some cameras have a known focal length, those stay as they are until the end.
+    """
+    database, scratch, held = scene.database, scene.database.parent, scene.held
+    if approach.mapper == "global":
+        return _map_globally(bool(held), database, scratch, seed)
     with closing(pycolmap.Database.open(database)) as store:
         mixed = 0 < len(held) < store.num_cameras()
         count = store.num_images()
-    if approach.mapper == "global":
-        return _map_globally(bool(held), database, scratch, seed)
     choice = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed, max_num_models=3)
     choice.mapper.num_threads = 1
     choice.mapper.random_seed = choice.triangulation.random_seed = seed
@@ -83,18 +270,6 @@ def run_mapping(
     return list(found.values())
 
 
-def write_pose_priors(database: Path, at: Mapping[str, Float[Array, "3"]]) -> None:
-    """Enter GPS positions into a database, in place of those that it has.
-
-    at: metres east, north and up by the images' names; NaN where unknown.
-    """
-    with closing(pycolmap.Database.open(database)) as store:
-        store.clear_pose_priors()
-        for image in store.read_all_images():
-            if image.name in at and np.isfinite(at[image.name]).all():
-                store.write_pose_prior(make_pose_prior(image, at[image.name]))
-
-
 def _map_globally(known: bool, database: Path, scratch: Path, seed: int) -> list[pycolmap.Reconstruction]:
     """All photos at once. known: EXIF has focal lengths."""
     choice = pycolmap.GlobalPipelineOptions(num_threads=1, random_seed=seed)
@@ -108,3 +283,67 @@ def _map_globally(known: bool, database: Path, scratch: Path, seed: int) -> list
     adjustment.ceres.use_gpu = False
     adjustment.ceres.solver_options.num_threads = 1
     return list(pycolmap.global_mapping(database, scratch, scratch, choice).values())
+
+
+def settle_focal_length(
+    best: pycolmap.Reconstruction, held: dict[int, float], rng: np.random.Generator, hold: bool = False
+) -> FocalLength:
+    """Settle the focal length of a reconstruction, in place. held: EXIF's by camera, kept so far. hold: it stays.
+
+    Raises: InputError: a solution that no lens gives.
+    """
+    tilts = _measure_tilts(best, rng)
+    oblique = int((tilts > OBLIQUE).sum())
+    fixes = oblique >= LEAST_OBLIQUE and oblique >= LEAST_SHARE * len(tilts)
+    used = [c for c in best.cameras if any(best.images[i].camera_id == c for i in best.reg_image_ids())]
+    exif = [held[c] for c in used if c in held]
+    free = None
+    if exif:
+        free = pycolmap.Reconstruction(best)
+        bundle_adjust(free, refine_focal_length=True)
+        ratio = float(np.median([free.cameras[c].focal_length / held[c] for c in used if c in held]))
+        near = abs(ratio - 1) <= HELD
+        if hold and not near:
+            decision = f"EXIF's, held: the photos alone would say {ratio:.3f} times that, which led to a model in doubt"
+        elif fixes and not hold:
+            decision = f"taken from the photos, {oblique} of which look at the ground from the side"
+        elif near:
+            decision = "EXIF's, which the photos confirm"
+        else:
+            decision = f"EXIF's: the photos alone would say {ratio:.3f} times that, but look too straight down to know"
+        if fixes and not hold:
+            _take_over(best, free)
+    else:
+        decision = "found by the photos alone: no EXIF says it"
+        if not fixes:
+            decision += ", and they look too straight down to know it well: heights may be too great or too small"
+    for camera in (best.cameras[number] for number in used):
+        sides = camera.focal_length / max(camera.width, camera.height)
+        if not LENSES[0] <= sides <= LENSES[1]:
+            raise InputError(
+                f"the photos lead to a focal length of {sides:.2f} picture widths, which no usual lens has: they do "
+                "not fix it; add photos that look from the side, or give the scene's `focal` in the config"
+            )
+    return FocalLength(
+        float(np.median(exif)) if exif else None,
+        float(np.median([best.cameras[c].focal_length for c in used])),
+        float(np.median([free.cameras[c].focal_length for c in used])) if free else None,
+        float(np.percentile(tilts, 95)),
+        decision,
+    )
+
+
+def _measure_tilts(best: pycolmap.Reconstruction, rng: np.random.Generator) -> Float[Array, "n"]:
+    """Degrees between each view and the normal of the points' plane."""
+    normal, _, _ = fit_plane(np.array([p.xyz for p in best.points3D.values()]), rng)
+    forward = np.stack([best.images[i].cam_from_world().rotation.matrix()[2] for i in best.reg_image_ids()])
+    return np.degrees(np.arccos(np.clip(np.abs(forward @ normal), 0, 1)))
+
+
+def _take_over(best: pycolmap.Reconstruction, free: pycolmap.Reconstruction) -> None:
+    for number, camera in free.cameras.items():
+        best.cameras[number].params = camera.params
+    for image in (free.images[number] for number in best.reg_image_ids()):
+        best.frames[image.frame_id].rig_from_world = free.frames[image.frame_id].rig_from_world
+    for number, point in free.points3D.items():
+        best.points3D[number].xyz = point.xyz

@@ -1,9 +1,8 @@
 """Structure from motion: a folder of overlapping photos becomes cameras, sparse points and undistorted pictures.
 
 pycolmap does it on the CPU: SIFT features, matches of photos that look alike, incremental or global mapping. Features
-and matches may use several threads, since each photo and each pair stands alone and its random numbers start from the
-seed; mapping uses one. So a run repeats to the bit. Where signs contradict the model (see `verdict`), photos are mapped
-in other ways too, and the best model is taken.
+and matches may use several threads, since each photo and each pair is independent and its random numbers start from the
+seed. Mapping uses one thread. So a run repeats to the bit.
 """
 
 import logging
@@ -23,21 +22,19 @@ from dav_gswt.geometry.scene_frame import FocalLength, SfmVerdict
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import ColmapModel, measure_parallax, model_from_reconstruction
-from dav_gswt.photos.exif import convert_equivalent, read_focal_length
+from dav_gswt.photos.ground_frame import fit_plane
 from dav_gswt.photos.lenses import undistort_photo
-from dav_gswt.photos.picture_names import name_pictures
-from dav_gswt.photos.planes import fit_plane
+from dav_gswt.photos.photo_files import convert_equivalent, name_pictures, read_focal_length
 from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
-from dav_gswt.photos.sfm.focal_length import require_parallax
 from dav_gswt.photos.sfm.gps import GpsPositions, align_to_gps, read_gps_positions
-from dav_gswt.photos.sfm.mapping import Mapper
-from dav_gswt.photos.sfm.solution import LEAST_PHOTOS, SfmPhoto, SfmScene, SfmSolution, find_solution
+from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS, Mapper, SfmPhoto, SfmScene, SfmSolution, find_solution
 from dav_gswt.photos.sfm.verdict import require_trust
 from dav_gswt.threads import map_ahead
 
 _log = logging.getLogger(__name__)
 
 GUESS = 1.2  # focal length in longer sides, where EXIF has none; then it is refined
+LEAST_ANGLE = 2.0  # degrees, median over the points of the widest angle under which photos see them
 PRESETS = {
     "quick": {"features": 4096, "neighbours": 12},
     "careful": {"features": 8192, "neighbours": 40, "size": 2048},
@@ -48,8 +45,8 @@ PRESETS = {
 class SfmOptions:
     """How structure from motion is run.
 
-    size: longer side at which features are looked for, pixels. features: most of them in a photo. neighbours: photos
-    that each is matched with, 0 for all. mapper: incremental (one photo after the other) or global (all at once).
+    size: longer side at which features are searched, pixels. features: most of them in a photo. neighbours: photos
+    that each is matched with. mapper: incremental (one photo after the other) or global (all at once).
     cameras: auto (one for all photos of equal size and EXIF focal length), one (for all of equal size), or each (photo
     its own). focal: 35 mm equivalent where EXIF has none or is wrong. side: longer side of the undistorted pictures,
     pixels (photos are never enlarged). verdict: stop or warn where the model is refused. threads: for features and
@@ -95,11 +92,6 @@ class Registration:
     positions: GpsPositions | None = None
     verdict: SfmVerdict | None = None
 
-    @property
-    def focal_ratio(self) -> float | None:
-        """Final focal length over EXIF's; None where EXIF has none."""
-        return self.focal.ratio if self.focal else None
-
 
 def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
     """Register the photos that lie in a folder.
@@ -129,9 +121,15 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
     for name, reason in solution.left_out:
         _log.warning("%s is left out: %s", name, reason)
     _log.info("focal length: %s", solution.focal.decision)
-    _report_verdict(solution.verdict)
+    verdict = solution.verdict
+    if verdict.grade == "good":
+        _log.info("structure from motion: good, by %s", ", ".join(sign.name for sign in verdict.signs))
+    for sign in verdict.objections:
+        _log.warning("structure from motion is %s: %s", sign.grade, sign.reason)
+    for text in verdict.tried[1:]:
+        _log.info("tried: %s", text)
     if options.verdict == "stop":
-        require_trust(solution.verdict)
+        require_trust(verdict)
     if positions and not align_to_gps(solution.best, scene.gps, _find_up(solution.best, options.seed)):
         positions = None
     made = _finish_registration(photos, solution, options, positions)
@@ -146,13 +144,13 @@ def _find_up(best: pycolmap.Reconstruction, seed: int) -> Float[Array, "3"]:
     return normal if np.median(heights) >= 0 else -normal
 
 
-def _report_verdict(verdict: SfmVerdict) -> None:
-    if verdict.grade == "good":
-        _log.info("structure from motion: good, by %s", ", ".join(sign.name for sign in verdict.signs))
-    for sign in verdict.objections:
-        _log.warning("structure from motion is %s: %s", sign.grade, sign.reason)
-    for text in verdict.tried[1:]:
-        _log.info("tried: %s", text)
+def require_parallax(spread: Float[Array, "n"]) -> None:
+    """spread: 1 - cos of the angle under which each point is seen. Raises: InputError: photos without parallax."""
+    if len(spread) and np.degrees(np.arccos(1 - np.clip(np.median(spread), 0, 2))) < LEAST_ANGLE:
+        raise InputError(
+            "the photos were taken from nearly one spot: nothing can be said of heights and distances; "
+            "move between photos by a quarter of the height over the ground"
+        )
 
 
 def undistort_image(registered: Registration, index: int) -> Float32[Array, "h w 3"]:
@@ -176,8 +174,7 @@ def _enter_images(photos: list[SfmPhoto], store: pycolmap.Database, options: Sfm
     """Enter cameras and images, numbered in the photos' order; returns EXIF's focal length of those that have one."""
     cameras, held = {}, {}
     for i, photo in enumerate(photos):
-        lens = {"auto": (photo.full, photo.focal), "one": photo.full, "each": i}
-        lens = lens[options.cameras]
+        lens = {"auto": (photo.full, photo.focal), "one": photo.full, "each": i}[options.cameras]
         if lens not in cameras:
             focal = photo.focal or GUESS * max(photo.width, photo.height)
             camera = pycolmap.Camera.create_from_model_name(1, "SIMPLE_RADIAL", focal, photo.width, photo.height)

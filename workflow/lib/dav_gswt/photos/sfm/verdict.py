@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import Grade, SfmSign, SfmVerdict
 from dav_gswt.photos.colmap_model import ColmapModel
-from dav_gswt.photos.planes import fit_plane, make_upright_rotation
+from dav_gswt.photos.ground_frame import fit_plane, make_upright_rotation
 from dav_gswt.photos.sfm.gps import ACROSS, LEAST_SPREAD, WORST, fit_similarity, measure_spread
 
 

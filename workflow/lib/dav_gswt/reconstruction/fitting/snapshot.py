@@ -15,7 +15,7 @@ import numpy as np
 from numpy import ndarray as Array
 
 from dav_gswt.files import UNREADABLE, atomic_file
-from dav_gswt.photos.array_file import release_pages
+from dav_gswt.photos.training_views import release_pages
 
 _log = logging.getLogger(__name__)
 

@@ -1,0 +1,138 @@
+"""The files of photos: what their EXIF says (focal length, position, time), and names for the pictures made of them."""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path, PurePosixPath
+
+import exifread
+import numpy as np
+from exifread.utils import Ratio
+
+from dav_gswt.images import image_files
+
+FILM_DIAGONAL = 43.2666  # mm, of a 36 x 24 mm frame: "35 mm equivalent" compares diagonals
+WIDEST = 1.55  # photos wider than a 3:2 sensor are cropped from a 4:3 sensor, whose diagonal the equivalent refers to
+UNITS = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # FocalPlaneResolutionUnit in millimetres
+UNSAFE = re.compile(r"[\s#]+")  # COLMAP's lists of images end a name at a blank and skip lines that begin with #
+
+
+def read_focal_length(path: Path | str) -> float | None:
+    """Focal length in pixels of the stored picture, or None where EXIF does not say.
+
+    The pixel pitch of the sensor is used if EXIF has it, else the 35 mm equivalent (`convert_equivalent`). If the
+    tagged width differs from the real width, the photo was resized and the pitch is scaled.
+    """
+    width, height = sorted(image_files.read_size(path), reverse=True)
+    tags = _read_tags(path)
+    focal, film, pitch, unit, *tagged = (
+        (_read_numbers(tags, f"EXIF {name}") or [default])[0]
+        for name, default in (
+            ("FocalLength", 0.0),
+            ("FocalLengthIn35mmFilm", 0.0),
+            ("FocalPlaneXResolution", 0.0),
+            ("FocalPlaneResolutionUnit", 2),
+            ("ExifImageWidth", 0.0),
+            ("ExifImageLength", 0.0),
+        )
+    )
+    if focal > 0 and pitch and int(unit) in UNITS:
+        longer = max(tagged)  # some programs exchange width and length
+        pixels = focal / UNITS[int(unit)] * pitch * width / (longer if longer >= 1 else width)
+    elif film > 0:
+        pixels = convert_equivalent(film, width, height)
+    else:
+        return None
+    # Beyond these limits, a fisheye of 150 degrees and a long telescope, the tag is a default or garbage.
+    return pixels if 0.13 * width < pixels < 100 * width else None
+
+
+def convert_equivalent(film: float, width: int, height: int) -> float:
+    """Focal length in pixels of a picture of this size from its 35 mm equivalent.
+
+    The equivalent compares diagonals: f = film / 43.27 mm * sqrt(w^2 + h^2). Pictures wider than 3:2 are cropped, so
+    the height of the 4:3 sensor is used for them.
+    """
+    longer, shorter = max(width, height), min(width, height)
+    across = max(shorter, 0.75 * longer) if longer > WIDEST * shorter else shorter
+    return film / FILM_DIAGONAL * (longer**2 + across**2) ** 0.5
+
+
+def read_gps_position(path: Path | str) -> tuple[float, float, float] | None:
+    """Latitude and longitude in degrees and altitude in metres, or None where EXIF does not have all three."""
+    tags = _read_tags(path)
+
+    def read(name: str) -> list[float]:
+        return np.float32(_read_numbers(tags, f"GPS GPS{name}")).tolist()  # single precision is enough: 0.1 mm
+
+    angles = []
+    for name, negative, most in (("Latitude", "S", 90.0), ("Longitude", "W", 180.0)):
+        parts = read(name)
+        if len(parts) != 3 or not 0 <= (angle := parts[0] + parts[1] / 60 + parts[2] / 3600) <= most:
+            return None
+        angles.append(-angle if str(tags.get(f"GPS GPS{name}Ref")).startswith(negative) else angle)
+    altitude = read("Altitude")
+    if not altitude or not abs(altitude[0]) < 1e5 or angles == [0.0, 0.0]:
+        return None
+    return angles[0], angles[1], -altitude[0] if read("AltitudeRef") == [1.0] else altitude[0]
+
+
+def read_capture_time(path: Path | str) -> str | None:
+    """When the photo was taken, ISO 8601 without a time zone, or None where EXIF does not say."""
+    try:
+        return datetime.strptime(str(_read_tags(path)["EXIF DateTimeOriginal"]), "%Y:%m:%d %H:%M:%S").isoformat()
+    except (KeyError, ValueError):
+        return None
+
+
+def _read_tags(path: Path | str) -> dict:
+    """The tags of a photo's EXIF; empty where there is none."""
+    try:
+        with Path(path).open("rb") as file:
+            return exifread.process_file(file, details=False, extract_thumbnail=False)
+    except OSError:
+        raise
+    except Exception:  # a damaged block may lead the parser to anything
+        return {}
+
+
+def _read_numbers(tags: dict, name: str) -> list[float]:
+    """The numbers of a tag; none if one of them is not finite."""
+    values = getattr(tags.get(name), "values", [])
+    numbers = []
+    for value in values if isinstance(values, list) else []:
+        value = value[0] if isinstance(value, tuple) and value else value  # as the parser gives floats
+        if isinstance(value, Ratio):
+            value = value.num / (value.den or 1)
+        if not isinstance(value, int | float) or not math.isfinite(value):
+            return []
+        numbers.append(float(value))
+    return numbers
+
+
+def split_name(name: str) -> tuple[str, str, str]:
+    """Path without suffix, file name, and stem. Only suffixes of pictures count, as names may have other dots."""
+    path = PurePosixPath(name)
+    bare = path.with_suffix("") if path.suffix.lower() in image_files.SUFFIXES and path.stem else path
+    return str(bare), path.name, bare.name
+
+
+def name_pictures(names: Sequence[str]) -> list[str]:
+    """The PNG that is made of each photo: its stem, or its whole path if stems are equal, and a number if need be.
+
+    Blanks and # become _, so that a name is one word in every list of images.
+    """
+    safe = [UNSAFE.sub("_", name) for name in names]
+    stems = Counter(split_name(name)[2] for name in safe)
+    out, used = [], set()
+    for name in safe:
+        stem = split_name(name)[2]
+        plain = stem if stems[stem] == 1 else name.replace("/", "_").replace(".", "_")
+        number, free = 1, plain
+        while free in used:
+            number, free = number + 1, f"{plain}_{number + 1}"
+        used.add(free)
+        out.append(f"{free}.png")
+    return out
