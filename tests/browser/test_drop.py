@@ -25,8 +25,8 @@ OTHER = Ground(discs=8, salt=99, speckle=20)
 READ = """async text => {
   // what the page says against a zip: null if all of it is read
   const { initialChunks, readChunks } = await import("./data/bundle.js");
-  const { PageError } = await import("./data/errors.js");
-  const { openSource } = await import("./data/open.js");
+  const { PageError } = await import("./data/checks.js");
+  const { openSource } = await import("./data/bundle.js");
   const { readTerrain } = await import("./scene/open_terrain.js");
   const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
   try {

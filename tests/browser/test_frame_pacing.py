@@ -1,13 +1,10 @@
 """What is drawn while something moves: less where frames come slowly, more where they come fast, and no to and fro."""
 
-import json
-
 import pytest
-from fixtures.page_visit import Visit
 
 PACE = """async ([frames, refresh, a_splat, a_pixel]) => {
   // budget and scale after each frame; a_splat: milliseconds of one; a_pixel: of all at full resolution
-  const { createFramePacing } = await import("./draw/frame_pacing.js");
+  const { createFramePacing } = await import("./draw/pacing.js");
   const pacing = createFramePacing(refresh), seen = [];
   for (let k = 0; k < frames; k++) {
     const took = Math.max(refresh, a_splat * pacing.budget, a_pixel * pacing.scale ** 2);
@@ -52,50 +49,8 @@ def test_where_pixels_are_slow_the_resolution_is_lower_and_the_budget_stays(modu
 @pytest.mark.parametrize("took, scale", [(5, 1), (21, 0.5), (84, 0.3), (10, 0.7246)])
 def test_the_first_picture_says_which_resolution_to_begin_with(modules, took, scale):
     begin = """async took => {
-      const { createFramePacing } = await import("./draw/frame_pacing.js"), pacing = createFramePacing();
+      const { createFramePacing } = await import("./draw/pacing.js"), pacing = createFramePacing();
       pacing.begin(took);
       return pacing.scale;
     }"""
     assert modules.evaluate(begin, took) == pytest.approx(scale, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    "text, found",
-    [
-        (None, None),
-        ("{", None),
-        ("null", None),
-        ('{"version":2,"device":"one","budget":5e5,"scale":1}', None),
-        ('{"version":1,"device":"two","budget":5e5,"scale":1}', None),
-        ('{"version":1,"device":"one","budget":"5e5","scale":1}', None),
-        ('{"version":1,"device":"one","budget":1e999,"scale":1}', None),
-        (f'{{"version":1,"device":"one","budget":5e5,"scale":1{" " * 2000}}}', None),
-        ('{"version":1,"device":"one","budget":9e9,"scale":7}', [6_000_000, 1]),
-        ('{"version":1,"device":"one","budget":-1,"scale":0}', [20_000, 0.3]),
-    ],
-)
-def test_a_kept_pace_is_bounded_and_ignored_when_it_is_broken(call, text, found):
-    assert call("ui/kept_pace.js", "readPace", text, "one") == (found and {"budget": found[0], "scale": found[1]})
-
-
-def test_a_pace_is_kept_rounded(call):
-    text = call("ui/kept_pace.js", "describePace", {"budget": 345678.4, "scale": 0.61803}, "one")
-    assert call("ui/kept_pace.js", "readPace", text, "one") == {"budget": 345678, "scale": 0.618}
-
-
-@pytest.mark.slow
-def test_the_next_visit_begins_with_the_pace_of_the_last(chromium, plain):
-    with chromium.new_context(viewport={"width": 160, "height": 100}) as context:
-        first = Visit(context.new_page()).open(plain)
-        assert first.page.evaluate("localStorage.getItem('davgswt.pace')") is None, "nothing was measured yet"
-        first.page.keyboard.down("w")
-        first.until("localStorage.getItem('davgswt.pace')")
-        first.page.keyboard.up("w")
-        kept = json.loads(first.page.evaluate("localStorage.getItem('davgswt.pace')"))
-        kept |= {"budget": 234_567, "scale": 0.5}
-        first.page.close()
-        second = context.new_page()
-        # once: the page before may have written when it was left
-        second.add_init_script(f"localStorage.setItem('davgswt.pace', {json.dumps(json.dumps(kept))})")
-        seen = Visit(second).open(plain)
-        assert seen.state["budget"] == 234_567

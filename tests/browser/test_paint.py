@@ -21,7 +21,7 @@ slow = pytest.mark.slow
 PAINTING = """
   const { createPainting } = await import("./ui/painting.js");
   const { describePaint, readPaint } = await import("./data/paint.js");
-  const { decodePaint, encodePaint } = await import("./data/paint_link.js");
+  const { decodePaint, encodePaint } = await import("./data/paint.js");
   const sent = [], client = { paint: points => sent.push([...points]), adjust: change => sent.push(change) };
   const painting = createPainting(manifest, client, () => {});
   const stroke = (...dabs) => {
@@ -148,7 +148,7 @@ def test_a_bad_file_is_refused(modules, manifest, change, message):
 
 def test_offsets_give_the_shares_that_are_wanted(modules, manifest):
     act = """
-      const { areSettable, changeShare, createShares } = await import("./ui/shares.js");
+      const { areSettable, changeShare, createShares } = await import("./ui/paint_sliders.js");
       const shares = createShares(manifest), begun = shares.sharesOf([0, 0]);
       const reached = [[0.25, 0.75], [0, 1]].map(wanted => shares.sharesOf(shares.offsetsFor(wanted)));
       const fixed = { classes: { ...manifest.classes, rule: [...manifest.classes.rule, { kind: "height" }] } };
@@ -166,7 +166,7 @@ def test_only_cells_that_a_dab_touches_are_made_again(modules, manifest):
           const { createTerrainTables } = await import("./worker/terrain_tables.js");
           const { createHeights } = await import("./terrain/heights.js");
           const { lookUpCell } = await import("./terrain/cells.js");
-          const { paintPoints } = await import("./worker/repaint.js");
+          const { paintPoints } = await import("./worker/terrain_tables.js");
           const terrain = createTerrainTables(manifest, createHeights());
           const borders = () => {
             const found = new Map();

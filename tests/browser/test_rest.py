@@ -9,7 +9,7 @@ from dav_gswt.study.terrain.browser import served
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 BUDGETS = """async ([drawn, all]) => {
   // budgets of the pictures at rest, and when each was due, where there are `all` Gaussians
-  const { createRest } = await import("./draw/rest.js");
+  const { createRest } = await import("./draw/pacing.js");
   const rest = createRest(), seen = [], progress = [];
   rest.restart(1000, drawn);
   for (let now = 1000; now < 3000; now += 16) {
@@ -23,7 +23,7 @@ BUDGETS = """async ([drawn, all]) => {
 }"""
 SLICES = """async ([blocks, cost]) => {
   // slices of a picture of so many blocks, of `cost` milliseconds each
-  const { createSlicedPicture } = await import("./draw/sliced_picture.js");
+  const { createSlicedPicture } = await import("./draw/renderer.js");
   let now = 0, done = 0;
   const gl = new Proxy({}, { get: (_, name) => ({
     SIGNALED: 1, fenceSync: () => 1, getSyncParameter: () => Number(now >= done), createTexture: () => ({}),

@@ -27,7 +27,7 @@ VALUE = dict(unit="metre", half=2.0, photos=PHOTOS, rounds=ROUNDS, thumb=120, co
 )
 def test_a_story_is_read_or_refused(call, change, sound):
     if sound:
-        assert call("data/story.js", "readStory", VALUE | change) == VALUE
+        assert call("ui/story.js", "readStory", VALUE | change) == VALUE
     else:
         with pytest.raises(Error, match="story.json is not as the workflow writes it"):
-            call("data/story.js", "readStory", VALUE | change)
+            call("ui/story.js", "readStory", VALUE | change)

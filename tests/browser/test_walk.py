@@ -46,39 +46,36 @@ def test_each_key_does_what_the_help_says(moving, key, condition):
     moving.page.keyboard.up(key)
 
 
-STEP = """async ([place, mode, held, wish]) => {
-  const { createWalker, moveBy, stepWalker } = await import("./ui/walker.js");
+STEP = """async ([place, mode, held, seconds]) => {
+  const { createWalker, stepWalker } = await import("./ui/walker.js");
   const walker = createWalker({ tile_side: 4, eye_floor: 0.5 }, place);
   walker.mode = mode;
   for (const action of held) walker.held.add(action);
-  const still = { forward: 0, right: 0, turn: 0, tilt: 0, rise: 0, run: 0 };
-  const moved = wish ? moveBy(walker, { ...still, ...wish }, 0.5) : stepWalker(walker, 0.5);
+  const moved = stepWalker(walker, seconds);
   return [moved, walker.x, walker.y, walker.eye, walker.yaw, walker.pitch];
 }"""
 AHEAD = dict(x=3.0, y=5.0, eye=2.0, yaw=90.0, pitch=-30.0)
 
 
 @pytest.mark.parametrize(
-    "mode, held, wish, expected",
+    "mode, held, seconds, expected",
     [
         # half a second at 1.2 eye heights of 2 a second
-        ("walk", ["forward"], None, [True, 3, 6.2, 2, 90, -30]),
-        ("walk", ["back", "run"], None, [True, 3, 0.2, 2, 90, -30]),
-        ("walk", ["right"], None, [True, 4.2, 5, 2, 90, -30]),
-        ("walk", ["left", "forward"], None, [True, 3 - 1.2 / 2**0.5, 5 + 1.2 / 2**0.5, 2, 90, -30]),
-        ("walk", ["forward", "back"], None, [False, 3, 5, 2, 90, -30]),
-        ("walk", ["turnLeft"], None, [True, 3, 5, 2, 125, -30]),
-        ("walk", ["turnRight", "higher"], None, [True, 3, 5, 2 * 2.718281828**0.6, 55, -30]),
-        ("walk", [], {"tilt": -1, "turn": -3}, [True, 3, 5, 2, 345, -65]),
-        ("walk", [], {"tilt": 4}, [True, 3, 5, 2, 90, 90]),
-        ("walk", [], {"rise": -9}, [True, 3, 5, 0.5, 90, -30]),
-        ("walk", [], {"rise": 9}, [True, 3, 5, 64, 90, -30]),
-        ("fly", ["forward"], None, [True, 3, 5 + 1.2 * 0.75**0.5, 1.4, 90, -30]),
+        ("walk", ["forward"], 0.5, [True, 3, 6.2, 2, 90, -30]),
+        ("walk", ["back", "run"], 0.5, [True, 3, 0.2, 2, 90, -30]),
+        ("walk", ["right"], 0.5, [True, 4.2, 5, 2, 90, -30]),
+        ("walk", ["left", "forward"], 0.5, [True, 3 - 1.2 / 2**0.5, 5 + 1.2 / 2**0.5, 2, 90, -30]),
+        ("walk", ["forward", "back"], 0.5, [False, 3, 5, 2, 90, -30]),
+        ("walk", ["turnLeft"], 0.5, [True, 3, 5, 2, 125, -30]),
+        ("walk", ["turnRight", "higher"], 0.5, [True, 3, 5, 2 * 2.718281828**0.6, 55, -30]),
+        ("walk", ["lower"], 9, [True, 3, 5, 0.5, 90, -30]),
+        ("walk", ["higher"], 9, [True, 3, 5, 64, 90, -30]),
+        ("fly", ["forward"], 0.5, [True, 3, 5 + 1.2 * 0.75**0.5, 1.4, 90, -30]),
     ],
     ids=lambda value: str(value)[:40],
 )
-def test_a_step_goes_where_one_looks_within_bounds(modules, mode, held, wish, expected):
-    assert modules.evaluate(STEP, [AHEAD, mode, held, wish]) == pytest.approx(expected, abs=1e-6)
+def test_a_step_goes_where_one_looks_within_bounds(modules, mode, held, seconds, expected):
+    assert modules.evaluate(STEP, [AHEAD, mode, held, seconds]) == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 ORBIT = """async ([place, turns, factor]) => {
   // where the eye is at first, after turns and after a zoom, over level ground
-  const { createOrbit } = await import("./ui/orbit.js");
+  const { createOrbit } = await import("./ui/controls.js");
   const { createWalker } = await import("./ui/walker.js");
   const { cameraAt } = await import("./terrain/camera.js");
   const { createHeights } = await import("./terrain/heights.js");

@@ -2,8 +2,8 @@
 
 import { OVERLAYS } from "../draw/overlays.js";
 import { createRenderer } from "../draw/renderer.js";
-import { backdropOptions } from "../scene/backdrop_options.js";
-import { checkCamera } from "./arguments.js";
+import { backdropOptions } from "../scene/open_terrain.js";
+import { checkCamera } from "./queries.js";
 
 /** @typedef {import("../scene/open_terrain.js").OpenTerrain} OpenTerrain */
 

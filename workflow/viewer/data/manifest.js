@@ -5,10 +5,10 @@ import {
   brief, isColour, isCoordinate, isDigest, isDirection, isFilled, isInside, isLength, isNatural, isRange, isSalt,
   isShare, isVector, isWhole,
 } from "./checks.js";
-import { REMAKE } from "./errors.js";
+import { REMAKE } from "./checks.js";
 import { findCoverFault, findCrowd, pickClasses } from "./land_cover.js";
 import { CACHE_BYTES, MAX_COUNT, MAX_LEVELS, MAX_ORDERS } from "./layout.js";
-import { chunkBytes, deviationOf, isEncoding, OLDEST, VERSION } from "./records.js";
+import { chunkBytes, deviationOf, isEncoding, OLDEST, VERSION } from "./layout.js";
 
 /**
  * @typedef {{ level: number, file: string, bytes: number, count: number, orders: number[],
@@ -17,7 +17,7 @@ import { chunkBytes, deviationOf, isEncoding, OLDEST, VERSION } from "./records.
  * @typedef {{ level: number, mean_scale?: number, distance: number | null, band?: number }} LevelEntry
  * @typedef {{ zenith: number[], horizon: number[], sun?: { direction: number[], colour?: number[] } }} Sky
  * @typedef {{ format: string, version: number, unit: string, tile_side: number, salt: number, eye_floor: number,
- *   ground_colour: number[], sky: Sky, encoding: import("./records.js").Encoding, directions: number[][],
+ *   ground_colour: number[], sky: Sky, encoding: import("./layout.js").Encoding, directions: number[][],
  *   levels: LevelEntry[], tiles: TileEntry[], materials: import("./land_cover.js").MaterialEntry[],
  *   classes?: import("../terrain/classes.js").ClassesEntry, objects?: import("./land_cover.js").ObjectEntry[],
  *   scatter?: import("../terrain/scatter.js").ScatterEntry,

@@ -1,14 +1,14 @@
 // Quantization of Gaussians to records: the same grid, steps and bytes as dav_gswt/bundle/encoding.py, for sets that
 // the page itself converts to a bundle.
 
-import { MAX_TURN, RECORD, TURN_STEPS } from "./records.js";
+import { MAX_TURN, RECORD, TURN_STEPS } from "./layout.js";
 
 /**
  * Gaussians in flat lists; turns: quaternions w x y z; paint: colour and opacity, 4 bytes each.
  *
  * @typedef {{ count: number, centres: Float32Array, logScales: Float32Array, turns: Float32Array,
  *   paint: Uint8Array | Uint8ClampedArray }} Gaussians
- * @typedef {import("./records.js").Encoding} Encoding
+ * @typedef {import("./layout.js").Encoding} Encoding
  */
 
 const PLACES = 65535, MIN_STEPS = 1024; // steps of the grid along an axis; fewest of them along a tile's side

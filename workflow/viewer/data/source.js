@@ -1,7 +1,7 @@
 // Sources of a bundle's files: the page's own folder, or files that were dropped onto the page. Nothing is allocated
 // for a file before its size is compared with the one that is expected.
 
-import { PageError, REMAKE } from "./errors.js";
+import { PageError, REMAKE } from "./checks.js";
 
 /**
  * `read(file, size, options)` gives exactly `size` bytes (null: at most MAX_BYTES), or throws a PageError.

@@ -1,7 +1,7 @@
 // Zip archives from untrusted sources: entries are read from the file one by one, sizes and names are checked before
 // anything is allocated, checksums after. Stored and deflated entries; no zip64.
 
-import { PageError } from "./errors.js";
+import { PageError } from "./checks.js";
 import { MAX_FILES } from "./source.js";
 
 const END = 0x06054b50, ENTRY = 0x02014b50, LOCAL = 0x04034b50; // signatures of records

@@ -1,6 +1,6 @@
 // WebGL2: context, programs, textures.
 
-import { PageError } from "../data/errors.js";
+import { PageError } from "../data/checks.js";
 
 /** @typedef {WebGL2RenderingContext} GL */
 

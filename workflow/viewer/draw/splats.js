@@ -1,16 +1,16 @@
 // Splats on the GPU: all records in one texture, pages of orders in another, and two instanced draws a picture, one for
 // far tiles and one for the 3 x 3 block about the eye. A block of instances is a page of entries in one cell.
 
-import { PageError } from "../data/errors.js";
+import { PageError } from "../data/checks.js";
 import {
   BLOCK, MAX_LEVELS, NEAR, orderPages, PAGE, PAGES_A_ROW, PLACE, PLACES_A_ROW, recordRows, ROW,
 } from "../data/layout.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import { rateOf } from "../terrain/sphere.js";
 import { createProgram, createTexture, setAxes } from "./gl.js";
-import { setHorizon } from "./horizon.js";
 import { OBJECTS, overlayColours } from "./overlays.js";
 import { FRAGMENT, vertexShader } from "./shaders.js";
+import { setHorizon } from "./sky.js";
 
 /**
  * @typedef {import("./gl.js").GL} GL
@@ -19,9 +19,8 @@ import { FRAGMENT, vertexShader } from "./shaders.js";
  * @typedef {import("../worker/frame_builder.js").FrameAnswer} FrameAnswer
  * @typedef {Record<string, WebGLUniformLocation | null>} Uniforms
  *
- * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there;
- * split: share of the picture, from the left, that shows no overlay (default: 0).
- * @typedef {{ end: number, low: number, overlay: number, split?: number }} DrawOptions
+ * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there.
+ * @typedef {{ end: number, low: number, overlay: number }} DrawOptions
  * @typedef {ReturnType<typeof createSplats>} Splats
  */
 
@@ -132,7 +131,7 @@ export function createSplats(gl, manifest, heights) {
      * @param {number} [from] the first block
      * @param {number} [many] of them; all of a picture, in slices or at once, are drawn in order
      */
-    draw(camera, { end, low, overlay, split = 0 }, from = 0, many = far.length + close.length) {
+    draw(camera, { end, low, overlay }, from = 0, many = far.length + close.length) {
       if (!frame) return;
       use();
       setConstants(gl, uniforms, manifest);
@@ -157,19 +156,11 @@ export function createSplats(gl, manifest, heights) {
       bind(PLACES, places);
       bind(OWNERS, owners);
       if (relief) bind(RELIEF, relief);
-      const edge = Math.round(split * camera.width);
-      for (const [left, right, shown] of edge ? [[0, edge, 0], [edge, camera.width, overlay]] : [[0, 0, overlay]]) {
-        gl.uniform1i(uniforms.overlay, shown);
-        if (edge) {
-          gl.enable(gl.SCISSOR_TEST);
-          gl.scissor(left, 0, right - left, camera.height);
-        }
-        bind(ENTRIES, entries);
-        far.draw(from, many);
-        bind(ENTRIES, nearEntries);
-        close.draw(from - far.length, many);
-      }
-      if (edge) gl.disable(gl.SCISSOR_TEST);
+      gl.uniform1i(uniforms.overlay, overlay);
+      bind(ENTRIES, entries);
+      far.draw(from, many);
+      bind(ENTRIES, nearEntries);
+      close.draw(from - far.length, many);
       gl.activeTexture(gl.TEXTURE0);
       gl.bindVertexArray(null);
     },

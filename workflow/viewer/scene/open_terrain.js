@@ -1,15 +1,24 @@
-// An open terrain: its manifest and surface, the worker that chooses what is drawn, and the reading of its chunks. What
-// the page and the importable terrain (terrain_api.js) have in common.
+// An open terrain: its manifest and surface, the worker that chooses what is drawn, the reading of its chunks, and what a
+// frame draws. The page and the importable terrain (terrain_api.js) have this in common.
 
 import { initialChunks, readChunks, readHeightMap, readManifest, readPictures } from "../data/bundle.js";
 import { chunkKey, listChunks } from "../data/layout.js";
+import { REACH } from "../terrain/cells.js";
 import { createHeights } from "../terrain/heights.js";
+import { findEnd, findReach } from "../terrain/sphere_cells.js";
 import { createWorkerClient } from "../worker/worker_client.js";
 
 const MOST_PENDING = 12; // chunks on their way while a view waits for more: it may have changed before they arrive
 const TURN = 4; // milliseconds until what is pending is looked at again
+const MIN_LOW = 1e-4; // sine of the angle below the horizon at which tiles end, at least
 
 /**
+ * @typedef {import("../worker/frame_builder.js").FrameAnswer} FrameAnswer
+ *
+ * i, j: the cell; tile: the one in it, of the first material that shows; level to last: the levels of detail that are
+ * drawn; order: index of the direction of its pre-sorted order, NO_ORDER where it is sorted by depth.
+ * @typedef {{ i: number, j: number, tile: number, level: number, last: number, order: number }} DrawnCell
+ *
  * What is read before anything is drawn.
  * @typedef {{ source: import("../data/source.js").Source, manifest: import("../data/manifest.js").Manifest,
  *   pixels: Float32Array | null, pictures: import("../terrain/classes.js").Pictures }} TerrainFiles
@@ -37,7 +46,7 @@ export async function readTerrain(source) {
  */
 export function openTerrain({ source, manifest, pixels, pictures }, { onRecords, onFrame, onError }) {
   let begun = false; // the first chunks were read
-  /** @type {import("../worker/frame_builder.js").FrameAnswer | null} */
+  /** @type {FrameAnswer | null} */
   let last = null;
   /** @type {unknown} */
   let failure = null; // of reading a chunk that a view needs
@@ -107,17 +116,14 @@ export function openTerrain({ source, manifest, pixels, pictures }, { onRecords,
      *
      * @param {import("../terrain/camera.js").Camera} camera
      * @param {number} budget
-     * @param {() => void} [check] throws to give up
      */
-    async askForAll(camera, budget, check = () => {}) {
+    async askForAll(camera, budget) {
       do {
         client.ask(camera, budget, true);
         await client.answered();
-        check();
         while (begun && last?.missing.length && pending.size && !stop.signal.aborted) {
           if (failure) throw failure;
           await new Promise((done) => setTimeout(done, TURN));
-          check();
         }
       } while (begun && last?.missing.length && !stop.signal.aborted);
     },
@@ -131,3 +137,33 @@ export function openTerrain({ source, manifest, pixels, pictures }, { onRecords,
 
 /** @param {number[]} values */
 const mean = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
+
+/**
+ * Where the tiles of a picture end and its backdrop begins: `end` and `low` of the options that renderers take.
+ *
+ * @param {{ manifest: import("../data/manifest.js").Manifest, heights: import("../terrain/heights.js").HeightField }} terrain
+ * @param {FrameAnswer | null} frame the last one
+ * @param {import("../terrain/camera.js").Camera} camera
+ */
+export function backdropOptions({ manifest, heights }, frame, camera) {
+  const farthest = REACH * manifest.tile_side;
+  if (heights.kind === "sphere") {
+    return findEnd(heights, camera.eye, frame?.reach ?? findReach({ side: manifest.tile_side }, heights, camera.eye));
+  }
+  return { end: frame?.reach ?? farthest, low: Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest) };
+}
+
+/**
+ * The cells of a frame, back to front.
+ *
+ * @param {FrameAnswer} frame
+ * @returns {DrawnCell[]}
+ */
+export function listDrawnCells({ drawn, i0, j0 }) {
+  const cells = [];
+  for (let k = 0; k < drawn.length; k += 6) {
+    const [di, dj, tile, level, last, order] = drawn.subarray(k, k + 6);
+    cells.push({ i: i0 + di, j: j0 + dj, tile, level, last, order });
+  }
+  return cells;
+}

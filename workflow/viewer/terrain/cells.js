@@ -4,13 +4,13 @@ import { RING } from "./cell_ring.js";
 import { tileAt } from "./choice.js";
 import { frameAt, locate } from "./sphere.js";
 import { columnOf, tileOn } from "./sphere_edges.js";
-import { createThing } from "./things.js";
+import { createThing } from "./scatter.js";
 
 /** @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables */
 
 export const REACH = 48; // tile sides to the last tiles: 97 x 97 cells
 const PARTS = 8; // heights within a cell are sampled at (PARTS + 1)^2 points
-/** @type {import("./things.js").Thing[]} */
+/** @type {import("./scatter.js").Thing[]} */
 const NONE = [];
 
 /**
@@ -50,7 +50,7 @@ export function createCellCache(levels) {
     i: doubles().fill(NaN), j: doubles(), tile: new Uint16Array(n), h: doubles(), east: doubles(), north: doubles(),
     low: doubles(), high: doubles(), borders: 0,
     tiles: /** @type {number[][]} */ (new Array(n)), counts: new Int32Array(n * levels),
-    things: /** @type {import("./things.js").Thing[][]} */ (new Array(n)),
+    things: /** @type {import("./scatter.js").Thing[][]} */ (new Array(n)),
     border: /** @type {(Border | null)[]} */ (new Array(n)),
   };
 }

@@ -11,7 +11,7 @@ import { inNearBlock, visitBackToFront } from "./draw_order.js";
  * in for missing ones and does not fade; missing: bits of the levels that have not arrived; count: of its Gaussians;
  * direction: of its pre-sorted order; spot: where it lies on a sphere, of which di and dj are the column and the row then.
  * @typedef {{ di: number, dj: number, at: number, tile: number, tiles: number[],
- *   border: import("./cells.js").Border | null, things: import("./things.js").Thing[], close: boolean,
+ *   border: import("./cells.js").Border | null, things: import("./scatter.js").Thing[], close: boolean,
  *   nearest: number, farthest: number, arrived: number, lo: number, hi: number, whole: boolean, missing: number,
  *   count: number, direction: number, spot: import("./sphere_cells.js").Spot | null }} Cell
  *

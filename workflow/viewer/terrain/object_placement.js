@@ -7,7 +7,7 @@ import { nearestOrder } from "./draw_order.js";
 import { frustumPlanes } from "./frustum.js";
 
 /**
- * @typedef {import("./things.js").Thing} Thing
+ * @typedef {import("./scatter.js").Thing} Thing
  * @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables
  */
 

@@ -2,8 +2,8 @@
 
 import { tileColour } from "../draw/overlays.js";
 import { tileUnder } from "../terrain/cells.js";
-import { element, takesLetters } from "./dom.js";
-import { unitName } from "./numbers.js";
+import { element, listenToKeys } from "./dom.js";
+import { unitName } from "./legend.js";
 import { moveTo } from "./walker.js";
 
 const CELLS = 9; // along a side
@@ -52,9 +52,9 @@ export function createMinimap(viewer) {
   };
   button.addEventListener("click", toggle);
   addEventListener("keydown", (event) => {
-    if (event.code === "Escape" && !map.hidden && !event.defaultPrevented) return toggle();
-    if (event.code === "KeyN" && !event.ctrlKey && !event.metaKey && !event.altKey && !takesLetters(event.target)) toggle();
+    if (event.code === "Escape" && !map.hidden && !event.defaultPrevented) toggle();
   });
+  listenToKeys({ KeyN: toggle });
   map.addEventListener("click", ({ offsetX, offsetY }) => {
     const { scene } = viewer;
     if (!scene) return;

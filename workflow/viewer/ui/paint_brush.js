@@ -1,6 +1,6 @@
 // The brush: strokes of a pointer or of the space bar on the ground, and the ring that shows where it is.
 
-import { hitGround, projectPoint, rayThrough } from "../terrain/ray.js";
+import { hitGround, projectPoint, rayThrough } from "../terrain/camera.js";
 import { element, isField } from "./dom.js";
 
 /**

@@ -1,11 +1,10 @@
 // The panel of materials: brushes, history, densities and shares, links and files.
 
 import { MAX_PAINTED } from "../terrain/painted.js";
-import { element, isField, swatch } from "./dom.js";
+import { createPanel, element, isField, swatch } from "./dom.js";
 import { createBrush, ERASER, SIZES } from "./paint_brush.js";
-import { createPaintKeep } from "./paint_keep.js";
+import { createPaintKeep, readPaintFile } from "./paint_keep.js";
 import { addDensities, addShares } from "./paint_sliders.js";
-import { createPanel } from "./panel.js";
 
 /**
  * @typedef {import("./viewer.js").Viewer} Viewer
@@ -82,7 +81,7 @@ export function createPaintPanel(viewer) {
   open.addEventListener("click", () => file.click());
   file.addEventListener("change", guarded(async () => {
     const chosen = file.files?.[0];
-    if (chosen) await keep.open(chosen).finally(() => (file.value = ""));
+    if (chosen) keep.load(await readPaintFile(chosen).finally(() => (file.value = "")));
   }));
   size.addEventListener("input", () => {
     brush.radius = Number(size.value);

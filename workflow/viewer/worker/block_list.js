@@ -78,7 +78,7 @@ export function createPlaceList({ objects }) {
     /**
      * Add an object; returns the number of its place.
      *
-     * @param {import("../terrain/things.js").Thing} thing
+     * @param {import("../terrain/scatter.js").Thing} thing
      * @param {number} mark see `cellMark`
      * @param {number} level for places in the near block
      */

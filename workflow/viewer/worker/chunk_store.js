@@ -3,7 +3,7 @@
 // times: a chunk that is evicted after its last reading is lost, and a coarser level is drawn instead.
 
 import { CACHE_BYTES, chunkKey, CODE_SHIFT, ROW } from "../data/layout.js";
-import { parseChunk } from "../data/records.js";
+import { parseChunk } from "../data/layout.js";
 import { RIM } from "../terrain/frustum.js";
 import { createPagePool } from "./page_pool.js";
 

@@ -2,8 +2,8 @@
 // or materials merges them instead of sorting its own Gaussians.
 
 import { chunkKey, MAX_ORDERS } from "../data/layout.js";
-import { indexType } from "../data/records.js";
-import { createDepthSorter } from "../terrain/depth_sort.js";
+import { indexType } from "../data/layout.js";
+import { createDepthSorter } from "../terrain/draw_order.js";
 
 const MOST_BYTES = 64e6; // of all orders
 

@@ -10,13 +10,12 @@ import { cellMark, createBlockList, createPlaceList } from "./block_list.js";
 import { createBorders } from "./borders.js";
 import { createChunkStore, WISHED } from "./chunk_store.js";
 import { createNearSorter } from "./near_sort.js";
-import { adjustCover, paintPoints } from "./repaint.js";
 import { createSortedBatches } from "./sorted_batches.js";
-import { createTerrainTables } from "./terrain_tables.js";
+import { adjustCover, createTerrainTables, paintPoints } from "./terrain_tables.js";
 
 /**
  * @typedef {import("../terrain/frustum.js").Cell} Cell
- * @typedef {import("../terrain/things.js").Thing} Thing
+ * @typedef {import("../terrain/scatter.js").Thing} Thing
  * @typedef {import("../terrain/camera.js").Camera} Camera
  * @typedef {import("./terrain_tables.js").TerrainTables} TerrainTables
  * @typedef {ReturnType<typeof placeObjects>} Groups

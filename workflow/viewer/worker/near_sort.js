@@ -2,14 +2,14 @@
 // there, with those of the objects that are drawn with its cells.
 
 import { CODE_SHIFT, MAX_LEVELS, SLOTS } from "../data/layout.js";
-import { createDepthSorter } from "../terrain/depth_sort.js";
+import { createDepthSorter } from "../terrain/draw_order.js";
 import { frustumPlanes, RIM } from "../terrain/frustum.js";
 import { bend, FACES, rateOf } from "../terrain/sphere.js";
 import { STRETCH } from "../terrain/sphere_cells.js";
 
 /**
  * @typedef {import("../terrain/frustum.js").Cell} Cell
- * @typedef {import("../terrain/things.js").Thing} Thing
+ * @typedef {import("../terrain/scatter.js").Thing} Thing
  * @typedef {import("../terrain/cells.js").Border} Border
  * @typedef {import("../terrain/camera.js").Camera} Camera
  * @typedef {Pick<import("./terrain_tables.js").TerrainTables, "side" | "near" | "deviations" | "heights" | "sphere">} Tables
