@@ -1,7 +1,6 @@
 // The endless terrain in other pages: docs/terrain-api.md. Types: terrain_api.d.ts, which a test holds to this file.
 
-import { createPainter } from "./api/painter.js";
-import { checkCamera, createChunkReader, createGround } from "./api/queries.js";
+import { checkCamera, createChunkReader, createGround, createPainter } from "./api/parts.js";
 import { openSource } from "./data/bundle.js";
 import { PageError } from "./data/checks.js";
 import { NO_ORDER } from "./data/layout.js";

@@ -68,12 +68,7 @@ export async function sourceOf(files) {
     + "Drop a bundle's folder or its gswt.zip.");
 }
 
-/**
- * Read and check the manifest. Throws a PageError.
- *
- * @param {Source} source
- * @returns {Promise<Manifest>}
- */
+/** The checked manifest. Throws a PageError. @param {Source} source @returns {Promise<Manifest>} */
 export async function readManifest(source) {
   const text = new TextDecoder().decode(await source.read(NAME, null));
   let manifest;
@@ -90,14 +85,11 @@ export async function readManifest(source) {
 /**
  * The pixels of the height map, or null where there is none. Throws a PageError.
  *
- * @param {Manifest} manifest
- * @param {Source} source
+ * @param {Manifest} manifest @param {Source} source
  */
 export async function readHeightMap({ heights }, source) {
   if (heights?.kind !== "image") return null;
-  const buffer = await source.read(heights.file, heights.bytes);
-  await checkDigest(buffer, heights);
-  const pixels = new Float32Array(buffer);
+  const pixels = new Float32Array(await readChecked(source, heights));
   if (!pixels.every(isCoordinate)) {
     throw new PageError(`${heights.file}: a height is not finite, or beyond all bounds. ${REMAKE}`);
   }
@@ -107,17 +99,14 @@ export async function readHeightMap({ heights }, source) {
 /**
  * The pixels of the classes' pictures, by file. Throws a PageError.
  *
- * @param {Manifest} manifest
- * @param {Source} source
+ * @param {Manifest} manifest @param {Source} source
  * @returns {Promise<import("../terrain/classes.js").Pictures>}
  */
 export async function readPictures({ classes }, source) {
   const pictures = new Map();
   for (const term of classes?.rule ?? []) {
     if (term.kind !== "image" || pictures.has(term.file)) continue;
-    const buffer = await source.read(term.file, term.bytes);
-    await checkDigest(buffer, term);
-    pictures.set(term.file, new Uint8Array(buffer));
+    pictures.set(term.file, new Uint8Array(await readChecked(source, term)));
   }
   return pictures;
 }
@@ -138,8 +127,7 @@ export function initialChunks(manifest) {
 /**
  * Read chunks and hand each to `take` as it arrives. The first failure stops all other requests and is thrown.
  *
- * @param {QueueItem[]} queue
- * @param {Source} source
+ * @param {QueueItem[]} queue @param {Source} source
  * @param {{ take: (chunk: Chunk) => void, onProgress?: (progress: Progress) => void, signal?: AbortSignal }} options
  */
 export async function readChunks(queue, source, { take, onProgress = () => {}, signal }) {
@@ -156,8 +144,7 @@ export async function readChunks(queue, source, { take, onProgress = () => {}, s
   const readNext = async () => {
     while (next < queue.length) {
       const { tile, entry } = queue[next++];
-      const buffer = await source.read(entry.file, entry.bytes, { signal: stop.signal, onBytes });
-      await checkDigest(buffer, entry);
+      const buffer = await readChecked(source, entry, { signal: stop.signal, onBytes });
       checkOrders(buffer, entry);
       stop.signal.throwIfAborted();
       take({ tile, level: entry.level, count: entry.count, buffer });
@@ -178,8 +165,7 @@ export async function readChunks(queue, source, { take, onProgress = () => {}, s
 /**
  * Every order must hold each Gaussian once: entries beyond the chunk would draw what is not there.
  *
- * @param {ArrayBuffer} buffer
- * @param {ChunkEntry} entry
+ * @param {ArrayBuffer} buffer @param {ChunkEntry} entry
  */
 function checkOrders(buffer, { file, count, orders }) {
   const indices = new (indexType(count))(buffer, count * RECORD), seen = new Uint8Array(count);
@@ -195,17 +181,20 @@ function checkOrders(buffer, { file, count, orders }) {
 }
 
 /**
- * Compare with the manifest's SHA-256 where the browser offers it (https, or this machine's own address).
+ * The bytes of a file, compared with the manifest's SHA-256 where the browser offers it (https, or this machine's own
+ * address).
  *
- * @param {ArrayBuffer} buffer
- * @param {{ file: string, sha256?: string }} entry
+ * @param {Source} source @param {{ file: string, bytes: number, sha256?: string }} entry
+ * @param {import("./source.js").ReadOptions} [options]
  */
-async function checkDigest(buffer, { file, sha256 }) {
-  if (!globalThis.crypto?.subtle || typeof sha256 !== "string") return;
+async function readChecked(source, { file, bytes, sha256 }, options) {
+  const buffer = await source.read(file, bytes, options);
+  if (!globalThis.crypto?.subtle || sha256 === undefined) return buffer;
   const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", buffer));
   const text = Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
   if (text !== sha256.toLowerCase()) {
     throw new PageError(
       `${file} is damaged (its SHA-256 is not the manifest's). Reload the page. If that does not help: ${REMAKE}`);
   }
+  return buffer;
 }

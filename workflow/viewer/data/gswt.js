@@ -88,9 +88,7 @@ const chunkName = ({ tile, level }) => `lod${level}_tile_${tile}.bin`;
 /**
  * The manifest of a set. Throws a PageError: it spreads too far.
  *
- * @param {GaussianSet[]} sets
- * @param {number} levels
- * @param {number} tiles
+ * @param {GaussianSet[]} sets @param {number} levels @param {number} tiles
  * @returns {Manifest}
  */
 function makeManifest(sets, levels, tiles) {
@@ -124,9 +122,7 @@ function makeManifest(sets, levels, tiles) {
 /**
  * Add Gaussians to the sums of a level and widen the heights of a tile.
  *
- * @param {GaussianSet} set
- * @param {LevelSum} sum
- * @param {number[]} z
+ * @param {GaussianSet} set @param {LevelSum} sum @param {number[]} z
  */
 function addToSums({ count, centres, logScales, paint }, sum, z) {
   for (let k = 0; k < count; k++) {
@@ -148,12 +144,7 @@ function orderDirections() {
 
 const sort = createDepthSorter();
 
-/**
- * The bytes of a chunk.
- *
- * @param {GaussianSet} set
- * @param {Manifest} manifest
- */
+/** The bytes of a chunk. @param {GaussianSet} set @param {Manifest} manifest */
 function makeChunk(set, { encoding, directions }) {
   const { count, centres } = set, chunk = new ArrayBuffer(chunkBytes(count, directions.length));
   writeRecords(chunk, set, encoding);
@@ -168,8 +159,7 @@ function makeChunk(set, { encoding, directions }) {
 /**
  * The Gaussians of a PLY file. Throws a PageError: the file is no such PLY, or a value is not finite.
  *
- * @param {ArrayBuffer} buffer
- * @param {string} name
+ * @param {ArrayBuffer} buffer @param {string} name
  * @returns {import("./quantize.js").Gaussians}
  */
 function parsePly(buffer, name) {
@@ -197,8 +187,7 @@ function parsePly(buffer, name) {
 /**
  * Where a file's vertices begin, how many bytes each has and at which offsets the properties are.
  *
- * @param {ArrayBuffer} buffer
- * @param {string} name
+ * @param {ArrayBuffer} buffer @param {string} name
  */
 function parseHeader(buffer, name) {
   /** @param {string} what */

@@ -1,7 +1,7 @@
-// Layout of a chunk's bytes, and of what the worker hands to the GPU: record rows, pages of orders, blocks of instances,
-// places of objects. A chunk has one 16-byte record a Gaussian (a texel of four 32-bit words), then its orders. It is
-// written by dav_gswt/bundle/encoding.py, and by quantize.js for sets that the page converts; draw/shaders.js decodes it.
-// An object of the terrain is numbered like a tile, after all tiles.
+// Layout of a chunk's bytes, and of what the worker hands to the GPU: record rows, pages of orders, blocks of
+// instances, places of objects. A chunk has one 16-byte record a Gaussian (a texel of four 32-bit words), then its
+// orders. dav_gswt/bundle/encoding.py writes it, and quantize.js for sets that the page converts; draw/shaders.js
+// decodes it. An object of the terrain is numbered like a tile, after all tiles.
 
 /**
  * @typedef {import("./manifest.js").Manifest} Manifest
@@ -13,32 +13,18 @@
 
 export const VERSION = 3, OLDEST = 2; // of the manifest; version 2 does not name its only material
 export const RECORD = 16; // bytes: position 3 x 16 bits; deviations, rotation 3 x 8 bits each; colour and opacity
-export const WIDE = 65536; // from this number of Gaussians on, an index of an order takes four bytes
+const WIDE = 65536; // from this number of Gaussians on, an index of an order takes four bytes
 export const FARTHEST = 1e9; // of all lengths: single precision keeps their squares finite
 const MAX_STEPS = 65535, MAX_LOG = 60; // of the grid; of the logarithm of a deviation
 export const MAX_TURN = Math.sin(Math.PI / 8), TURN_STEPS = 127; // largest of a quaternion's x, y, z, and its steps
 
-/**
- * Type of a chunk's orders.
- *
- * @param {number} count
- */
+/** Type of a chunk's orders. @param {number} count */
 export const indexType = (count) => (count < WIDE ? Uint16Array : Uint32Array);
 
-/**
- * Bytes of a chunk.
- *
- * @param {number} count
- * @param {number} orders
- */
+/** Bytes of a chunk. @param {number} count @param {number} orders */
 export const chunkBytes = (count, orders) => count * (RECORD + orders * indexType(count).BYTES_PER_ELEMENT);
 
-/**
- * Is this an encoding that can be decoded?
- *
- * @param {any} value
- * @returns {value is Encoding}
- */
+/** Is this an encoding that can be decoded? @param {any} value @returns {value is Encoding} */
 export function isEncoding(value) {
   /** @param {unknown} list @param {number} size @param {number} most */
   const numbers = (list, size, most) => Array.isArray(list) && list.length === size
@@ -51,8 +37,7 @@ export function isEncoding(value) {
 /**
  * The standard deviation that a byte of a record stands for.
  *
- * @param {Encoding} encoding
- * @param {number} byte
+ * @param {Encoding} encoding @param {number} byte
  */
 export const deviationOf = ({ log_scale: [least, rise] }, byte) => Math.exp(least + rise * byte);
 
@@ -60,9 +45,7 @@ export const deviationOf = ({ log_scale: [least, rise] }, byte) => Math.exp(leas
  * The parts of a chunk: records as words, all orders in one list, and of each Gaussian its centre and the byte of its
  * largest deviation.
  *
- * @param {ArrayBuffer} buffer
- * @param {number} count
- * @param {Encoding} encoding
+ * @param {ArrayBuffer} buffer @param {number} count @param {Encoding} encoding
  */
 export function parseChunk(buffer, count, { origin, step }) {
   const records = new Uint32Array(buffer, 0, (count * RECORD) / 4);
@@ -145,12 +128,7 @@ export function orderPages(manifest) {
   return Math.min(MAX_PAGES, Math.max(manifest.classes ? BORDER_PAGES : MIN_PAGES, Math.ceil(all / 32) * 32));
 }
 
-/**
- * The key of a chunk.
- *
- * @param {number} tile
- * @param {number} level
- */
+/** The key of a chunk. @param {number} tile @param {number} level */
 export const chunkKey = (tile, level) => 16 * tile + level;
 
 /**
@@ -167,7 +145,6 @@ export function uncertaintyRange(tiles) {
 /**
  * Where a value lies between the ends of a range, 0 to 1; in the middle of a range without extent.
  *
- * @param {number} value
- * @param {[number, number]} range
+ * @param {number} value @param {[number, number]} range
  */
 export const shareOfRange = (value, [low, high]) => (high > low ? Math.min(Math.max((value - low) / (high - low), 0), 1) : 0.5);

@@ -5,7 +5,7 @@
 import { LATTICE, MAX_MATERIALS } from "../terrain/classes.js";
 import { createPainted, findRunFault } from "../terrain/painted.js";
 import { brief, isName, PageError } from "./checks.js";
-import { MAX_CANDIDATES } from "./land_cover.js";
+import { MAX_CANDIDATES } from "./manifest.js";
 
 /**
  * Runs of painted points; by object, how many times its measured density; by material, what is added to its bias.
@@ -31,8 +31,7 @@ export const snap = (v, steps, [low, high]) => Math.round(Math.min(Math.max(v, l
 /**
  * The content of the file: materials and objects by name, so that it outlives a change of their order.
  *
- * @param {Paint} paint
- * @param {Manifest} manifest
+ * @param {Paint} paint @param {Manifest} manifest
  */
 export function describePaint({ runs, densities, offsets }, { materials, objects = [] }) {
   return {
@@ -43,7 +42,7 @@ export function describePaint({ runs, densities, offsets }, { materials, objects
 }
 
 /** Is this meant to be a file of paint? @param {any} value */
-export const isPaint = (value) => value?.format === FORMAT;
+const isPaint = (value) => value?.format === FORMAT;
 
 /**
  * What a file holds, for a terrain. Densities of objects that the terrain does not have are left out.
@@ -146,8 +145,7 @@ export async function encodePaint({ runs, densities, offsets }, manifest) {
 /**
  * What a link holds. Throws a PageError: it is cut or changed, or of another terrain.
  *
- * @param {string} text
- * @param {Manifest} manifest
+ * @param {string} text @param {Manifest} manifest
  * @returns {Promise<Paint>}
  */
 export async function decodePaint(text, manifest) {
@@ -197,7 +195,8 @@ async function unpack(text) {
   if (!/^[\w-]*$/.test(text) || text.length > 2 * MAX_LINK) throw cut();
   try {
     const packed = atob(text.replaceAll("-", "+").replaceAll("_", "/"));
-    return await pass(Uint8Array.from(packed, (c) => c.charCodeAt(0)), new DecompressionStream("deflate-raw"), MAX_UNPACKED);
+    const bytes = Uint8Array.from(packed, (c) => c.charCodeAt(0));
+    return await pass(bytes, new DecompressionStream("deflate-raw"), MAX_UNPACKED);
   } catch {
     throw cut();
   }
@@ -206,8 +205,7 @@ async function unpack(text) {
 /**
  * Bytes through a stream. Throws: more than `most` come out, or the stream refuses them.
  *
- * @param {Uint8Array<ArrayBuffer>} bytes
- * @param {CompressionStream | DecompressionStream} stream
+ * @param {Uint8Array<ArrayBuffer>} bytes @param {CompressionStream | DecompressionStream} stream
  * @param {number} most
  */
 async function pass(bytes, stream, most) {

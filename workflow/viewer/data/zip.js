@@ -39,11 +39,7 @@ export async function openZip(blob) {
   return readTable(blob, new DataView(await blob.slice(begin, begin + size).arrayBuffer()), count);
 }
 
-/**
- * @param {Blob} blob
- * @param {DataView<ArrayBuffer>} table
- * @param {number} count
- */
+/** @param {Blob} blob @param {DataView<ArrayBuffer>} table @param {number} count */
 function readTable(blob, table, count) {
   /** @type {import("./source.js").Files} */
   const files = new Map();
@@ -75,8 +71,7 @@ function readTable(blob, table, count) {
 /**
  * The bytes of an entry, with the size and the checksum of the table.
  *
- * @param {Blob} blob
- * @param {Entry} entry
+ * @param {Blob} blob @param {Entry} entry
  */
 async function unpack(blob, { name, method, crc, packed, size, local }) {
   const head = new DataView(await blob.slice(local, local + LOCAL_SIZE).arrayBuffer());

@@ -50,8 +50,7 @@ export function createFramePacing(refresh = REFRESH) {
     /**
      * A frame came `gap` milliseconds after the last and had `used` Gaussians. Returns: may clearly more be drawn?
      *
-     * @param {number} gap
-     * @param {number} used
+     * @param {number} gap @param {number} used
      */
     addFrame(gap, used) {
       time += gap;
@@ -109,11 +108,7 @@ export function createRest() {
     restart(now, drawn) {
       [since, budget, whole] = [now, drawn, false];
     },
-    /**
-     * The budget of the next picture if it is due, or null. Call `finish` when it is shown.
-     *
-     * @param {number} now
-     */
+    /** The next picture's budget if it is due, or null; `finish` follows. @param {number} now */
     next(now) {
       if (whole || now - since < DELAY) return null;
       return STEPS.find((step) => step >= MORE * budget) ?? BUDGET.most;
@@ -137,8 +132,8 @@ export function createRest() {
 }
 
 /**
- * Previews while chunks arrive: the first when the coarsest level is there, the next when the one before is finished and
- * most of the time since went to loading. On a slow machine previews would otherwise delay the chunks.
+ * Previews while chunks arrive. The first is drawn when the coarsest level is there, the next when the one before is
+ * finished and most of the time since went to loading. On a slow machine previews would otherwise delay the chunks.
  *
  * @param {import("./gl.js").GL} gl
  */
@@ -151,12 +146,7 @@ export function createPreview(gl) {
     get took() {
       return took;
     },
-    /**
-     * May a preview be drawn now?
-     *
-     * @param {number} now
-     * @param {boolean} ready the coarsest level is there
-     */
+    /** May a preview be drawn? @param {number} now @param {boolean} ready has the coarsest level? */
     isDue(now, ready) {
       if (fence) {
         if (!hasPassed(gl, fence)) return false;

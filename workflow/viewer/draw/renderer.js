@@ -20,8 +20,7 @@ const GROW = 2; // times the blocks of the slice before, at most
 const MOST = 250; // slices of a picture: where each waits long whatever its size, a picture still ends
 
 /**
- * @param {GL} gl
- * @param {import("../data/manifest.js").Manifest} manifest
+ * @param {GL} gl @param {import("../data/manifest.js").Manifest} manifest
  * @param {import("../terrain/heights.js").HeightField} heights
  */
 export function createRenderer(gl, manifest, heights) {
@@ -48,8 +47,7 @@ export function createRenderer(gl, manifest, heights) {
  * A picture in slices: some blocks at a time into a texture, so that the device stays at hand however slow it is. The
  * canvas keeps what it shows until the picture is whole.
  *
- * @param {GL} gl
- * @param {Pick<import("./sky.js").Sky, "draw">} sky
+ * @param {GL} gl @param {Pick<import("./sky.js").Sky, "draw">} sky
  * @param {Pick<import("./splats.js").Splats, "draw" | "length">} splats
  */
 export function createSlicedPicture(gl, sky, splats) {
@@ -90,8 +88,7 @@ export function createSlicedPicture(gl, sky, splats) {
     /**
      * Begin the picture of the splats' last frame; one that was under way is given up.
      *
-     * @param {Camera} camera
-     * @param {DrawOptions} options
+     * @param {Camera} camera @param {DrawOptions} options
      */
     begin(camera, options) {
       forgetFence();

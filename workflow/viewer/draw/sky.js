@@ -32,10 +32,7 @@ void main() {
   colour = vec4(mix(seen, sunColour, clamp(disc, 0.0, 1.0)), 1.0);
 }`;
 
-/**
- * @param {import("./gl.js").GL} gl
- * @param {import("../data/manifest.js").Manifest} manifest
- */
+/** @param {import("./gl.js").GL} gl @param {import("../data/manifest.js").Manifest} manifest */
 export function createSky(gl, { sky, ground_colour: ground, heights }) {
   const sphere = heights?.kind === "sphere" ? heights : null, empty = gl.createVertexArray();
   const { use, uniforms } = createProgram(gl, VERTEX, fragmentShader(sphere !== null));
@@ -44,8 +41,7 @@ export function createSky(gl, { sky, ground_colour: ground, heights }) {
     /**
      * Fill the picture; low: sine of the angle below the horizon at which tiles end.
      *
-     * @param {Camera} camera
-     * @param {{ low: number }} options
+     * @param {Camera} camera @param {{ low: number }} options
      */
     draw(camera, { low }) {
       use();
@@ -69,8 +65,7 @@ export function createSky(gl, { sky, ground_colour: ground, heights }) {
 /**
  * Set what the backdrop of an eye over a sphere needs.
  *
- * @param {import("./gl.js").GL} gl
- * @param {Record<string, WebGLUniformLocation | null>} uniforms
+ * @param {import("./gl.js").GL} gl @param {Record<string, WebGLUniformLocation | null>} uniforms
  * @param {{ radius: number }} sphere
  * @param {number[]} eye from the planet's middle
  */

@@ -30,11 +30,7 @@ const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
 const QUADS = Uint16Array.from({ length: 6 * PAGE }, (_, k) => 4 * Math.floor(k / 6) + [0, 1, 2, 2, 1, 3][k % 6]);
 const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3, PLACES = 4, OWNERS = 5; // texture units
 
-/**
- * @param {GL} gl
- * @param {Manifest} manifest
- * @param {HeightField} heights
- */
+/** @param {GL} gl @param {Manifest} manifest @param {HeightField} heights */
 export function createSplats(gl, manifest, heights) {
   const { use, uniforms } = createProgram(gl, vertexShader(heights.kind), FRAGMENT);
   const tallest = Math.max(recordRows(manifest), orderPages(manifest) / PAGES_A_ROW);
@@ -51,6 +47,8 @@ export function createSplats(gl, manifest, heights) {
   const each = manifest.tiles.length / manifest.materials.length;
   let shownOverlay = -1;
   if (gl.getError() === gl.OUT_OF_MEMORY) throw new PageError(FULL);
+  use();
+  setConstants(gl, uniforms, manifest, heights);
 
   /** @param {number} unit @param {WebGLTexture} texture */
   function bind(unit, texture) {
@@ -126,20 +124,15 @@ export function createSplats(gl, manifest, heights) {
     /**
      * Draw blocks of the last frame over what is there, as the camera sees them now.
      *
-     * @param {import("../terrain/camera.js").Camera} camera
-     * @param {DrawOptions} options
+     * @param {import("../terrain/camera.js").Camera} camera @param {DrawOptions} options
      * @param {number} [from] the first block
      * @param {number} [many] of them; all of a picture, in slices or at once, are drawn in order
      */
     draw(camera, { end, low, overlay }, from = 0, many = far.length + close.length) {
       if (!frame) return;
       use();
-      setConstants(gl, uniforms, manifest);
-      setSurface(gl, uniforms, heights, camera);
-      setView(gl, uniforms, camera, frame, manifest.tile_side);
+      setView(gl, uniforms, heights, manifest.tile_side, camera, frame);
       if (heights.kind === "sphere") {
-        setHorizon(gl, uniforms, heights, camera.eye);
-        setSphere(gl, uniforms, heights, manifest.tile_side, frame.eye.map((v, k) => v - camera.eye[k]));
         gl.uniform1f(uniforms.begin, 0.5 * (Math.max(Math.hypot(...camera.eye) - heights.radius, 0) + end));
       }
       gl.uniform1f(uniforms.end, end);
@@ -172,8 +165,12 @@ export function createSplats(gl, manifest, heights) {
   };
 }
 
-/** @param {GL} gl @param {Uniforms} uniforms @param {Manifest} manifest */
-function setConstants(gl, uniforms, manifest) {
+/**
+ * What is the same in all pictures.
+ *
+ * @param {GL} gl @param {Uniforms} uniforms @param {Manifest} manifest @param {HeightField} heights
+ */
+function setConstants(gl, uniforms, manifest, heights) {
   const { origin, step, log_scale: logScale } = manifest.encoding;
   gl.uniform3fv(uniforms.origin, origin);
   gl.uniform3fv(uniforms.stride, step);
@@ -189,39 +186,30 @@ function setConstants(gl, uniforms, manifest) {
   gl.uniform3fv(uniforms.zenith, manifest.sky.zenith);
   gl.uniform3fv(uniforms.horizon, manifest.sky.horizon);
   gl.uniform3fv(uniforms.ground, manifest.ground_colour);
-}
-
-/**
- * @param {GL} gl
- * @param {Uniforms} uniforms
- * @param {HeightField} heights
- * @param {import("../terrain/camera.js").Camera} camera
- */
-function setSurface(gl, uniforms, heights, { eye: [x, y] }) {
-  if (heights.kind === "flat" || heights.kind === "sphere") return;
-  if (heights.kind === "hills") {
+  if (heights.kind === "sphere") {
+    const rate = rateOf(heights, manifest.tile_side);
+    gl.uniform1f(uniforms.radius, heights.radius);
+    gl.uniform1f(uniforms.rate, rate);
+    gl.uniform1f(uniforms.stretch, heights.radius * rate);
+  } else if (heights.kind === "hills") {
     gl.uniform1i(uniforms.octaves, heights.amplitudes.length);
     gl.uniform1ui(uniforms.salt, heights.salt);
     gl.uniform1fv(uniforms["amplitude[0]"], padded(heights.amplitudes, MAX_OCTAVES));
     gl.uniform1fv(uniforms["scale[0]"], padded(heights.scales, MAX_OCTAVES));
-  } else {
+  } else if (heights.kind === "image") {
     gl.uniform1i(uniforms.relief, RELIEF);
     gl.uniform1i(uniforms.mirrored, Number(heights.mirrored));
     gl.uniform1fv(uniforms["scale[0]"], [heights.perUnit]);
   }
-  const { cells, places } = heights.under(x, y);
-  gl.uniform2iv(uniforms["cellUnder[0]"], cells);
-  gl.uniform2fv(uniforms["placeUnder[0]"], places);
 }
 
 /**
- * @param {GL} gl
- * @param {Uniforms} uniforms
- * @param {import("../terrain/camera.js").Camera} camera
- * @param {FrameAnswer} frame
- * @param {number} side
+ * What depends on the view.
+ *
+ * @param {GL} gl @param {Uniforms} uniforms @param {HeightField} heights @param {number} side
+ * @param {import("../terrain/camera.js").Camera} camera @param {FrameAnswer} frame
  */
-function setView(gl, uniforms, camera, { i0, j0, switches, bands, marks }, side) {
+function setView(gl, uniforms, heights, side, camera, { i0, j0, eye, switches, bands, marks }) {
   const [x, y, z] = camera.eye;
   setAxes(gl, uniforms, camera);
   gl.uniform3f(uniforms.corner, i0 * side - x, j0 * side - y, -z);
@@ -230,15 +218,14 @@ function setView(gl, uniforms, camera, { i0, j0, switches, bands, marks }, side)
   gl.uniform1fv(uniforms["switches[0]"], padded(switches.slice(0, -1), MAX_LEVELS));
   gl.uniform1fv(uniforms["bands[0]"], padded(bands, MAX_LEVELS));
   gl.uniform1uiv(uniforms["marks[0]"], marks);
-}
-
-/** @param {GL} gl @param {Uniforms} uniforms @param {import("../terrain/sphere.js").Sphere} sphere @param {number} side @param {number[]} moved */
-function setSphere(gl, uniforms, sphere, side, moved) {
-  const rate = rateOf(sphere, side);
-  gl.uniform3fv(uniforms.moved, moved);
-  gl.uniform1f(uniforms.radius, sphere.radius);
-  gl.uniform1f(uniforms.rate, rate);
-  gl.uniform1f(uniforms.stretch, sphere.radius * rate);
+  if (heights.kind === "sphere") {
+    setHorizon(gl, uniforms, heights, camera.eye);
+    gl.uniform3fv(uniforms.moved, eye.map((v, k) => v - camera.eye[k]));
+  } else if (heights.kind !== "flat") {
+    const { cells, places } = heights.under(x, y);
+    gl.uniform2iv(uniforms["cellUnder[0]"], cells);
+    gl.uniform2fv(uniforms["placeUnder[0]"], places);
+  }
 }
 
 /** @param {number[]} list @param {number} length */
@@ -254,8 +241,7 @@ function createRelief(gl, { pixels, columns, rows }) {
 /**
  * Consecutive pages of a texture row are uploaded together.
  *
- * @param {GL} gl
- * @param {FrameAnswer["uploads"]} uploads
+ * @param {GL} gl @param {FrameAnswer["uploads"]} uploads
  */
 function uploadPages(gl, { numbers, data }) {
   for (let k = 0; k < numbers.length;) {
@@ -308,8 +294,7 @@ function createBlocks(gl) {
 /**
  * Blocks of pages 0, 1, ... of the near block's order; its entries name their cells themselves.
  *
- * @param {number} pages
- * @param {number} count
+ * @param {number} pages @param {number} count
  */
 function nearBlocks(pages, count) {
   const words = new Uint32Array(BLOCK * pages);

@@ -21,9 +21,7 @@ const HALVINGS = 40; // of the step in which the ray comes down
 /**
  * The camera of an eye at a place, for a picture of this size.
  *
- * @param {Place} place
- * @param {number} width
- * @param {number} height
+ * @param {Place} place @param {number} width @param {number} height
  * @param {import("./heights.js").HeightField} [heights]
  * @returns {Camera}
  */
@@ -112,9 +110,7 @@ function hitSphere(eye, way, radius) {
 /**
  * A place of the ground as a point of the world.
  *
- * @param {import("./heights.js").HeightField} heights
- * @param {number} x
- * @param {number} y
+ * @param {import("./heights.js").HeightField} heights @param {number} x @param {number} y
  */
 export function pointAt(heights, x, y) {
   if (heights.kind === "sphere") return frameAt(x, y)[2].map((v) => v * heights.radius);
@@ -124,8 +120,7 @@ export function pointAt(heights, x, y) {
 /**
  * A point of the world in the picture, from the left and the upper edge, 0 to 1; null: it is behind the eye.
  *
- * @param {Camera} camera
- * @param {number[]} point
+ * @param {Camera} camera @param {number[]} point
  */
 export function projectPoint({ eye, right, up, ahead, width, height, focal }, point) {
   const away = point.map((v, k) => v - eye[k]);

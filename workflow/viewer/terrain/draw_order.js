@@ -9,8 +9,7 @@ const BITS = 11, DIGITS = 1 << BITS; // of the radix sort
  * A ray from the eye crosses cell edges only away from it, in i and in j: a cell with more steps |di| + |dj| never
  * hides one with fewer, and cells of equal steps never hide each other. Equal steps are visited by j, then by i.
  *
- * @param {number} most
- * @param {(di: number, dj: number) => void} visit
+ * @param {number} most @param {(di: number, dj: number) => void} visit
  */
 export function visitBackToFront(most, visit) {
   for (let steps = 2 * most; steps >= 0; steps--) {
@@ -27,8 +26,7 @@ export function visitBackToFront(most, visit) {
 /**
  * Is a cell in the 3 x 3 block about the eye's cell, which is drawn last and sorted by depth?
  *
- * @param {number} di
- * @param {number} dj
+ * @param {number} di @param {number} dj
  */
 export const inNearBlock = (di, dj) => Math.abs(di) <= 1 && Math.abs(dj) <= 1;
 
@@ -39,8 +37,7 @@ export const inNearBlock = (di, dj) => Math.abs(di) <= 1 && Math.abs(dj) <= 1;
  * @param {number[][]} directions
  * @param {number[]} orders indices into directions, those that the tile keeps
  * @param {number[]} to from the eye to the tile's centre
- * @param {number} east
- * @param {number} north
+ * @param {number} east @param {number} north
  */
 export function nearestOrder(directions, orders, to, east, north) {
   const x = to[0] + east * to[2], y = to[1] + north * to[2], z = to[2];
@@ -56,8 +53,8 @@ export function nearestOrder(directions, orders, to, east, north) {
 }
 
 /**
- * A stable radix sort of float bits, with buffers of its own: `sort(depths, n)` gives the indices of the first n depths from back to front. The
- * result is overwritten by the next call.
+ * A stable radix sort of float bits, with buffers of its own: `sort(depths, n)` gives the indices of the first n depths
+ * from back to front. The next call overwrites the result.
  *
  * @typedef {(depths: Float32Array, n: number) => Uint32Array} DepthSorter
  * @returns {DepthSorter}

@@ -1,7 +1,7 @@
 // Scatter: where objects stand on the terrain, as a pure function of the cell.
 // The same numbers as dav_gswt/terrain/scatter.py, where the idea is; tests/golden/scatter.json holds both to it.
 
-import { createCellRing } from "./cell_ring.js";
+import { createCellRing } from "./caches.js";
 import { hashCell } from "./choice.js";
 
 /**
@@ -36,8 +36,7 @@ export const MAX_RADIUS = 1; // of a footprint, in tile sides: at most 4 cells a
 /**
  * The scatter of a terrain.
  *
- * @param {ScatterEntry} entry
- * @param {ScatterObject[]} objects
+ * @param {ScatterEntry} entry @param {ScatterObject[]} objects
  * @param {number} side of a tile
  * @param {import("./classes.js").Classes | null} classes null: one material
  */
@@ -63,10 +62,7 @@ export function createScatter({ cells: n, turn, size, salt }, objects, side, cla
   /**
    * The candidate of square (a, b) in cell (i, j), if it is an object whose footprint lies inside its material.
    *
-   * @param {number} i
-   * @param {number} j
-   * @param {number} a
-   * @param {number} b
+   * @param {number} i @param {number} j @param {number} a @param {number} b
    * @returns {Candidate | null}
    */
   function findCandidate(i, j, a, b) {
@@ -132,13 +128,7 @@ export function createScatter({ cells: n, turn, size, salt }, objects, side, cla
         }
       }
     },
-    /**
-     * The objects whose feet lie in a cell.
-     *
-     * @param {number} i
-     * @param {number} j
-     * @returns {Instance[]}
-     */
+    /** Objects that stand in a cell. @param {number} i @param {number} j @returns {Instance[]} */
     instancesIn: (i, j) => standing.get(i, j),
   };
 }
@@ -152,9 +142,7 @@ function leads(p, q) {
 /**
  * By object, the sum of the probabilities of those on a material up to it.
  *
- * @param {ScatterObject[]} objects
- * @param {number[]} probabilities
- * @param {number} m
+ * @param {ScatterObject[]} objects @param {number[]} probabilities @param {number} m
  */
 function sumProbabilities(objects, probabilities, m) {
   let sum = 0;
@@ -164,11 +152,8 @@ function sumProbabilities(objects, probabilities, m) {
 /**
  * The material with the highest score at a place, of equals the first.
  *
- * @param {import("./classes.js").Classes} classes
- * @param {number} i
- * @param {number} j
- * @param {number} u
- * @param {number} v
+ * @param {import("./classes.js").Classes} classes @param {number} i @param {number} j
+ * @param {number} u @param {number} v
  */
 export function materialAt(classes, i, j, u, v) {
   const bits = classes.materialsIn(i, j);
@@ -182,8 +167,7 @@ export function materialAt(classes, i, j, u, v) {
 /**
  * Does the score of the material exceed the others by the jitter's amplitude in four places of the footprint's rim?
  *
- * @param {import("./classes.js").Classes} classes
- * @param {Instance} instance
+ * @param {import("./classes.js").Classes} classes @param {Instance} instance
  * @param {number} material
  */
 function liesInside(classes, { i, j, u, v, radius }, material) {

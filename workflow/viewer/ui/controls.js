@@ -25,10 +25,7 @@ const STEEPEST = -89, FLATTEST = -4; // degrees above the horizon of an orbit
 /**
  * Let a person move the walker; onChange is called after each change that needs a picture.
  *
- * @param {Walker} walker
- * @param {Orbit} orbit
- * @param {HTMLElement} canvas
- * @param {HTMLElement} pad
+ * @param {Walker} walker @param {Orbit} orbit @param {HTMLElement} canvas @param {HTMLElement} pad
  * @param {Pick<Brush, "begin" | "move" | "end" | "cancel">} brush may take pointers
  * @param {() => void} onChange
  */
@@ -64,11 +61,8 @@ export function listenToControls(walker, orbit, canvas, pad, brush, onChange) {
  * One pointer turns the view, as if the picture were held, unless the brush takes it; two fingers walk (drag) and change
  * height (pinch).
  *
- * @param {Walker} walker
- * @param {Orbit} orbit
- * @param {HTMLElement} canvas
- * @param {Pick<Brush, "begin" | "move" | "end" | "cancel">} brush
- * @param {() => void} onChange
+ * @param {Walker} walker @param {Orbit} orbit @param {HTMLElement} canvas
+ * @param {Pick<Brush, "begin" | "move" | "end" | "cancel">} brush @param {() => void} onChange
  */
 function listenToPointers(walker, orbit, canvas, brush, onChange) {
   /** @type {Map<number, Point>} */

@@ -4,8 +4,7 @@
  * An element of index.html. Throws if there is none of this id and type.
  *
  * @template {Element} T
- * @param {string} id
- * @param {new () => T} type
+ * @param {string} id @param {new () => T} type
  * @returns {T}
  */
 export function element(id, type) {
@@ -18,7 +17,7 @@ export function element(id, type) {
 export const isField = (target) => target instanceof HTMLInputElement || target instanceof HTMLSelectElement
   || target instanceof HTMLButtonElement || (target instanceof HTMLElement && target.tagName === "SUMMARY");
 
-/** Run a command when its key is pressed alone and not in a list. @param {Record<string, () => void>} commands by code */
+/** Run commands when their keys are pressed, outside of lists. @param {Record<string, () => void>} commands by code */
 export function listenToKeys(commands) {
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.target instanceof HTMLSelectElement) return;
@@ -26,11 +25,14 @@ export function listenToKeys(commands) {
   });
 }
 
-/** A patch of a colour, 0 to 1. @param {number[]} colour */
+/** A colour, 0 to 1, in CSS. @param {number[]} colour @param {number} [most] */
+export const cssColour = (colour, most = 255) => `rgb(${colour.map((v) => Math.round(most * v)).join(" ")})`;
+
+/** A patch of a colour in CSS. @param {string} colour */
 export function swatch(colour) {
   const patch = document.createElement("i");
   patch.className = "swatch";
-  patch.style.backgroundColor = `rgb(${colour.map((v) => Math.round(255 * v)).join(" ")})`;
+  patch.style.backgroundColor = colour;
   return patch;
 }
 

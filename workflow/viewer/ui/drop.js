@@ -34,11 +34,7 @@ export function listenToDrops(handlers) {
   });
 }
 
-/**
- * @param {FileSystemEntry[]} entries
- * @param {File[]} loose
- * @param {DropHandlers} handlers
- */
+/** @param {FileSystemEntry[]} entries @param {File[]} loose @param {DropHandlers} handlers */
 async function handleDrop(entries, loose, { openSource, loadJson }) {
   const files = entries.length ? await listFiles(entries) : new Map(loose.map((file) => [file.name, file]));
   const only = files.size === 1 ? [...files.values()][0] : null;
@@ -47,11 +43,7 @@ async function handleDrop(entries, loose, { openSource, loadJson }) {
   return openSource(await sourceOf(filesOf(files)));
 }
 
-/**
- * All files of dropped entries, folders included, by their paths.
- *
- * @param {FileSystemEntry[]} entries
- */
+/** All files of dropped entries and folders, by path. @param {FileSystemEntry[]} entries */
 async function listFiles(entries) {
   /** @type {Map<string, File>} */
   const files = new Map();

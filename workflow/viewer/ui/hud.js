@@ -35,7 +35,7 @@ export function createHud() {
       announced = now;
       status.textContent = `Loading ${megabytes(bytes)} of ${megabytes(total)} MB`;
     },
-    /** Ask on a phone before much is downloaded; resolves when its user agrees. @param {number} bytes @returns {Promise<void>} */
+    /** Ask before a large download on a phone; resolves on consent. @param {number} bytes @returns {Promise<void>} */
     askToLoad(bytes) {
       const isPhone = matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < PHONE;
       if (!isPhone || bytes <= ASKED) return Promise.resolve();

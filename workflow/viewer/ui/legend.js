@@ -4,7 +4,7 @@ import { NO_ORDER, uncertaintyRange } from "../data/layout.js";
 import { levelColour, materialColour, OBJECTS, OVERLAYS, SORTED, uncertaintyColour } from "../draw/overlays.js";
 import { hitGround, pointAt, rayThrough } from "../terrain/camera.js";
 import { REACH, tileUnder } from "../terrain/cells.js";
-import { element, swatch } from "./dom.js";
+import { cssColour, element, swatch } from "./dom.js";
 
 /**
  * @typedef {import("../data/manifest.js").Manifest} Manifest
@@ -26,7 +26,7 @@ export function createLegend() {
     if (value.textContent !== text) value.textContent = text;
   };
   return {
-    /** Show the legend of an overlay; the plain picture has none. @param {number} overlay @param {Manifest | null} manifest */
+    /** Show a legend; the plain picture has none. @param {number} overlay @param {Manifest | null} manifest */
     show(overlay, manifest) {
       const name = OVERLAYS[overlay];
       shown = name === "picture" ? null : manifest;
@@ -35,7 +35,7 @@ export function createLegend() {
       const list = document.createElement("ul");
       list.append(...entriesOf(name, shown).map(([colour, text]) => {
         const item = document.createElement("li");
-        item.append(...colour ? [swatch(colour)] : [], text);
+        item.append(...colour ? [swatch(cssColour(colour))] : [], text);
         return item;
       }));
       say(HINT);
@@ -57,8 +57,7 @@ export function createLegend() {
 /**
  * Colours of an overlay and what they stand for.
  *
- * @param {string} name
- * @param {Manifest} manifest
+ * @param {string} name @param {Manifest} manifest
  * @returns {[number[] | null, string][]}
  */
 function entriesOf(name, { tiles, levels, directions, materials, objects, unit }) {
@@ -111,10 +110,8 @@ export function tellValues(viewer) {
 /**
  * Tile, finest level and order that are drawn at a point of the picture; null: there is no ground.
  *
- * @param {import("./viewer.js").Scene} scene
- * @param {import("../terrain/camera.js").Camera} camera
- * @param {number} across
- * @param {number} down
+ * @param {import("./viewer.js").Scene} scene @param {import("../terrain/camera.js").Camera} camera
+ * @param {number} across @param {number} down
  * @returns {Under | null}
  */
 function valuesAt({ manifest, heights, lift, frame }, camera, across, down) {

@@ -54,8 +54,7 @@ export function createPaintKeep(viewer, onLink) {
     /**
      * Paint what a link holds; "": nothing. Throws a PageError.
      *
-     * @param {string} text
-     * @param {boolean} [undoable]
+     * @param {string} text @param {boolean} [undoable]
      */
     async follow(text, undoable = true) {
       const { scene } = viewer;

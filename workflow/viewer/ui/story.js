@@ -2,7 +2,7 @@
 
 import { isNatural, PageError } from "../data/checks.js";
 import { webSource } from "../data/source.js";
-import { createPanel, element } from "./dom.js";
+import { createPanel, element, swatch } from "./dom.js";
 
 const SVG = "http://www.w3.org/2000/svg", SIZE = 240, MARGIN = 16;
 const ROUNDS = ["#e3b778", "#7fc4e8", "#8fd18a", "#e79bc0", "#d8d06a", "#b7a6f0"]; // colours, from the start on
@@ -71,18 +71,12 @@ function drawPlan({ photos, half }) {
 
 /** @param {Story} story */
 function listRounds({ rounds }) {
-  const table = document.createElement("table"), head = table.createTHead().insertRow();
-  for (const title of ["", "photos", "PSNR"]) {
-    const cell = document.createElement("th");
-    cell.textContent = title;
-    head.append(cell);
-  }
+  const table = document.createElement("table");
+  table.createTHead().innerHTML = "<tr><th></th><th>photos</th><th>PSNR</th></tr>";
   const rows = table.createTBody();
   for (const [k, { photos, psnr, preset }] of rounds.entries()) {
-    const row = rows.insertRow(), mark = document.createElement("i");
-    mark.className = "swatch";
-    mark.style.backgroundColor = ROUNDS[k % ROUNDS.length];
-    row.insertCell().append(mark, k ? ` round ${k}` : " start");
+    const row = rows.insertRow();
+    row.insertCell().append(swatch(ROUNDS[k % ROUNDS.length]), k ? ` round ${k}` : " start");
     row.insertCell().append(k ? `+ ${photos}` : String(photos));
     row.insertCell().append(psnr === null ? "none" : `${psnr.toFixed(1)} dB${preset ? ` (${preset})` : ""}`);
   }
@@ -107,12 +101,7 @@ function showPhotos({ photos, thumb, columns }) {
   return list;
 }
 
-/**
- * The checked content of story.json. Throws a PageError.
- *
- * @param {any} value parsed JSON
- * @returns {Story}
- */
+/** story.json, checked. Throws a PageError. @param {any} value parsed JSON @returns {Story} */
 export function readStory(value) {
   const finite = (/** @type {any} */ v) => Array.isArray(v) && v.every(Number.isFinite);
   const { unit, half, photos, rounds, thumb, columns, pictures } = value ?? {};

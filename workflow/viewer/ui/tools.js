@@ -51,24 +51,17 @@ export function listenToTools(viewer, paint, walker) {
   });
 }
 
-/**
- * A function that saves the finest picture of this place. A slow device takes a while; the button
- * shows how far it is.
- *
- * @param {Viewer} viewer
- */
+/** A function that saves the finest picture of this place, which takes a slow device a while. @param {Viewer} viewer */
 function createSaving(viewer) {
-  const button = element("keep", HTMLButtonElement), bar = document.createElement("progress");
+  const button = element("keep", HTMLButtonElement);
   let busy = false;
-  bar.setAttribute("aria-label", "Saving the picture");
   return async () => {
     if (busy) return;
     busy = true;
     button.setAttribute("aria-busy", "true");
     const timer = setInterval(() => {
-      bar.value = viewer.resting.done;
-      if (!bar.isConnected) button.append(bar);
-      viewer.hud.say(`Saving the picture: ${Math.round(100 * bar.value)} %. It is taken where you stand still.`);
+      const done = Math.round(100 * viewer.resting.done);
+      viewer.hud.say(`Saving the picture: ${done} %. It is taken where you stand still.`);
     }, EVERY);
     try {
       saveFile(await viewer.takePicture(), ".png");
@@ -77,7 +70,6 @@ function createSaving(viewer) {
       viewer.fail(error);
     } finally {
       clearInterval(timer);
-      bar.remove();
       button.removeAttribute("aria-busy");
       busy = false;
     }

@@ -7,7 +7,6 @@ import { goBy, moveTo } from "./walker.js";
 /**
  * @typedef {import("./walker.js").Walker} Walker
  * @typedef {{ at: (x: number, y: number) => number[] }} Surface
- * @typedef {ReturnType<typeof createTour>} Tour
  */
 
 const LOW = 1.3, HIGH = 5; // heights over the ground ahead, in lowest eyes
@@ -38,9 +37,7 @@ export function createTour() {
     /**
      * Go on for some seconds. Returns: did the walker move?
      *
-     * @param {Walker} walker
-     * @param {Surface} surface
-     * @param {number} seconds
+     * @param {Walker} walker @param {Surface} surface @param {number} seconds
      */
     step(walker, surface, seconds) {
       if (!on) return false;
@@ -79,8 +76,7 @@ const smooth = (t) => t * t * (3 - 2 * t);
  * The tour's button and key. Any input ends it. `?tour` in the address begins it, except where the
  * system asks for less motion.
  *
- * @param {import("./viewer.js").Viewer} viewer
- * @param {() => void} closePanels
+ * @param {import("./viewer.js").Viewer} viewer @param {() => void} closePanels
  */
 export function listenToTour(viewer, closePanels) {
   const { tour, hud } = viewer, button = element("tour", HTMLButtonElement);

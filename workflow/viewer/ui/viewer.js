@@ -18,6 +18,7 @@ import { createWalker, moveTo } from "./walker.js";
 /**
  * @typedef {import("../data/source.js").Source} Source
  * @typedef {import("./walker.js").Walker} Walker
+ * @typedef {import("../draw/renderer.js").SlicedPicture} SlicedPicture
  *
  * An open bundle. renderer: null while the graphics context is lost; frame: the worker's last; coarse: chunks of the
  * coarsest level that have arrived.
@@ -58,10 +59,8 @@ export class Viewer {
   #restored = Promise.resolve(); // pending while the graphics context is lost
 
   /**
-   * @param {HTMLCanvasElement} canvas
-   * @param {import("../draw/gl.js").GL} gl
-   * @param {import("./hud.js").Hud} hud
-   * @param {Options} options
+   * @param {HTMLCanvasElement} canvas @param {import("../draw/gl.js").GL} gl
+   * @param {import("./hud.js").Hud} hud @param {Options} options
    */
   constructor(canvas, gl, hud, options) {
     this.canvas = canvas;
@@ -160,7 +159,7 @@ export class Viewer {
     this.#tellNumbers(scene, start);
   }
 
-  /** Begin the picture of the worker's last frame in slices. @param {import("../draw/renderer.js").SlicedPicture} picture */
+  /** Begin the picture of the worker's last frame in slices. @param {SlicedPicture} picture */
   begin(picture) {
     const { scene } = this;
     if (!scene) return;
@@ -169,7 +168,7 @@ export class Viewer {
     this.dirty = false;
   }
 
-  /** Show a picture that was drawn in slices. @param {import("../draw/renderer.js").SlicedPicture} picture */
+  /** Show a picture that was drawn in slices. @param {SlicedPicture} picture */
   show(picture) {
     const { scene } = this;
     if (!scene) return;

@@ -49,8 +49,7 @@ export function createWalker({ tile_side: side, eye_floor: floor, heights }, pla
 /**
  * Change any parts of the place, within bounds; what is not a finite number, or beyond all bounds, stays as it was.
  *
- * @param {Walker} walker
- * @param {Partial<Place>} place
+ * @param {Walker} walker @param {Partial<Place>} place
  */
 export function moveTo(walker, place) {
   for (const key of PLACE_KEYS) {
@@ -66,8 +65,7 @@ export function moveTo(walker, place) {
 /**
  * Move by the held keys for some seconds. Returns: did anything change?
  *
- * @param {Walker} walker
- * @param {number} seconds
+ * @param {Walker} walker @param {number} seconds
  */
 export function stepWalker(walker, seconds) {
   /** @param {Action} more @param {Action} less */

@@ -4,7 +4,7 @@
 import { NEAR, ROW, viewRoom } from "../data/layout.js";
 import { deviationOf } from "../data/layout.js";
 import { shareOfRange, uncertaintyRange } from "../data/layout.js";
-import { RING } from "../terrain/cell_ring.js";
+import { RING } from "../terrain/caches.js";
 import { createCellCache, forgetCells } from "../terrain/cells.js";
 import { createClasses } from "../terrain/classes.js";
 import { RIM } from "../terrain/frustum.js";

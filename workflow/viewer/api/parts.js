@@ -1,8 +1,11 @@
-// What other pages ask of a terrain: the ground as they stand on it, and Gaussians for renderers of their own. What they
-// pass in is checked before it reaches the worker: a NaN there would draw nothing and say nothing.
+// What other pages ask of a terrain: the ground, Gaussians for renderers of their own, and a painter for their context.
+// What they pass in is checked before it reaches the worker: a NaN there would draw nothing and say nothing.
 
 import { readChunks } from "../data/bundle.js";
 import { chunkKey, deviationOf, listChunks, MAX_TURN, parseChunk, TURN_STEPS } from "../data/layout.js";
+import { OVERLAYS } from "../draw/overlays.js";
+import { createRenderer } from "../draw/renderer.js";
+import { backdropOptions } from "../scene/open_terrain.js";
 import { hitGround } from "../terrain/camera.js";
 import { REACH, tileUnder } from "../terrain/cells.js";
 
@@ -16,12 +19,10 @@ import { REACH, tileUnder } from "../terrain/cells.js";
 /**
  * A list of `many` finite numbers. Throws a TypeError.
  *
- * @param {string} name
- * @param {ArrayLike<number>} values
- * @param {number} many
+ * @param {string} name @param {ArrayLike<number>} values @param {number} many
  * @returns {number[]}
  */
-export function checkNumbers(name, values, many) {
+function checkNumbers(name, values, many) {
   const list = values == null ? [] : Array.from(values);
   if (list.length !== many || !list.every(Number.isFinite)) throw new TypeError(`${name}: not ${many} finite numbers`);
   return list;
@@ -44,11 +45,9 @@ export function checkCamera({ eye, right, up, ahead, width, height, focal }) {
 /**
  * An index below `end`. Throws a RangeError.
  *
- * @param {string} name
- * @param {number} value
- * @param {number} end
+ * @param {string} name @param {number} value @param {number} end
  */
-export function checkIndex(name, value, end) {
+function checkIndex(name, value, end) {
   if (!Number.isInteger(value) || value < 0 || value >= end) throw new RangeError(`${name}: ${value} is not 0 to ${end - 1}`);
 }
 
@@ -78,8 +77,7 @@ export function createGround({ manifest, heights, lift }) {
       return tileUnder(manifest, heights, x, y);
     },
     /**
-     * @param {ArrayLike<number>} origin
-     * @param {ArrayLike<number>} direction
+     * @param {ArrayLike<number>} origin @param {ArrayLike<number>} direction
      * @param {number} [farthest]
      */
     pick(origin, direction, farthest = REACH * manifest.tile_side) {
@@ -135,10 +133,10 @@ export function createChunkReader({ manifest, source }) {
 }
 
 /**
- * Shapes and colours of records, decoded as draw/shaders.js decodes them: standard deviations, quaternions w x y z, red green blue opacity from 0 to 1.
+ * Shapes and colours of records, decoded as draw/shaders.js decodes them: standard deviations, quaternions w x y z, red
+ * green blue opacity from 0 to 1.
  *
- * @param {Uint32Array} records
- * @param {number} count
+ * @param {Uint32Array} records @param {number} count
  * @param {import("../data/layout.js").Encoding} encoding
  */
 function decodeRecords(records, count, encoding) {
@@ -153,4 +151,56 @@ function decodeRecords(records, count, encoding) {
     colours.set([0, 8, 16, 24].map((bits) => ((d >>> bits) & 255) / 255), 4 * k);
   }
   return { deviations, turns, colours };
+}
+
+/**
+ * @param {import("../draw/gl.js").GL} gl @param {Pick<OpenTerrain, "manifest" | "heights">} terrain
+ * @param {() => void} onEnd
+ */
+export function createPainter(gl, terrain, onEnd) {
+  resetState(gl);
+  const renderer = createRenderer(gl, terrain.manifest, terrain.heights);
+  /** @type {import("../worker/frame_builder.js").FrameAnswer | null} */
+  let frame = null;
+  return {
+    /** @param {import("../worker/worker.js").Records} records */
+    addRecords(records) {
+      resetState(gl);
+      renderer.splats.addRecords(records);
+    },
+    /** @param {import("../worker/frame_builder.js").FrameAnswer} answer */
+    setFrame(answer) {
+      resetState(gl);
+      frame = answer;
+      renderer.splats.setFrame(answer);
+    },
+    painter: {
+      /** @param {import("../terrain/camera.js").Camera} camera @param {{ backdrop?: boolean, overlay?: string }} [options] */
+      draw(camera, { backdrop = true, overlay = OVERLAYS[0] } = {}) {
+        const view = checkCamera(camera), number = OVERLAYS.indexOf(overlay);
+        if (number < 0) throw new RangeError(`overlay: ${overlay} is none of ${OVERLAYS.join(", ")}`);
+        const options = { ...backdropOptions(terrain, frame, view), overlay: number };
+        resetState(gl);
+        gl.viewport(0, 0, view.width, view.height);
+        if (backdrop) renderer.draw(view, options);
+        else renderer.splats.draw(view, options);
+      },
+      end() {
+        onEnd();
+        renderer.end();
+      },
+    },
+  };
+}
+
+/** What others may have set on the context, as our drawing and uploading expects it. @param {import("../draw/gl.js").GL} gl */
+function resetState(gl) {
+  for (const test of [gl.DEPTH_TEST, gl.CULL_FACE, gl.SCISSOR_TEST, gl.STENCIL_TEST]) gl.disable(test);
+  gl.blendEquation(gl.FUNC_ADD);
+  gl.colorMask(true, true, true, true);
+  gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
+  for (const [name, value] of /** @type {[number, number | boolean][]} */ ([
+    [gl.UNPACK_FLIP_Y_WEBGL, false], [gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false], [gl.UNPACK_ALIGNMENT, 4],
+    [gl.UNPACK_ROW_LENGTH, 0], [gl.UNPACK_SKIP_ROWS, 0], [gl.UNPACK_SKIP_PIXELS, 0],
+  ])) gl.pixelStorei(name, value);
 }
