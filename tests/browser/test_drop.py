@@ -397,7 +397,9 @@ def test_a_broken_zip_is_told_and_a_sound_bundle_takes_the_place_of_the_pages_ow
     assert not alert.is_visible(), "a click takes the message away"
     files, deep = files_of(other, "folder/"), "[" * 100_000 + "]" * 100_000
     name = "folder/davgswt.json"
-    files[name] = files[name].replace(b'"provenance": {}', f'"provenance": {deep}'.encode())
+    for old, new in ('"provenance": {}', f'"provenance": {deep}'), ('"sky": {', f'"sky": {{"kind": {deep}, '):
+        assert old in files[name].decode()
+        files[name] = files[name].replace(old.encode(), new.encode())
     open_dropped(target, zipped(files))
     after = target.at(**OBLIQUE)
     assert (after != before).any()
