@@ -135,7 +135,7 @@ def measure(tabs: list) -> None:
         for count, found in zip(("one material", "two materials"), medians, strict=True):
             times = ", ".join(f"{key} {found[key]:.2f}" for key in ("update", "sort", "both", "between"))
             counts = ", ".join(f"{found[key]:,.0f} {key}" for key in ("drawn", "near", "cells", "border"))
-            works = ", ".join(f"{found[key]:,.0f} {key}" for key in ("tested", "sorted", "merged"))
+            works = ", ".join(f"{found[key]:,.0f} {key}" for key in ("tested", "sorted"))
             print(f"  {name}, {count}: ms {times}; {counts}; new in a view: {works}")
         ratios[patient] = medians[1]["both"] / medians[0]["both"]
     print(f"  ratio all at once: {ratios[True]:.2f}")

@@ -9,9 +9,6 @@ Object.assign(window, {
     get state() {
       return viewer.state();
     },
-    get flyPath() {
-      return viewer.flyPath;
-    },
     /** Is the tour under way? */
     get tour() {
       return viewer.tour.on;

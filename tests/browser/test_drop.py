@@ -25,8 +25,8 @@ OTHER = Ground(discs=8, salt=99, speckle=20)
 READ = """async text => {
   // what the page says against a zip: null if all of it is read
   const { initialChunks, readChunks } = await import("./data/bundle.js");
-  const { PageError } = await import("./data/errors.js");
-  const { openSource } = await import("./data/open.js");
+  const { PageError } = await import("./data/checks.js");
+  const { openSource } = await import("./data/bundle.js");
   const { readTerrain } = await import("./scene/open_terrain.js");
   const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
   try {
@@ -397,7 +397,9 @@ def test_a_broken_zip_is_told_and_a_sound_bundle_takes_the_place_of_the_pages_ow
     assert not alert.is_visible(), "a click takes the message away"
     files, deep = files_of(other, "folder/"), "[" * 100_000 + "]" * 100_000
     name = "folder/davgswt.json"
-    files[name] = files[name].replace(b'"provenance": {}', f'"provenance": {deep}'.encode())
+    for old, new in ('"provenance": {}', f'"provenance": {deep}'), ('"sky": {', f'"sky": {{"kind": {deep}, '):
+        assert old in files[name].decode()
+        files[name] = files[name].replace(old.encode(), new.encode())
     open_dropped(target, zipped(files))
     after = target.at(**OBLIQUE)
     assert (after != before).any()

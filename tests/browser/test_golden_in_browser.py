@@ -133,7 +133,7 @@ def test_sorting_is_exact_and_stable(modules):
     depths[5], depths[6] = 0.0, 1e30
     found = modules.evaluate(
         """async depths => {
-          const { createDepthSorter } = await import("./terrain/depth_sort.js");
+          const { createDepthSorter } = await import("./terrain/draw_order.js");
           return [...createDepthSorter()(new Float32Array(depths), depths.length)];
         }""",
         depths.tolist(),

@@ -24,7 +24,7 @@ OPEN = """
   const view = (place, patient = true) => {
     const before = builder.work, frame = builder.build(cameraAt(place, 640, 400, heights), 1e6, patient);
     const { work } = builder, did = name => work[name] - before[name];
-    return { frame, tested: did("tested"), sorted: did("sorted"), merged: did("merged") };
+    return { frame, tested: did("tested"), sorted: did("sorted") };
   };
   const describe = ({ blocks, near, cells }) => {
     let drawn = 0; // entries
@@ -35,7 +35,7 @@ OPEN = """
 """
 LOOK_AROUND = """async () => {
   const turn = patient => Array.from({ length: 24 }, (_, k) => view({ ...place, yaw: 15 * k }, patient));
-  const sums = views => Object.fromEntries(["tested", "sorted", "merged"].map(name => (
+  const sums = views => Object.fromEntries(["tested", "sorted"].map(name => (
     [name, views.reduce((sum, one) => sum + one[name], 0)])));
   const uploads = views => views.reduce((sum, { frame }) => sum + frame.uploads.numbers.length, 0);
   const first = turn(true), again = turn(true), hurried = turn(false);
@@ -66,7 +66,7 @@ HURRY = """async () => {
 }"""
 COUNT = """async () => {
   const { createTerrainTables } = await import("./worker/terrain_tables.js");
-  const { createBorders } = await import("./worker/borders.js");
+  const { createBorders } = await import("./worker/sorted_batches.js");
   const terrain = createTerrainTables(manifest, heights), borders = createBorders(terrain, builder.store);
   return [[1e9, -12], [1e9, -40], [40000, -12]].map(([budget, pitch]) => {
     const frame = builder.build(cameraAt({ ...place, pitch }, 640, 400, heights), budget, true);
@@ -81,7 +81,7 @@ COUNT = """async () => {
   });
 }"""
 FORGET = """async () => {
-  const { createBorders } = await import("./worker/borders.js");
+  const { createBorders } = await import("./worker/sorted_batches.js");
   const centres = new Float32Array(300), store = { get: () => ({ centres, count: 100 }) };
   const keeper = { keep: () => new Uint32Array(50) };
   const borders = createBorders({ keeper, each: 16 }, store, 1000); // bytes: room for five lists
@@ -90,38 +90,7 @@ FORGET = """async () => {
   for (const cell of cells) borders.keep(cell, 0, 0);
   const after = held(), { bytes } = borders;
   borders.keep(cells[7], 0, 0);
-  const { tested } = borders;
-  borders.forget(cells[7]);
-  return { after, bytes, tested, then: held(), left: borders.bytes };
-}"""
-MERGE = """async () => {
-  const { createRunMerger } = await import("./worker/run_merge.js");
-  const { createDepthOrders } = await import("./worker/depth_orders.js");
-  let seed = 1;
-  const random = () => (seed = (seed * 16807) % 2147483647) / 2147483647;
-  const direction = [0.6, -0.3, -0.2], runs = createRunMerger(), results = [];
-  for (let parts = 1; parts < 8; parts++) {
-    const chunks = Array.from({ length: parts }, (_, p) => {
-      const count = Math.floor(400 * random());
-      // places on a coarse grid: many depths are equal
-      const centres = Float32Array.from({ length: 3 * count }, () => Math.round(8 * random()) / 4);
-      return { count, centres, entries: Uint32Array.from({ length: count }, (_, k) => 1000 * p + k) };
-    });
-    const orders = createDepthOrders({ get: tile => chunks[tile] }, { directions: [direction] });
-    runs.clear();
-    const listed = [];
-    chunks.forEach((chunk, p) => {
-      const all = Array.from(chunk.entries.keys()), some = p % 3 ? all.filter(() => random() < 0.4) : all;
-      runs.add(chunk, orders.get(p, 0, 0), direction, p % 3 ? Uint32Array.from(some) : null);
-      for (const k of some) {
-        const [x, y, z] = chunk.centres.subarray(3 * k, 3 * k + 3), [a, b, c] = direction;
-        listed.push([Math.fround(x * a + y * b + z * c), chunk.entries[k]]);
-      }
-    });
-    listed.sort((p, q) => q[0] - p[0]); // stable
-    results.push({ merged: Array.from(runs.merge()), expected: listed.map(([, entry]) => entry) });
-  }
-  return results;
+  return { after, bytes, tested: borders.tested };
 }"""
 
 
@@ -173,11 +142,3 @@ def test_cells_that_were_asked_for_long_ago_are_forgotten(page):
     found = page.evaluate(FORGET)
     assert found["after"] == [0, 0, 0, 1, 1, 1, 1, 1] and found["bytes"] == 1000
     assert found["tested"] == 800, "what is known is not tested again"
-    assert found["then"] == [0, 0, 0, 1, 1, 1, 1, 0] and found["left"] == 800
-
-
-def test_merged_runs_are_in_the_order_of_a_stable_sort(page):
-    results = page.evaluate(MERGE)
-    assert len(results) == 7
-    for found in results:
-        assert found["merged"] == found["expected"]

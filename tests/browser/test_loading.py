@@ -3,6 +3,7 @@
 import pytest
 from fixtures.browser import served
 from fixtures.bundles import Ground
+from playwright.sync_api import Error
 
 
 def test_no_request_leaves_the_page_and_nothing_is_complained_about(visit, plain):
@@ -85,3 +86,33 @@ def assert_said(seen, address, message):
     assert message in alert.inner_text()
     assert not seen.page.locator("#loading").is_visible()
     assert seen.page.evaluate("davgswt.ready.then(() => 'ready', () => 'refused')") == "refused"
+
+
+PHOTOS = [{"round": int(k > 2), "at": [k - 2.0, 1.0, 3.0], "look": [0.5, -0.5], "picture": k} for k in range(5)]
+ROUNDS = [{"photos": 3, "psnr": 27.1, "preset": "draft"}, {"photos": 2, "psnr": None}]
+VALUE = dict(unit="metre", half=2.0, photos=PHOTOS, rounds=ROUNDS, thumb=120, columns=8, pictures=5)
+
+
+@pytest.mark.parametrize(
+    "change, sound",
+    [
+        ({"more": 1}, True),
+        ({"unit": 3}, False),
+        ({"half": 0}, False),
+        ({"thumb": 0}, False),
+        ({"columns": 65}, False),
+        ({"photos": 3}, False),
+        ({"photos": [{"round": 0, "at": ["1", 2, 3], "look": [0, 0]}]}, False),
+        ({"photos": [{"round": 0, "at": [1, 2, 3], "look": [0]}]}, False),
+        ({"photos": [PHOTOS[0] | {"picture": 5}]}, False),
+        ({"rounds": [{"photos": -1, "psnr": 1}]}, False),
+        ({"rounds": [{"photos": 1, "psnr": "1"}]}, False),
+        ({"rounds": [{"photos": 1, "psnr": 1, "preset": 3}]}, False),
+    ],
+)
+def test_a_story_is_read_or_refused(call, change, sound):
+    if sound:
+        assert call("ui/story.js", "readStory", VALUE | change) == VALUE
+    else:
+        with pytest.raises(Error, match="story.json is not as the workflow writes it"):
+            call("ui/story.js", "readStory", VALUE | change)

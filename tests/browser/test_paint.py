@@ -21,7 +21,7 @@ slow = pytest.mark.slow
 PAINTING = """
   const { createPainting } = await import("./ui/painting.js");
   const { describePaint, readPaint } = await import("./data/paint.js");
-  const { decodePaint, encodePaint } = await import("./data/paint_link.js");
+  const { decodePaint, encodePaint } = await import("./data/paint.js");
   const sent = [], client = { paint: points => sent.push([...points]), adjust: change => sent.push(change) };
   const painting = createPainting(manifest, client, () => {});
   const stroke = (...dabs) => {
@@ -80,11 +80,11 @@ def test_densities_and_offsets_are_bounded_steps_of_the_history(modules, manifes
       const [{ probability }] = manifest.objects;
       painting.setDensity(0, 0.52, true);
       painting.setDensity(0, 9, true);
-      painting.setOffsets([0.0304, -99], true);
-      const set = [...painting.densities, ...painting.offsets];
+      painting.load({ runs: [], densities: painting.densities, offsets: [0.03, -8] });
+      const set = [...painting.densities, ...painting.paint.offsets];
       painting.undo();
       painting.undo();
-      const before = [...painting.densities, ...painting.offsets];
+      const before = [...painting.densities, ...painting.paint.offsets];
       const chances = sent.flatMap(({ probabilities }) => probabilities ?? []).map(chance => chance / probability);
       return { set, before, chances, offsets: sent.map(({ offsets }) => offsets) };
     """
@@ -100,7 +100,7 @@ def test_links_and_files_restore_what_was_painted_and_set(modules, manifest):
       stroke([4, 7, 3, 1]);
       stroke([-9, -3, 1, 0]);
       painting.setDensity(0, 2, true);
-      painting.setOffsets([0.03, -0.03], true);
+      painting.load({ ...painting.paint, offsets: [0.03, -0.03] });
       const { paint } = painting, link = await encodePaint(paint, manifest);
       const file = JSON.parse(JSON.stringify(describePaint(paint, manifest)));
       const other = { ...manifest, materials: manifest.materials.toReversed() };
@@ -146,19 +146,6 @@ def test_a_bad_file_is_refused(modules, manifest, change, message):
     assert message in run(modules, manifest, act)
 
 
-def test_offsets_give_the_shares_that_are_wanted(modules, manifest):
-    act = """
-      const { areSettable, changeShare, createShares } = await import("./ui/shares.js");
-      const shares = createShares(manifest), begun = shares.sharesOf([0, 0]);
-      const reached = [[0.25, 0.75], [0, 1]].map(wanted => shares.sharesOf(shares.offsetsFor(wanted)));
-      const fixed = { classes: { ...manifest.classes, rule: [...manifest.classes.rule, { kind: "height" }] } };
-      return [begun, ...reached, changeShare([0.2, 0.6, 0.2], 1, 0.2), areSettable(manifest), areSettable(fixed)];
-    """
-    begun, quarter, none, changed, *settable = run(modules, manifest, act)
-    assert sum(begun) == pytest.approx(1) and quarter == pytest.approx([0.25, 0.75], abs=0.01)
-    assert none == pytest.approx([0, 1]) and changed == pytest.approx([0.4, 0.2, 0.4]) and settable == [True, False]
-
-
 def test_only_cells_that_a_dab_touches_are_made_again(modules, manifest):
     """Borders of other cells keep their identity, so their Gaussians are not tested again."""
     found = modules.evaluate(
@@ -166,7 +153,7 @@ def test_only_cells_that_a_dab_touches_are_made_again(modules, manifest):
           const { createTerrainTables } = await import("./worker/terrain_tables.js");
           const { createHeights } = await import("./terrain/heights.js");
           const { lookUpCell } = await import("./terrain/cells.js");
-          const { paintPoints } = await import("./worker/repaint.js");
+          const { paintPoints } = await import("./worker/terrain_tables.js");
           const terrain = createTerrainTables(manifest, createHeights());
           const borders = () => {
             const found = new Map();
@@ -231,10 +218,10 @@ def test_a_stroke_of_the_mouse_while_the_page_draws_shows_what_a_link_to_it_show
 
 
 @slow
-def test_keys_choose_a_brush_and_paint_under_it_and_sliders_set_densities_and_shares(visit, address):
+def test_keys_choose_a_brush_and_paint_under_it_and_sliders_set_densities(visit, address):
     seen = visit(400, 400).open(f"{address}?still")
     seen.at(**ABOVE)
-    for key in ("m", "2", "]", "Space"):
+    for key in ("m", "2", "Space"):
         seen.page.keyboard.press(key)
     points = seen.page.evaluate("davgswt.painting.painted.points()")
     assert {material for _, _, material in points} == {1}
@@ -250,11 +237,10 @@ def test_keys_choose_a_brush_and_paint_under_it_and_sliders_set_densities_and_sh
     assert seen.page.evaluate("davgswt.painting.densities[0]") == 1.05 and seen.state["yaw"] == ABOVE["yaw"]
     drag = "one => { one.value = '0'; for (const kind of ['input', 'change'])"
     drag += " one.dispatchEvent(new Event(kind, { bubbles: true })); }"
-    for slider in ("#densities input", "#shares input"):
-        seen.page.locator(slider).first.evaluate(drag)
-    assert is_grass(seen.picture()).all(), "no sand and no gaps where shrubs were"
-    assert seen.page.locator("#shares output").all_text_contents() == ["0 %", "100 %"]
-    for _ in range(3):
+    seen.page.locator("#densities input").evaluate(drag)
+    dark = [int((picture[..., 1] < 105).sum()) for picture in (before, seen.picture())]
+    assert dark[1] < 0.1 * dark[0], "no shrubs, no gaps"
+    for _ in range(2):
         seen.page.evaluate("document.getElementById('undo').click()")
     assert (seen.picture() == before).all()
     seen.page.keyboard.press("Escape")
@@ -284,7 +270,7 @@ def test_stills_and_pages_show_what_was_painted_set_and_saved(cover, tmp_path, s
     paint(seen, 4.0, 7.0, 3.0, 1)
     paint(seen, 8.0, 2.0, 2.0, 0)
     seen.page.evaluate("davgswt.painting.setDensity(0, 2, true)")
-    seen.page.evaluate("davgswt.painting.setOffsets([0.03, -0.03], true)")
+    seen.page.evaluate("davgswt.painting.load({ ...davgswt.painting.paint, offsets: [0.03, -0.03] })")
     with seen.page.expect_download() as download:
         seen.page.locator("#savePaint").dispatch_event("click")
     download.value.save_as(tmp_path / "painted.json")

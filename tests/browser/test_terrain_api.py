@@ -130,7 +130,7 @@ def test_a_steep_place_elsewhere_hides_no_ground(other):
     found = other.evaluate(
         """async () => {
           const { createHeights } = await import("./terrain/heights.js");
-          const { hitGround } = await import("./terrain/ray.js");
+          const { hitGround } = await import("./terrain/camera.js");
           const pixels = new Float32Array(64 * 64), entry = { kind: "image", rows: 64, columns: 64, width: 640 };
           pixels[64 * 20 + 20] = 100;
           const heights = createHeights(entry, pixels), long = Math.hypot(1, 0.05);

@@ -52,7 +52,6 @@ def test_any_input_ends_the_tour(visit, plain):
         "key": lambda page: page.keyboard.press("ArrowRight"),
         "mouse": lambda page: page.mouse.click(240, 60),
         "wheel": lambda page: page.mouse.wheel(0, 50),
-        "gamepad": lambda page: page.evaluate("dispatchEvent(new Event('gamepadinput'))"),
     }
     for name, touch in inputs.items():
         start = seen.state["x"]

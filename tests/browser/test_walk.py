@@ -1,4 +1,6 @@
-"""Walking: keys, mouse, touch, the eye's floor, the link, and what survives a resize or a lost context."""
+"""Walking, orbiting and the map: keys, mouse, the eye's floor, the link, and what survives a lost context."""
+
+import math
 
 import pytest
 from fixtures.bundles import Ground
@@ -46,39 +48,36 @@ def test_each_key_does_what_the_help_says(moving, key, condition):
     moving.page.keyboard.up(key)
 
 
-STEP = """async ([place, mode, held, wish]) => {
-  const { createWalker, moveBy, stepWalker } = await import("./ui/walker.js");
+STEP = """async ([place, mode, held, seconds]) => {
+  const { createWalker, stepWalker } = await import("./ui/walker.js");
   const walker = createWalker({ tile_side: 4, eye_floor: 0.5 }, place);
   walker.mode = mode;
   for (const action of held) walker.held.add(action);
-  const still = { forward: 0, right: 0, turn: 0, tilt: 0, rise: 0, run: 0 };
-  const moved = wish ? moveBy(walker, { ...still, ...wish }, 0.5) : stepWalker(walker, 0.5);
+  const moved = stepWalker(walker, seconds);
   return [moved, walker.x, walker.y, walker.eye, walker.yaw, walker.pitch];
 }"""
 AHEAD = dict(x=3.0, y=5.0, eye=2.0, yaw=90.0, pitch=-30.0)
 
 
 @pytest.mark.parametrize(
-    "mode, held, wish, expected",
+    "mode, held, seconds, expected",
     [
         # half a second at 1.2 eye heights of 2 a second
-        ("walk", ["forward"], None, [True, 3, 6.2, 2, 90, -30]),
-        ("walk", ["back", "run"], None, [True, 3, 0.2, 2, 90, -30]),
-        ("walk", ["right"], None, [True, 4.2, 5, 2, 90, -30]),
-        ("walk", ["left", "forward"], None, [True, 3 - 1.2 / 2**0.5, 5 + 1.2 / 2**0.5, 2, 90, -30]),
-        ("walk", ["forward", "back"], None, [False, 3, 5, 2, 90, -30]),
-        ("walk", ["turnLeft"], None, [True, 3, 5, 2, 125, -30]),
-        ("walk", ["turnRight", "higher"], None, [True, 3, 5, 2 * 2.718281828**0.6, 55, -30]),
-        ("walk", [], {"tilt": -1, "turn": -3}, [True, 3, 5, 2, 345, -65]),
-        ("walk", [], {"tilt": 4}, [True, 3, 5, 2, 90, 90]),
-        ("walk", [], {"rise": -9}, [True, 3, 5, 0.5, 90, -30]),
-        ("walk", [], {"rise": 9}, [True, 3, 5, 64, 90, -30]),
-        ("fly", ["forward"], None, [True, 3, 5 + 1.2 * 0.75**0.5, 1.4, 90, -30]),
+        ("walk", ["forward"], 0.5, [True, 3, 6.2, 2, 90, -30]),
+        ("walk", ["back", "run"], 0.5, [True, 3, 0.2, 2, 90, -30]),
+        ("walk", ["right"], 0.5, [True, 4.2, 5, 2, 90, -30]),
+        ("walk", ["left", "forward"], 0.5, [True, 3 - 1.2 / 2**0.5, 5 + 1.2 / 2**0.5, 2, 90, -30]),
+        ("walk", ["forward", "back"], 0.5, [False, 3, 5, 2, 90, -30]),
+        ("walk", ["turnLeft"], 0.5, [True, 3, 5, 2, 125, -30]),
+        ("walk", ["turnRight", "higher"], 0.5, [True, 3, 5, 2 * 2.718281828**0.6, 55, -30]),
+        ("walk", ["lower"], 9, [True, 3, 5, 0.5, 90, -30]),
+        ("walk", ["higher"], 9, [True, 3, 5, 64, 90, -30]),
+        ("fly", ["forward"], 0.5, [True, 3, 5 + 1.2 * 0.75**0.5, 1.4, 90, -30]),
     ],
     ids=lambda value: str(value)[:40],
 )
-def test_a_step_goes_where_one_looks_within_bounds(modules, mode, held, wish, expected):
-    assert modules.evaluate(STEP, [AHEAD, mode, held, wish]) == pytest.approx(expected, abs=1e-6)
+def test_a_step_goes_where_one_looks_within_bounds(modules, mode, held, seconds, expected):
+    assert modules.evaluate(STEP, [AHEAD, mode, held, seconds]) == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -192,3 +191,65 @@ def test_the_budget_takes_fewer_splats_and_still_draws_near_tiles_back_to_front(
         assert each["steps"] == sorted(each["steps"], reverse=True)
         assert len({tuple(cell) for cell in each["cells"]}) == len(each["cells"])
         assert min(each["steps"]) == 0, "the tile underfoot is drawn"
+
+
+ORBIT = """async ([place, turns, factor]) => {
+  // where the eye is at first, after turns and after a zoom, over level ground
+  const { createOrbit } = await import("./ui/controls.js");
+  const { createWalker } = await import("./ui/walker.js");
+  const { cameraAt } = await import("./terrain/camera.js");
+  const { createHeights } = await import("./terrain/heights.js");
+  const manifest = { tile_side: 4, eye_floor: 0.01 }, heights = createHeights(), seen = [];
+  const walker = createWalker(manifest, place), scene = { walker, heights, manifest, lift: 0 };
+  const orbit = createOrbit({ scene, camera: () => cameraAt(walker, 320, 200, heights) });
+  const note = () => seen.push({ x: walker.x, y: walker.y, eye: walker.eye, yaw: walker.yaw, pitch: walker.pitch });
+  note();
+  for (const [turn, tilt] of turns) {
+    orbit.turn(turn, tilt);
+    note();
+  }
+  orbit.zoom(factor);
+  note();
+  return seen;
+}"""
+
+
+def pivot_of(place):
+    """Where the middle of the picture meets level ground."""
+    far = place["eye"] / math.tan(math.radians(-place["pitch"]))
+    yaw = math.radians(place["yaw"])
+    return place["x"] + far * math.cos(yaw), place["y"] + far * math.sin(yaw)
+
+
+def distance_of(place):
+    return place["eye"] / math.sin(math.radians(-place["pitch"]))
+
+
+def test_orbiting_keeps_what_one_looks_at_and_zooming_nears_it(modules):
+    start, turned, steep, flat, near = modules.evaluate(ORBIT, [OBLIQUE, [[40, -10], [-90, -80], [0, 120]], 0.5])
+    angles = [place[key] for place in (start, turned, steep, flat, near) for key in ("yaw", "pitch")]
+    assert angles == pytest.approx([20, -30, 60, -40, 330, -89, 330, -4, 330, -4], abs=1e-6)
+    for place in (turned, steep, flat, near):
+        assert pivot_of(place) == pytest.approx(pivot_of(start), abs=0.01)
+        assert distance_of(place) == pytest.approx((4.0, 2.0)[place is near], rel=1e-3)
+
+
+def test_orbiting_in_the_sky_turns_about_a_place_ahead(modules):
+    up, turned, _ = modules.evaluate(ORBIT, [OBLIQUE | {"pitch": 10}, [[180, 0]], 1])
+    # about a place four tile sides ahead: on its other side
+    far = 2 * 16 * math.cos(math.radians(10))
+    assert turned["x"] - up["x"] == pytest.approx(far * math.cos(math.radians(20)), abs=1e-6)
+    assert (turned["yaw"], turned["eye"]) == (pytest.approx(200), pytest.approx(2))
+
+
+@pytest.mark.slow
+def test_the_map_takes_one_elsewhere(visit, plain):
+    seen = visit(640, 400).open(plain)
+    seen.page.evaluate("place => davgswt.set(place)", OBLIQUE)
+    seen.page.keyboard.press("n")
+    box = seen.page.locator("#map").bounding_box()
+    # two of nine tiles (4 units each) to the east of the middle, one to the north
+    seen.page.mouse.click(box["x"] + (0.5 + 2 / 9) * box["width"], box["y"] + (0.5 - 1 / 9) * box["height"])
+    seen.until("davgswt.state.x !== 3")
+    now = seen.state
+    assert (now["x"], now["y"]) == (pytest.approx(11, abs=0.3), pytest.approx(9, abs=0.3))

@@ -6,23 +6,16 @@ import { pathToFileURL } from "node:url";
 
 const viewer = pathToFileURL(`${process.argv[2]}/`);
 const load = (name) => import(new URL(name, viewer));
-const { initialChunks, readChunks, readHeightMap, readManifest, readPictures } = await load("data/bundle.js");
-const { PageError } = await load("data/errors.js");
+const { initialChunks, readChunks, readHeightMap, readManifest, readPictures, sourceOf } = await load("data/bundle.js");
+const { PageError } = await load("data/checks.js");
 const { openZip } = await load("data/zip.js");
-const { sourceOf } = await load("data/open.js");
 const { cameraAt } = await load("terrain/camera.js");
 const { createHeights } = await load("terrain/heights.js");
 const { createFrameBuilder } = await load("worker/frame_builder.js");
-const { createFlyPath } = await load("ui/fly_path.js");
 
 const bytesOf = (text) => Uint8Array.from(Buffer.from(text, "base64"));
 
-async function read({ files, zip, path }) {
-  if (path !== undefined) {
-    const flight = createFlyPath();
-    flight.load(JSON.parse(Buffer.from(path, "base64").toString()));
-    return { finite: flight.path.every((place) => Object.values(place).every(Number.isFinite)) };
-  }
+async function read({ files, zip }) {
   const named = zip === undefined
     ? new Map(Object.entries(files).map(([name, text]) => {
       const blob = new Blob([bytesOf(text)]);

@@ -2,29 +2,21 @@
 // first picture has N Gaussians at most.
 
 import { webSource } from "./data/source.js";
-import { BUDGET } from "./draw/frame_pacing.js";
 import { createContext } from "./draw/gl.js";
+import { BUDGET } from "./draw/pacing.js";
 import { parsePaint, syncAddress } from "./ui/address.js";
-import { createCompare } from "./ui/compare.js";
-import { listenToControls } from "./ui/controls.js";
-import { element } from "./ui/dom.js";
+import { createOrbit, listenToControls } from "./ui/controls.js";
+import { createPanel, element } from "./ui/dom.js";
 import { listenToDrops } from "./ui/drop.js";
 import { createFirstView } from "./ui/first_view.js";
 import { runFrameLoop } from "./ui/frame_loop.js";
 import { createHud } from "./ui/hud.js";
-import { createJobs } from "./ui/job.js";
 import { createMinimap } from "./ui/minimap.js";
-import { listenToModes } from "./ui/modes.js";
-import { createOrbit } from "./ui/orbit.js";
 import { createPaintPanel } from "./ui/paint_panel.js";
-import { createPanel } from "./ui/panel.js";
-import { createPhotoMode } from "./ui/photo_mode.js";
-import { createStoryPanel } from "./ui/story_panel.js";
+import { createStoryPanel } from "./ui/story.js";
 import { listenToTools } from "./ui/tools.js";
-import { listenToTour } from "./ui/tour_control.js";
-import { listenToVideo } from "./ui/video.js";
+import { listenToTour } from "./ui/tour.js";
 import { explainError, Viewer } from "./ui/viewer.js";
-import { listenToXr } from "./ui/xr_session.js";
 
 document.documentElement.classList.add("running"); // hides the hint that nothing happens
 const hud = createHud(), menu = createPanel("menu");
@@ -38,8 +30,6 @@ export let paint;
 
 /** @type {ReturnType<typeof createMinimap> | null} */
 let map = null;
-/** @type {ReturnType<typeof createCompare> | null} */
-let compare = null;
 
 /** Resolves when the page's own bundle is loaded. */
 export const ready = start().catch((error) => {
@@ -66,10 +56,8 @@ async function start() {
     onFirstScene(walker) {
       listenToControls(walker, createOrbit(viewer), canvas, element("pad", HTMLElement), paint.brush, redraw);
       new ResizeObserver(redraw).observe(canvas);
-      listenToTools(viewer, paint.keep);
-      listenToModes(walker, (text) => hud.say(text), redraw);
+      listenToTools(viewer, paint.keep, walker);
       map = createMinimap(viewer);
-      compare = createCompare(viewer);
       if (still) return;
       runFrameLoop(viewer);
       syncAddress(viewer, paint.keep);
@@ -88,17 +76,12 @@ async function start() {
     onPicture() {
       paint.brush.draw();
       map?.draw();
-      compare?.update();
       if (viewer.scene) firstView.note(viewer.scene.walker, viewer.overlay);
     },
     onWhole: firstView.showTerrain,
   });
   paint = createPaintPanel(viewer);
-  const jobs = createJobs({ say: hud.say, onError: (error) => viewer.fail(error) });
-  createPhotoMode(viewer, jobs, firstView.showTerrain);
-  listenToVideo(viewer, jobs, closePanels);
-  listenToXr(viewer);
-  for (const id of ["paintButton", "storyButton", "photoButton"]) {
+  for (const id of ["paintButton", "storyButton"]) {
     element(id, HTMLButtonElement).addEventListener("click", () => menu.show(false));
   }
   listenToDrops({
@@ -106,7 +89,7 @@ async function start() {
       hud.showOpening();
       await viewer.open(source);
     },
-    loadJson: (json) => (paint.keep.isPaint(json) ? paint.keep.load(json) : viewer.flyPath.load(json)),
+    loadJson: (json) => paint.keep.load(json),
     onError: (error) => viewer.fail(error),
   });
   await viewer.open(webSource(new URL(".", location.href)));

@@ -1,17 +1,14 @@
 // The endless terrain in other pages: docs/terrain-api.md. Types: terrain_api.d.ts, which a test holds to this file.
 
-import { checkCamera } from "./api/arguments.js";
-import { createChunkReader } from "./api/chunks.js";
-import { createGround } from "./api/ground.js";
-import { createPainter } from "./api/painter.js";
-import { PageError } from "./data/errors.js";
-import { openSource } from "./data/open.js";
-import { listDrawnCells, NO_ORDER } from "./scene/drawn_cells.js";
-import { openTerrain, readTerrain } from "./scene/open_terrain.js";
+import { checkCamera, createChunkReader, createGround, createPainter } from "./api/parts.js";
+import { openSource } from "./data/bundle.js";
+import { PageError } from "./data/checks.js";
+import { NO_ORDER } from "./data/layout.js";
+import { listDrawnCells, openTerrain, readTerrain } from "./scene/open_terrain.js";
 import { cameraAt } from "./terrain/camera.js";
 
-export { PageError as TerrainError } from "./data/errors.js";
-export { rayThrough } from "./terrain/ray.js";
+export { PageError as TerrainError } from "./data/checks.js";
+export { rayThrough } from "./terrain/camera.js";
 
 const BUDGET = 1_000_000; // Gaussians of an update
 

@@ -1,15 +1,18 @@
-// Reading a bundle: davgswt.json, its height map and its chunks, coarse levels first, each checked before it is used.
+// Reading a bundle: where it comes from, then davgswt.json, its height map and its chunks, coarse levels first, each
+// checked before it is used.
 
-import { isCoordinate } from "./checks.js";
-import { PageError, REMAKE } from "./errors.js";
-import { listChunks, viewRoom } from "./layout.js";
+import { isCoordinate, PageError, REMAKE } from "./checks.js";
+import { gswtSource, isGswt } from "./gswt.js";
+import { indexType, listChunks, RECORD, viewRoom } from "./layout.js";
 import { findFault, NAME, pickKnown } from "./manifest.js";
-import { indexType, RECORD } from "./records.js";
+import { fileSource, webSource } from "./source.js";
+import { openZip } from "./zip.js";
 
 /**
  * @typedef {import("./manifest.js").Manifest} Manifest
  * @typedef {import("./manifest.js").ChunkEntry} ChunkEntry
  * @typedef {import("./source.js").Source} Source
+ * @typedef {import("./source.js").Files} Files
  *
  * A chunk to read, and a chunk that was read.
  * @typedef {{ tile: number, entry: ChunkEntry }} QueueItem
@@ -22,11 +25,50 @@ import { indexType, RECORD } from "./records.js";
 const PARALLEL = 6; // requests at a time
 
 /**
- * Read and check the manifest. Throws a PageError.
+ * The source of a terrain: the address of its folder, the folder's files (paths as a directory picker gives them), or
+ * its zip. Throws a PageError.
  *
- * @param {Source} source
- * @returns {Promise<Manifest>}
+ * @param {string | URL | Blob | Iterable<File>} where
+ * @returns {Promise<Source>}
  */
+export async function openSource(where) {
+  if (typeof where === "string" || where instanceof URL) return webSource(folderOf(where));
+  if (where instanceof Blob) return sourceOf(await openZip(where));
+  return sourceOf(filesOf(new Map([...where].map((file) => [file.webkitRelativePath || file.name, file]))));
+}
+
+/** The address of a folder or of the manifest in it, against the page's own. @param {string | URL} where */
+function folderOf(where) {
+  const address = new URL(where, globalThis.document?.baseURI ?? globalThis.location?.href);
+  if (!address.pathname.endsWith("/") && !address.pathname.endsWith(`/${NAME}`)) address.pathname += "/";
+  return new URL(".", address);
+}
+
+/** @param {Map<string, Blob>} files @returns {Files} */
+export const filesOf = (files) =>
+  new Map([...files].map(([name, file]) => [name, { size: file.size, open: () => file.arrayBuffer() }]));
+
+/**
+ * A bundle, wherever its manifest lies among the files, or a set of tiles for the public renderer.
+ *
+ * @param {Files} files
+ * @returns {Promise<Source>}
+ */
+export async function sourceOf(files) {
+  const manifest = [...files.keys()].filter((name) => name === NAME || name.endsWith(`/${NAME}`))
+    .sort((a, b) => a.length - b.length)[0];
+  if (manifest !== undefined) {
+    const above = manifest.slice(0, -NAME.length);
+    const inside = [...files].filter(([name]) => name.startsWith(above));
+    return fileSource(new Map(inside.map(([name, entry]) => [name.slice(above.length), entry])));
+  }
+  if (isGswt(files)) return gswtSource(files);
+  throw new PageError(
+    `There is no terrain in what was dropped: neither ${NAME} nor lod0_tile_00.ply. `
+    + "Drop a bundle's folder or its gswt.zip.");
+}
+
+/** The checked manifest. Throws a PageError. @param {Source} source @returns {Promise<Manifest>} */
 export async function readManifest(source) {
   const text = new TextDecoder().decode(await source.read(NAME, null));
   let manifest;
@@ -43,14 +85,11 @@ export async function readManifest(source) {
 /**
  * The pixels of the height map, or null where there is none. Throws a PageError.
  *
- * @param {Manifest} manifest
- * @param {Source} source
+ * @param {Manifest} manifest @param {Source} source
  */
 export async function readHeightMap({ heights }, source) {
   if (heights?.kind !== "image") return null;
-  const buffer = await source.read(heights.file, heights.bytes);
-  await checkDigest(buffer, heights);
-  const pixels = new Float32Array(buffer);
+  const pixels = new Float32Array(await readChecked(source, heights));
   if (!pixels.every(isCoordinate)) {
     throw new PageError(`${heights.file}: a height is not finite, or beyond all bounds. ${REMAKE}`);
   }
@@ -60,17 +99,14 @@ export async function readHeightMap({ heights }, source) {
 /**
  * The pixels of the classes' pictures, by file. Throws a PageError.
  *
- * @param {Manifest} manifest
- * @param {Source} source
+ * @param {Manifest} manifest @param {Source} source
  * @returns {Promise<import("../terrain/classes.js").Pictures>}
  */
 export async function readPictures({ classes }, source) {
   const pictures = new Map();
   for (const term of classes?.rule ?? []) {
     if (term.kind !== "image" || pictures.has(term.file)) continue;
-    const buffer = await source.read(term.file, term.bytes);
-    await checkDigest(buffer, term);
-    pictures.set(term.file, new Uint8Array(buffer));
+    pictures.set(term.file, new Uint8Array(await readChecked(source, term)));
   }
   return pictures;
 }
@@ -91,8 +127,7 @@ export function initialChunks(manifest) {
 /**
  * Read chunks and hand each to `take` as it arrives. The first failure stops all other requests and is thrown.
  *
- * @param {QueueItem[]} queue
- * @param {Source} source
+ * @param {QueueItem[]} queue @param {Source} source
  * @param {{ take: (chunk: Chunk) => void, onProgress?: (progress: Progress) => void, signal?: AbortSignal }} options
  */
 export async function readChunks(queue, source, { take, onProgress = () => {}, signal }) {
@@ -109,8 +144,7 @@ export async function readChunks(queue, source, { take, onProgress = () => {}, s
   const readNext = async () => {
     while (next < queue.length) {
       const { tile, entry } = queue[next++];
-      const buffer = await source.read(entry.file, entry.bytes, { signal: stop.signal, onBytes });
-      await checkDigest(buffer, entry);
+      const buffer = await readChecked(source, entry, { signal: stop.signal, onBytes });
       checkOrders(buffer, entry);
       stop.signal.throwIfAborted();
       take({ tile, level: entry.level, count: entry.count, buffer });
@@ -131,8 +165,7 @@ export async function readChunks(queue, source, { take, onProgress = () => {}, s
 /**
  * Every order must hold each Gaussian once: entries beyond the chunk would draw what is not there.
  *
- * @param {ArrayBuffer} buffer
- * @param {ChunkEntry} entry
+ * @param {ArrayBuffer} buffer @param {ChunkEntry} entry
  */
 function checkOrders(buffer, { file, count, orders }) {
   const indices = new (indexType(count))(buffer, count * RECORD), seen = new Uint8Array(count);
@@ -148,17 +181,20 @@ function checkOrders(buffer, { file, count, orders }) {
 }
 
 /**
- * Compare with the manifest's SHA-256 where the browser offers it (https, or this machine's own address).
+ * The bytes of a file, compared with the manifest's SHA-256 where the browser offers it (https, or this machine's own
+ * address).
  *
- * @param {ArrayBuffer} buffer
- * @param {{ file: string, sha256?: string }} entry
+ * @param {Source} source @param {{ file: string, bytes: number, sha256?: string }} entry
+ * @param {import("./source.js").ReadOptions} [options]
  */
-async function checkDigest(buffer, { file, sha256 }) {
-  if (!globalThis.crypto?.subtle || typeof sha256 !== "string") return;
+async function readChecked(source, { file, bytes, sha256 }, options) {
+  const buffer = await source.read(file, bytes, options);
+  if (!globalThis.crypto?.subtle || sha256 === undefined) return buffer;
   const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", buffer));
   const text = Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
   if (text !== sha256.toLowerCase()) {
     throw new PageError(
       `${file} is damaged (its SHA-256 is not the manifest's). Reload the page. If that does not help: ${REMAKE}`);
   }
+  return buffer;
 }

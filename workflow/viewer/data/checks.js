@@ -1,6 +1,12 @@
-// Checks of values that a manifest holds, whatever they are.
+// Checks of values from files, and the error that a person at the screen is told.
 
-import { FARTHEST } from "./records.js";
+import { FARTHEST } from "./layout.js";
+
+/** What went wrong and what to do, in words for the person at the screen. */
+export class PageError extends Error {}
+
+export const REMAKE = "Make the page again with “make run”.";
+export const REMAKE_SET = "Make the set again.";
 
 const SHORTEST = 1e-9; // of lengths
 

@@ -1,14 +1,17 @@
-// davgswt.json, checked before anything is drawn.
+// davgswt.json, checked before anything is drawn: the bundle, its materials, classes, objects and scatter.
 
+import { MAX_MATERIALS } from "../terrain/classes.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
+import { MAX_OCTAVES as MAX_JITTER } from "../terrain/jitter.js";
+import { findRunFault } from "../terrain/painted.js";
+import { MAX_RADIUS } from "../terrain/scatter.js";
 import {
-  brief, isColour, isCoordinate, isDigest, isDirection, isFilled, isInside, isLength, isNatural, isRange, isSalt,
-  isShare, isVector, isWhole,
+  brief, isColour, isCoordinate, isDigest, isDirection, isFilled, isInside, isLength, isList, isName, isNatural,
+  isRange, isSalt, isShare, isSize, isVector, isWhole, REMAKE,
 } from "./checks.js";
-import { REMAKE } from "./errors.js";
-import { findCoverFault, findCrowd, pickClasses } from "./land_cover.js";
-import { CACHE_BYTES, MAX_COUNT, MAX_LEVELS, MAX_ORDERS } from "./layout.js";
-import { chunkBytes, deviationOf, isEncoding, OLDEST, VERSION } from "./records.js";
+import {
+  CACHE_BYTES, chunkBytes, deviationOf, isEncoding, MAX_COUNT, MAX_LEVELS, MAX_ORDERS, OLDEST, VERSION,
+} from "./layout.js";
 
 /**
  * @typedef {{ level: number, file: string, bytes: number, count: number, orders: number[],
@@ -16,22 +19,69 @@ import { chunkBytes, deviationOf, isEncoding, OLDEST, VERSION } from "./records.
  * @typedef {{ tile: number, uncertainty?: number, z: number[], chunks: ChunkEntry[] }} TileEntry
  * @typedef {{ level: number, mean_scale?: number, distance: number | null, band?: number }} LevelEntry
  * @typedef {{ zenith: number[], horizon: number[], sun?: { direction: number[], colour?: number[] } }} Sky
+ * @typedef {{ name: string, share: number, first_tile: number, ground_colour: number[] }} MaterialEntry
+ * @typedef {{ name: string, radius: number, z: number[], ground: number, material: number, density: number,
+ *   probability: number, chunks: ChunkEntry[] }} ObjectEntry
  * @typedef {{ format: string, version: number, unit: string, tile_side: number, salt: number, eye_floor: number,
- *   ground_colour: number[], sky: Sky, encoding: import("./records.js").Encoding, directions: number[][],
- *   levels: LevelEntry[], tiles: TileEntry[], materials: import("./land_cover.js").MaterialEntry[],
- *   classes?: import("../terrain/classes.js").ClassesEntry, objects?: import("./land_cover.js").ObjectEntry[],
+ *   ground_colour: number[], sky: Sky, encoding: import("./layout.js").Encoding, directions: number[][],
+ *   levels: LevelEntry[], tiles: TileEntry[], materials: MaterialEntry[],
+ *   classes?: import("../terrain/classes.js").ClassesEntry, objects?: ObjectEntry[],
  *   scatter?: import("../terrain/scatter.js").ScatterEntry,
  *   heights?: import("../terrain/heights.js").HeightsEntry }} Manifest
  */
 
 export const NAME = "davgswt.json";
 export const MAX_TILES = 256; // of a material
-const FORMAT = "davgswt", MAX_SIDE = 4096; // pixels along a side of a height map
-const MAX_CELLS = 1 << 24; // along the side of a planet's face
+export const MAX_CANDIDATES = 512; // objects on a tile at most
+const FORMAT = "davgswt", MAX_SIDE = 4096; // pixels along a side of a height map or of a picture of materials
+const MAX_PIXELS = 2 ** 26; // of all pictures of materials together
+const MAX_FACE = 1 << 24; // cells along the side of a planet's face
 const WIDEST = 8; // of deviations, in tile sides
+const MAX_TERMS = 64, MAX_OBJECTS = 256, MAX_CELLS = 64; // of a rule; of a terrain; of the scatter along a tile's side
+const MAX_WAVES = 4096; // cells of the jitter along a tile's side
+const UNTURNED = 180; // degrees
+const DEEPEST = 6; // levels of lists and objects within a manifest
+const KEYS = new Set(`format version unit tile_side salt eye_floor ground_colour sky zenith horizon
+  sun direction colour encoding origin step log_scale sh_degree directions levels level mean_scale
+  distance band tiles tile uncertainty z chunks file bytes count orders sha256 heights kind height
+  wavelength octaves radius cells rows columns width beyond materials name share first_tile classes
+  rule weight wavelengths biases material low high soft jitter amplitude rise slope most ground
+  clearance painted objects density probability scatter turn size`.split(/\s+/));
 
 /**
- * Why a manifest cannot be used, or null.
+ * What each part of a manifest must be, given the whole; the parts before it are sound.
+ *
+ * @type {Record<string, (value: any, m: any) => boolean>}
+ */
+const PARTS = {
+  unit: (unit) => typeof unit === "string" && unit.length <= 40,
+  tile_side: isLength,
+  eye_floor: isLength,
+  salt: isSalt,
+  ground_colour: isColour,
+  sky: (sky) => isColour(sky?.zenith) && isColour(sky.horizon) && (sky.sun === undefined
+    || (isVector(sky.sun?.direction) && Math.hypot(...sky.sun.direction) > 0
+      && (sky.sun.colour === undefined || isVector(sky.sun.colour)))),
+  encoding: (encoding, m) => isEncoding(encoding) && deviationOf(encoding, 255) <= WIDEST * m.tile_side,
+  directions: (list) => isFilled(list) && list.length <= MAX_ORDERS && list.every(isDirection),
+  levels: (list) => isFilled(list) && list.length <= MAX_LEVELS
+    && list.every((/** @type {any} */ level, /** @type {number} */ l) => level?.level === l && rises(list, l)),
+  tiles: (tiles, { materials }) => isFilled(tiles) && tiles.length % 16 === 0
+    && tiles.length <= MAX_TILES * (isFilled(materials) ? materials.length : 1),
+  materials: (materials, { tiles }) => Array.isArray(materials) && isWhole(materials.length, 1, MAX_MATERIALS)
+    && tiles.length % (16 * materials.length) === 0
+    && materials.every((one, m) => isMaterial(one, (m * tiles.length) / materials.length)),
+  classes: (classes, { materials: { length } }) => (length > 1 ? areClasses(classes, length) : classes === undefined),
+  objects: (objects, { materials, tile_side: side }) => objects === undefined
+    || (isFilled(objects) && objects.length <= MAX_OBJECTS
+      && objects.every((/** @type {any} */ one) => isObject(one, materials.length, side))),
+  scatter: (scatter, { objects }) => (objects ? isScatter(scatter) : scatter === undefined),
+  heights: (heights, m) => heights === undefined || (isSurface(heights, m.tile_side)
+    && !(heights.kind === "sphere" && (m.classes || m.objects))),
+};
+
+/**
+ * Why a manifest cannot be used, or null. Version 2 does not name its only material: it is added.
  *
  * @param {any} m parsed JSON
  * @returns {string | null}
@@ -43,56 +93,36 @@ export function findFault(m) {
   if (m.version !== VERSION && m.version !== OLDEST) {
     return `the terrain has version ${brief(m.version)}, this page reads version ${OLDEST} and ${VERSION}. ${REMAKE}`;
   }
-  /** @param {string} what */
-  const broken = (what) => `“${what}” is missing or makes no sense. ${REMAKE}`;
-  if (typeof m.unit !== "string" || m.unit.length > 40) return broken("unit");
-  if (!isLength(m.tile_side)) return broken("tile_side");
-  if (!isLength(m.eye_floor)) return broken("eye_floor");
-  if (!isSalt(m.salt)) return broken("salt");
-  if (!isColour(m.ground_colour)) return broken("ground_colour");
-  if (!isSky(m.sky)) return broken("sky");
-  if (!isEncoding(m.encoding) || !(deviationOf(m.encoding, 255) <= WIDEST * m.tile_side)) return broken("encoding");
-  if (!isFilled(m.directions) || m.directions.length > MAX_ORDERS || !m.directions.every(isDirection)) {
-    return broken("directions");
+  if (m.version === OLDEST) {
+    const only = { name: "ground", share: 1, first_tile: 0, ground_colour: m.ground_colour };
+    Object.assign(m, { materials: [only], classes: undefined, objects: undefined, scatter: undefined });
   }
-  if (!areLevels(m.levels)) return broken("levels");
-  const count = m.version === VERSION && isFilled(m.materials) ? m.materials.length : 1;
-  if (!isFilled(m.tiles) || m.tiles.length % 16 || m.tiles.length > MAX_TILES * count) return broken("tiles");
-  const uncovered = m.version === VERSION ? findCoverFault(m) : null;
-  if (uncovered) return broken(uncovered);
-  const crowd = m.version === VERSION ? findCrowd(m) : null;
-  if (crowd) return crowd;
-  if (m.heights !== undefined && !isSurface(m.heights, m.tile_side)) return broken("heights");
-  if (m.heights?.kind === "sphere" && (m.classes || m.objects?.length)) return broken("heights");
-  for (let t = 0; t < m.tiles.length; t++) {
-    const fault = findTileFault(m, m.tiles[t], t);
+  for (const [key, isSound] of Object.entries(PARTS)) {
+    if (!isSound(m[key], m)) return `“${key}” is missing or makes no sense. ${REMAKE}`;
+  }
+  const { tiles, objects = [] } = m;
+  for (const [t, tile] of tiles.entries()) {
+    const sound = tile?.tile === t && isRange(tile.z) && isShare(tile.uncertainty ?? 0);
+    const fault = findChunkFault(m, sound ? tile.chunks : null, `tile ${t}`);
     if (fault) return fault;
   }
-  const objects = m.version === VERSION ? m.objects ?? [] : [];
-  for (let k = 0; k < objects.length; k++) {
-    const fault = findChunkFault(m, objects[k].chunks, `object ${k}`);
+  for (const [k, { chunks }] of objects.entries()) {
+    const fault = findChunkFault(m, chunks, `object ${k}`);
     if (fault) return fault;
   }
-  return null;
+  return findCrowd(m);
 }
 
-/**
- * @param {any} m
- * @param {any} tile
- * @param {number} t
- */
-function findTileFault(m, tile, t) {
-  if (tile?.tile !== t || !isRange(tile.z) || !isShare(tile.uncertainty ?? 0)) {
-    return `tile ${t} is missing or makes no sense. ${REMAKE}`;
-  }
-  return findChunkFault(m, tile.chunks, `tile ${t}`);
+/** Why the objects are too many, or null. @param {any} m */
+function findCrowd({ objects, scatter }) {
+  if (!scatter) return null;
+  const chance = objects.reduce((/** @type {number} */ sum, /** @type {any} */ one) => sum + one.probability, 0);
+  const most = Math.ceil(scatter.cells ** 2 * Math.min(1, chance));
+  if (most <= MAX_CANDIDATES) return null;
+  return `up to ${most} objects stand on a tile, this page draws ${MAX_CANDIDATES}. Make fewer, or smaller tiles.`;
 }
 
-/**
- * @param {any} m
- * @param {any} chunks
- * @param {string} owner
- */
+/** @param {any} m @param {any} chunks @param {string} owner */
 function findChunkFault(m, chunks, owner) {
   if (!Array.isArray(chunks)) return `${owner} is missing or makes no sense. ${REMAKE}`;
   const levels = new Set(chunks.map((/** @type {any} */ chunk) => chunk?.level));
@@ -111,70 +141,23 @@ function findChunkFault(m, chunks, owner) {
   return null;
 }
 
+/**
+ * The parts of a sound manifest that the page knows: nothing else of a file is kept or passed on.
+ *
+ * @param {any} value @param {number} [depth]
+ * @returns {any}
+ */
+export function pickKnown(value, depth = 0) {
+  if (value === null || typeof value !== "object") return value;
+  if (depth >= DEEPEST) return undefined;
+  if (Array.isArray(value)) return value.map((one) => pickKnown(one, depth + 1));
+  const known = Object.entries(value).filter(([key]) => KEYS.has(key));
+  return Object.fromEntries(known.map(([key, one]) => [key, pickKnown(one, depth + 1)]));
+}
+
 /** Are these different numbers of directions? @param {any} orders @param {number} directions */
 const areOrders = (orders, directions) => isFilled(orders) && orders.length <= directions
   && orders.every((/** @type {any} */ d) => isNatural(d) && d < directions) && new Set(orders).size === orders.length;
-
-/**
- * The keys of a sound manifest that the page knows: nothing else of a file is kept or passed on.
- *
- * @param {Manifest} manifest
- * @returns {Manifest}
- */
-export function pickKnown({
-  format, version, unit, tile_side, salt, eye_floor, ground_colour, sky, encoding, directions, levels, tiles, heights,
-  ...cover
-}) {
-  const { origin, step, log_scale, sh_degree } = encoding, { zenith, horizon, sun } = sky;
-  return {
-    format, version, unit, tile_side, salt, eye_floor, ground_colour, directions,
-    sky: sun ? { zenith, horizon, sun: { direction: sun.direction, colour: sun.colour } } : { zenith, horizon },
-    encoding: { origin, step, log_scale, sh_degree },
-    levels: levels.map(({ level, mean_scale, distance, band }) => ({ level, mean_scale, distance, band })),
-    tiles: tiles.map(({ tile, uncertainty, z, chunks }) => ({ tile, uncertainty, z, chunks: chunks.map(pickChunk) })),
-    heights: heights && pickHeights(heights),
-    ...(version === OLDEST ? { materials: [onlyMaterial(ground_colour)] } : pickCover(cover)),
-  };
-}
-
-/** What version 2 does not name. @param {number[]} colour */
-const onlyMaterial = (colour) => ({ name: "ground", share: 1, first_tile: 0, ground_colour: colour });
-
-/** @param {ChunkEntry} chunk @returns {ChunkEntry} */
-const pickChunk = ({ level, file, bytes, count, orders, sha256 }) => ({ level, file, bytes, count, orders, sha256 });
-
-/** @param {Pick<Manifest, "materials" | "classes" | "objects" | "scatter">} cover */
-function pickCover({ materials, classes, objects, scatter }) {
-  return {
-    materials: materials.map(({ name, share, first_tile, ground_colour }) => (
-      { name, share, first_tile, ground_colour })),
-    classes: classes && pickClasses(classes),
-    objects: objects?.map(({ name, radius, z, ground, material, density, probability, chunks }) => (
-      { name, radius, z, ground, material, density, probability, chunks: chunks.map(pickChunk) })),
-    scatter: scatter && { cells: scatter.cells, turn: scatter.turn, size: scatter.size, salt: scatter.salt },
-  };
-}
-
-/**
- * @param {import("../terrain/heights.js").HeightsEntry} entry
- * @returns {import("../terrain/heights.js").HeightsEntry}
- */
-function pickHeights(entry) {
-  if (entry.kind === "flat") return { kind: "flat" };
-  if (entry.kind === "hills") {
-    const { kind, height, wavelength, octaves, salt } = entry;
-    return { kind, height, wavelength, octaves, salt };
-  }
-  if (entry.kind === "sphere") return { kind: "sphere", radius: entry.radius, cells: entry.cells };
-  const { kind, file, bytes, sha256, rows, columns, width, beyond } = entry;
-  return { kind, file, bytes, sha256, rows, columns, width, beyond };
-}
-
-/** @param {any} levels */
-function areLevels(levels) {
-  return isFilled(levels) && levels.length <= MAX_LEVELS
-    && levels.every((/** @type {any} */ level, /** @type {number} */ l) => level?.level === l && rises(levels, l));
-}
 
 /** @param {any[]} levels @param {number} l */
 function rises(levels, l) {
@@ -184,29 +167,60 @@ function rises(levels, l) {
   return isCoordinate(far) && far >= (l ? levels[l - 1].distance : 0);
 }
 
-/**
- * Is this a surface that terrain/heights.js knows?
- *
- * @param {any} h
- * @param {number} side of a tile
- */
+/** Is this a surface that terrain/heights.js knows? @param {any} h @param {number} side of a tile */
 function isSurface(h, side) {
   if (h?.kind === "flat") return true;
-  if (h?.kind === "sphere") return isPlanet(h, side);
-  if (h?.kind === "hills") {
-    return isCoordinate(h.height) && isLength(h.wavelength) && isSalt(h.salt) && isNatural(h.octaves)
-      && h.octaves > 0 && h.octaves <= MAX_OCTAVES;
+  if (h?.kind === "sphere") { // its cells are about as large as its tiles: more would be in view than can be drawn
+    return isLength(h.radius) && h.radius >= side && isWhole(h.cells, 1, MAX_FACE)
+      && Math.abs(h.cells - (h.radius / side) * Math.sqrt((2 * Math.PI) / 3)) <= 1;
   }
-  return h?.kind === "image" && isLength(h.width) && isNatural(h.rows) && isNatural(h.columns) && isInside(h.file)
-    && h.rows > 0 && h.columns > 0 && Math.max(h.rows, h.columns) <= MAX_SIDE && h.bytes === 4 * h.rows * h.columns
-    && isDigest(h.sha256);
+  if (h?.kind === "hills") {
+    return isCoordinate(h.height) && isLength(h.wavelength) && isSalt(h.salt) && isWhole(h.octaves, 1, MAX_OCTAVES);
+  }
+  return h?.kind === "image" && isPicture(h, 4);
 }
 
-/** A planet whose cells are about as large as its tiles: more would be in view than can be drawn. @param {any} h @param {number} side */
-const isPlanet = (h, side) => isLength(h.radius) && h.radius >= side && isWhole(h.cells, 1, MAX_CELLS)
-  && Math.abs(h.cells - (h.radius / side) * Math.sqrt((2 * Math.PI) / 3)) <= 1;
+/** @param {any} one @param {number} size bytes of a pixel */
+const isPicture = (one, size) => isInside(one.file) && [one.rows, one.columns].every((n) => isWhole(n, 1, MAX_SIDE))
+  && isLength(one.width) && one.bytes === size * one.rows * one.columns && isDigest(one.sha256);
 
-/** @param {any} sky */
-const isSky = (sky) => isColour(sky?.zenith) && isColour(sky.horizon) && (sky.sun === undefined
-  || (isVector(sky.sun?.direction) && Math.hypot(...sky.sun.direction) > 0
-    && (sky.sun.colour === undefined || isVector(sky.sun.colour))));
+/** @param {any} one @param {number} firstTile */
+const isMaterial = (one, firstTile) => isName(one?.name) && isShare(one.share) && one.first_tile === firstTile
+  && isColour(one.ground_colour);
+
+/** @param {any} classes @param {number} count of materials */
+function areClasses(classes, count) {
+  const { salt, rule, jitter, rise, painted } = classes ?? {};
+  if (painted !== undefined && findRunFault(painted, count)) return false;
+  if (!isSalt(salt) || !isFilled(rule) || rule.length > MAX_TERMS) return false;
+  if (!rule.every((/** @type {any} */ term) => isSize(term?.weight) && isTerm(term, count))) return false;
+  const pictures = rule.filter((/** @type {any} */ term) => term.kind === "image");
+  const pixels = pictures.reduce((/** @type {number} */ sum, /** @type {any} */ { bytes }) => sum + bytes, 0);
+  const files = new Set(pictures.map((/** @type {any} */ { file }) => file));
+  return pixels <= MAX_PIXELS && files.size === pictures.length
+    && isWhole(jitter?.cells, 1, MAX_WAVES) && isWhole(jitter.octaves, 1, MAX_JITTER)
+    && isSize(jitter.amplitude) && isSize(rise?.slope) && isSize(rise.most)
+    && isList(rise.ground, count, isCoordinate) && isList(rise.clearance, count, isSize);
+}
+
+/** @param {any} term @param {number} count of materials */
+function isTerm(term, count) {
+  if (term.kind === "noise") {
+    return isList(term.wavelengths, count, isLength) && isList(term.biases, count, isCoordinate)
+      && isList(term.octaves, count, (octaves) => isWhole(octaves, 1, MAX_JITTER));
+  }
+  if (term.kind === "image") return isPicture(term, 1) && (term.beyond === "mirror" || term.beyond === "clamp");
+  /** @param {any} bound */
+  const isBound = (bound) => bound === null || isCoordinate(bound);
+  return (term.kind === "height" || term.kind === "slope") && isWhole(term.material, 0, count - 1)
+    && isBound(term.low) && isBound(term.high) && isLength(term.soft);
+}
+
+/** All but its chunks. @param {any} one @param {number} count of materials @param {number} side of a tile */
+const isObject = (one, count, side) => isName(one?.name) && isLength(one.radius) && one.radius <= MAX_RADIUS * side
+  && isRange(one.z) && isCoordinate(one.ground) && isWhole(one.material, 0, count - 1)
+  && isSize(one.density) && isShare(one.probability);
+
+/** @param {any} scatter */
+const isScatter = (scatter) => isWhole(scatter?.cells, 1, MAX_CELLS) && isSize(scatter.turn)
+  && scatter.turn <= UNTURNED && isSize(scatter.size) && scatter.size < 1 && isSalt(scatter.salt);

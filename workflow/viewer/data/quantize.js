@@ -1,14 +1,14 @@
 // Quantization of Gaussians to records: the same grid, steps and bytes as dav_gswt/bundle/encoding.py, for sets that
 // the page itself converts to a bundle.
 
-import { MAX_TURN, RECORD, TURN_STEPS } from "./records.js";
+import { MAX_TURN, RECORD, TURN_STEPS } from "./layout.js";
 
 /**
  * Gaussians in flat lists; turns: quaternions w x y z; paint: colour and opacity, 4 bytes each.
  *
  * @typedef {{ count: number, centres: Float32Array, logScales: Float32Array, turns: Float32Array,
  *   paint: Uint8Array | Uint8ClampedArray }} Gaussians
- * @typedef {import("./records.js").Encoding} Encoding
+ * @typedef {import("./layout.js").Encoding} Encoding
  */
 
 const PLACES = 65535, MIN_STEPS = 1024; // steps of the grid along an axis; fewest of them along a tile's side
@@ -18,8 +18,7 @@ const THINNEST = 1 / 64, WIDEST = 4; // bounds of axes: in pixels, in tile sides
 /**
  * The finest grid that holds all these Gaussians; null: they spread too far.
  *
- * @param {Gaussians[]} sets
- * @param {number} side
+ * @param {Gaussians[]} sets @param {number} side
  * @param {number} pixel size of a pixel on the nearest ground in view
  * @returns {Encoding | null}
  */
@@ -51,9 +50,7 @@ export function fitEncoding(sets, side, pixel) {
 /**
  * Write Gaussians' records to the beginning of a chunk.
  *
- * @param {ArrayBuffer} buffer
- * @param {Gaussians} gaussians
- * @param {Encoding} encoding
+ * @param {ArrayBuffer} buffer @param {Gaussians} gaussians @param {Encoding} encoding
  */
 export function writeRecords(buffer, { count, centres, logScales, turns, paint }, encoding) {
   const { origin, step, log_scale: [least, rise] } = encoding;
@@ -72,11 +69,7 @@ export function writeRecords(buffer, { count, centres, logScales, turns, paint }
   }
 }
 
-/**
- * Round; halves to the even number.
- *
- * @param {number} v
- */
+/** Round; halves to the even number. @param {number} v */
 function roundEven(v) {
   const down = Math.floor(v);
   return v - down === 0.5 ? down + (down & 1) : Math.round(v);

@@ -1,7 +1,7 @@
-// Sources of a bundle's files: the page's own folder, or files that were dropped onto the page. Nothing is allocated
-// for a file before its size is compared with the one that is expected.
+// Sources of a bundle's files: the page's own folder, or files that were dropped onto the page. No more of a file is
+// read than the size that is expected.
 
-import { PageError, REMAKE } from "./errors.js";
+import { PageError, REMAKE } from "./checks.js";
 
 /**
  * `read(file, size, options)` gives exactly `size` bytes (null: at most MAX_BYTES), or throws a PageError.
@@ -20,76 +20,35 @@ export const MAX_FILES = 4096; // in a folder or a zip
 /** @param {string} file */
 const shortName = (file) => file.split("/").slice(-2).join("/");
 
-/**
- * Files below a URL.
- *
- * @param {URL} base
- * @returns {Source}
- */
+/** Files below a URL. @param {URL} base @returns {Source} */
 export function webSource(base) {
   return {
     async read(file, size, { signal, onBytes = () => {} } = {}) {
-      const response = await request(new URL(file, base), file, signal);
-      if (size === null) return readAll(response, file, signal);
-      const bytes = new Uint8Array(size);
-      let at = 0;
-      for await (const part of partsOf(response, signal, () => wrongSize(file, at, size))) {
-        if (at + part.length > size) throw wrongSize(file, at + part.length, size);
-        bytes.set(part, at);
-        at += part.length;
-        onBytes(part.length);
+      const response = await request(new URL(file, base), file, signal), most = size ?? MAX_BYTES;
+      const reader = /** @type {ReadableStream<Uint8Array>} */ (response.body).getReader(), parts = [];
+      let came = 0;
+      for (;;) {
+        const { done, value } = await reader.read().catch((error) => {
+          throw signal?.aborted ? error : wrongSize(file, came, size ?? came + 1);
+        });
+        if (done) break;
+        came += value.length;
+        if (came > most) throw size === null ? tooLarge(file) : wrongSize(file, came, size);
+        parts.push(value);
+        onBytes(value.length);
       }
-      if (at < size) throw wrongSize(file, at, size);
+      if (size !== null && came < size) throw wrongSize(file, came, size);
+      const bytes = new Uint8Array(came);
+      for (const part of parts.reverse()) {
+        came -= part.length;
+        bytes.set(part, came);
+      }
       return bytes.buffer;
     },
   };
 }
 
-/**
- * All bytes of a response.
- *
- * @param {Response} response
- * @param {string} file
- * @param {AbortSignal | undefined} signal
- */
-async function readAll(response, file, signal) {
-  const parts = [];
-  let at = 0;
-  for await (const part of partsOf(response, signal, () => wrongSize(file, at, at + 1))) {
-    at += part.length;
-    if (at > MAX_BYTES) throw tooLarge(file);
-    parts.push(/** @type {Uint8Array<ArrayBuffer>} */ (part));
-  }
-  return new Blob(parts).arrayBuffer();
-}
-
-/**
- * The parts of a response as they arrive. broken: gives the error for a connection that breaks off.
- *
- * @param {Response} response
- * @param {AbortSignal | undefined} signal
- * @param {() => Error} broken
- */
-async function* partsOf(response, signal, broken) {
-  const reader = /** @type {ReadableStream<Uint8Array>} */ (response.body).getReader();
-  for (;;) {
-    let step;
-    try {
-      step = await reader.read();
-    } catch (error) {
-      throw signal?.aborted ? error : broken();
-    }
-    if (step.done) return;
-    yield step.value;
-  }
-}
-
-/**
- * Dropped files.
- *
- * @param {Files} files
- * @returns {Source}
- */
+/** Dropped files. @param {Files} files @returns {Source} */
 export function fileSource(files) {
   return {
     async read(file, size, { onBytes = () => {} } = {}) {

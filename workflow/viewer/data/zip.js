@@ -1,7 +1,7 @@
 // Zip archives from untrusted sources: entries are read from the file one by one, sizes and names are checked before
 // anything is allocated, checksums after. Stored and deflated entries; no zip64.
 
-import { PageError } from "./errors.js";
+import { PageError } from "./checks.js";
 import { MAX_FILES } from "./source.js";
 
 const END = 0x06054b50, ENTRY = 0x02014b50, LOCAL = 0x04034b50; // signatures of records
@@ -39,11 +39,7 @@ export async function openZip(blob) {
   return readTable(blob, new DataView(await blob.slice(begin, begin + size).arrayBuffer()), count);
 }
 
-/**
- * @param {Blob} blob
- * @param {DataView<ArrayBuffer>} table
- * @param {number} count
- */
+/** @param {Blob} blob @param {DataView<ArrayBuffer>} table @param {number} count */
 function readTable(blob, table, count) {
   /** @type {import("./source.js").Files} */
   const files = new Map();
@@ -75,8 +71,7 @@ function readTable(blob, table, count) {
 /**
  * The bytes of an entry, with the size and the checksum of the table.
  *
- * @param {Blob} blob
- * @param {Entry} entry
+ * @param {Blob} blob @param {Entry} entry
  */
 async function unpack(blob, { name, method, crc, packed, size, local }) {
   const head = new DataView(await blob.slice(local, local + LOCAL_SIZE).arrayBuffer());

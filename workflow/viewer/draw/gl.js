@@ -1,6 +1,6 @@
 // WebGL2: context, programs, textures.
 
-import { PageError } from "../data/errors.js";
+import { PageError } from "../data/checks.js";
 
 /** @typedef {WebGL2RenderingContext} GL */
 
@@ -21,13 +21,7 @@ export function createContext(canvas) {
   return gl;
 }
 
-/**
- * Compile and link; uniforms by name.
- *
- * @param {GL} gl
- * @param {string} vertex
- * @param {string} fragment
- */
+/** A linked program. @param {GL} gl @param {string} vertex @param {string} fragment */
 export function createProgram(gl, vertex, fragment) {
   const program = gl.createProgram();
   for (const [kind, source] of /** @type {[number, string][]} */ ([
@@ -58,10 +52,7 @@ export function createProgram(gl, vertex, fragment) {
 /**
  * An empty texture, read without interpolation.
  *
- * @param {GL} gl
- * @param {number} format
- * @param {number} width
- * @param {number} height
+ * @param {GL} gl @param {number} format @param {number} width @param {number} height
  */
 export function createTexture(gl, format, width, height) {
   const texture = gl.createTexture();
@@ -76,8 +67,7 @@ export function createTexture(gl, format, width, height) {
 /**
  * Has the GPU passed this fence? True where there is none.
  *
- * @param {GL} gl
- * @param {WebGLSync | null} fence
+ * @param {GL} gl @param {WebGLSync | null} fence
  */
 export const hasPassed = (gl, fence) =>
   fence === null || gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED;
@@ -85,8 +75,7 @@ export const hasPassed = (gl, fence) =>
 /**
  * Set the camera's axes in a program.
  *
- * @param {GL} gl
- * @param {Record<string, WebGLUniformLocation | null>} uniforms
+ * @param {GL} gl @param {Record<string, WebGLUniformLocation | null>} uniforms
  * @param {import("../terrain/camera.js").Camera} camera
  */
 export function setAxes(gl, uniforms, { right, up, ahead }) {

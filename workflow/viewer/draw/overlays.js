@@ -21,8 +21,7 @@ export const SORTED = [0.95, 0.95, 0.95]; // cells that are sorted by depth have
 /**
  * 256 colours of 4 bytes, by the number that an overlay shows (see the vertex shader).
  *
- * @param {number} overlay
- * @param {import("../data/manifest.js").Manifest} manifest
+ * @param {number} overlay @param {import("../data/manifest.js").Manifest} manifest
  */
 export function overlayColours(overlay, { directions }) {
   const colours = Array.from({ length: 256 }, (_, n) => {

@@ -3,7 +3,7 @@
 import {
   CODE_SHIFT, MAX_LEVELS, PAGE, PAGES_A_ROW, PLACES, PLACES_A_ROW, ROW, SLOTS,
 } from "../data/layout.js";
-import { MAX_TURN, TURN_STEPS } from "../data/records.js";
+import { MAX_TURN, TURN_STEPS } from "../data/layout.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import { FACES } from "../terrain/sphere.js";
 import { OBJECTS, OVERLAYS } from "./overlays.js";
@@ -11,7 +11,7 @@ import { OBJECTS, OVERLAYS } from "./overlays.js";
 const AIR = 0.12; // height at which the sky of a planet is 1/e as bright, in radii
 const UNCERTAINTY = OVERLAYS.indexOf("uncertainty");
 
-/** A record as a Gaussian; the other end of data/records.js. */
+/** A record as a Gaussian; the other end of data/layout.js. */
 const DECODE = `
 uniform vec3 origin, stride; // centre = origin + stride * 16 bits
 uniform vec2 logScale;       // ln(deviation) = x + y * 8 bits

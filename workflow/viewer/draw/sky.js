@@ -2,7 +2,6 @@
 // colours as dav_gswt/terrain/backdrop.py.
 
 import { createProgram, setAxes } from "./gl.js";
-import { setHorizon } from "./horizon.js";
 import { BACKDROP, SPHERE_BACKDROP } from "./shaders.js";
 
 /**
@@ -33,10 +32,7 @@ void main() {
   colour = vec4(mix(seen, sunColour, clamp(disc, 0.0, 1.0)), 1.0);
 }`;
 
-/**
- * @param {import("./gl.js").GL} gl
- * @param {import("../data/manifest.js").Manifest} manifest
- */
+/** @param {import("./gl.js").GL} gl @param {import("../data/manifest.js").Manifest} manifest */
 export function createSky(gl, { sky, ground_colour: ground, heights }) {
   const sphere = heights?.kind === "sphere" ? heights : null, empty = gl.createVertexArray();
   const { use, uniforms } = createProgram(gl, VERTEX, fragmentShader(sphere !== null));
@@ -45,8 +41,7 @@ export function createSky(gl, { sky, ground_colour: ground, heights }) {
     /**
      * Fill the picture; low: sine of the angle below the horizon at which tiles end.
      *
-     * @param {Camera} camera
-     * @param {{ low: number }} options
+     * @param {Camera} camera @param {{ low: number }} options
      */
     draw(camera, { low }) {
       use();
@@ -65,4 +60,18 @@ export function createSky(gl, { sky, ground_colour: ground, heights }) {
       gl.bindVertexArray(null);
     },
   };
+}
+
+/**
+ * Set what the backdrop of an eye over a sphere needs.
+ *
+ * @param {import("./gl.js").GL} gl @param {Record<string, WebGLUniformLocation | null>} uniforms
+ * @param {{ radius: number }} sphere
+ * @param {number[]} eye from the planet's middle
+ */
+export function setHorizon(gl, uniforms, { radius }, eye) {
+  const far = Math.hypot(...eye), height = Math.max(far - radius, 0);
+  gl.uniform3fv(uniforms.upward, eye.map((v) => v / far));
+  gl.uniform1f(uniforms.dip, Math.sqrt(height * (2 * radius + height)) / far);
+  gl.uniform1f(uniforms.height, height / radius);
 }

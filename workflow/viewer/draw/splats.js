@@ -1,16 +1,16 @@
 // Splats on the GPU: all records in one texture, pages of orders in another, and two instanced draws a picture, one for
 // far tiles and one for the 3 x 3 block about the eye. A block of instances is a page of entries in one cell.
 
-import { PageError } from "../data/errors.js";
+import { PageError } from "../data/checks.js";
 import {
   BLOCK, MAX_LEVELS, NEAR, orderPages, PAGE, PAGES_A_ROW, PLACE, PLACES_A_ROW, recordRows, ROW,
 } from "../data/layout.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import { rateOf } from "../terrain/sphere.js";
 import { createProgram, createTexture, setAxes } from "./gl.js";
-import { setHorizon } from "./horizon.js";
 import { OBJECTS, overlayColours } from "./overlays.js";
 import { FRAGMENT, vertexShader } from "./shaders.js";
+import { setHorizon } from "./sky.js";
 
 /**
  * @typedef {import("./gl.js").GL} GL
@@ -19,9 +19,8 @@ import { FRAGMENT, vertexShader } from "./shaders.js";
  * @typedef {import("../worker/frame_builder.js").FrameAnswer} FrameAnswer
  * @typedef {Record<string, WebGLUniformLocation | null>} Uniforms
  *
- * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there;
- * split: share of the picture, from the left, that shows no overlay (default: 0).
- * @typedef {{ end: number, low: number, overlay: number, split?: number }} DrawOptions
+ * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there.
+ * @typedef {{ end: number, low: number, overlay: number }} DrawOptions
  * @typedef {ReturnType<typeof createSplats>} Splats
  */
 
@@ -31,11 +30,7 @@ const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
 const QUADS = Uint16Array.from({ length: 6 * PAGE }, (_, k) => 4 * Math.floor(k / 6) + [0, 1, 2, 2, 1, 3][k % 6]);
 const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3, PLACES = 4, OWNERS = 5; // texture units
 
-/**
- * @param {GL} gl
- * @param {Manifest} manifest
- * @param {HeightField} heights
- */
+/** @param {GL} gl @param {Manifest} manifest @param {HeightField} heights */
 export function createSplats(gl, manifest, heights) {
   const { use, uniforms } = createProgram(gl, vertexShader(heights.kind), FRAGMENT);
   const tallest = Math.max(recordRows(manifest), orderPages(manifest) / PAGES_A_ROW);
@@ -52,6 +47,8 @@ export function createSplats(gl, manifest, heights) {
   const each = manifest.tiles.length / manifest.materials.length;
   let shownOverlay = -1;
   if (gl.getError() === gl.OUT_OF_MEMORY) throw new PageError(FULL);
+  use();
+  setConstants(gl, uniforms, manifest, heights);
 
   /** @param {number} unit @param {WebGLTexture} texture */
   function bind(unit, texture) {
@@ -127,20 +124,15 @@ export function createSplats(gl, manifest, heights) {
     /**
      * Draw blocks of the last frame over what is there, as the camera sees them now.
      *
-     * @param {import("../terrain/camera.js").Camera} camera
-     * @param {DrawOptions} options
+     * @param {import("../terrain/camera.js").Camera} camera @param {DrawOptions} options
      * @param {number} [from] the first block
      * @param {number} [many] of them; all of a picture, in slices or at once, are drawn in order
      */
-    draw(camera, { end, low, overlay, split = 0 }, from = 0, many = far.length + close.length) {
+    draw(camera, { end, low, overlay }, from = 0, many = far.length + close.length) {
       if (!frame) return;
       use();
-      setConstants(gl, uniforms, manifest);
-      setSurface(gl, uniforms, heights, camera);
-      setView(gl, uniforms, camera, frame, manifest.tile_side);
+      setView(gl, uniforms, heights, manifest.tile_side, camera, frame);
       if (heights.kind === "sphere") {
-        setHorizon(gl, uniforms, heights, camera.eye);
-        setSphere(gl, uniforms, heights, manifest.tile_side, frame.eye.map((v, k) => v - camera.eye[k]));
         gl.uniform1f(uniforms.begin, 0.5 * (Math.max(Math.hypot(...camera.eye) - heights.radius, 0) + end));
       }
       gl.uniform1f(uniforms.end, end);
@@ -157,19 +149,11 @@ export function createSplats(gl, manifest, heights) {
       bind(PLACES, places);
       bind(OWNERS, owners);
       if (relief) bind(RELIEF, relief);
-      const edge = Math.round(split * camera.width);
-      for (const [left, right, shown] of edge ? [[0, edge, 0], [edge, camera.width, overlay]] : [[0, 0, overlay]]) {
-        gl.uniform1i(uniforms.overlay, shown);
-        if (edge) {
-          gl.enable(gl.SCISSOR_TEST);
-          gl.scissor(left, 0, right - left, camera.height);
-        }
-        bind(ENTRIES, entries);
-        far.draw(from, many);
-        bind(ENTRIES, nearEntries);
-        close.draw(from - far.length, many);
-      }
-      if (edge) gl.disable(gl.SCISSOR_TEST);
+      gl.uniform1i(uniforms.overlay, overlay);
+      bind(ENTRIES, entries);
+      far.draw(from, many);
+      bind(ENTRIES, nearEntries);
+      close.draw(from - far.length, many);
       gl.activeTexture(gl.TEXTURE0);
       gl.bindVertexArray(null);
     },
@@ -181,8 +165,12 @@ export function createSplats(gl, manifest, heights) {
   };
 }
 
-/** @param {GL} gl @param {Uniforms} uniforms @param {Manifest} manifest */
-function setConstants(gl, uniforms, manifest) {
+/**
+ * What is the same in all pictures.
+ *
+ * @param {GL} gl @param {Uniforms} uniforms @param {Manifest} manifest @param {HeightField} heights
+ */
+function setConstants(gl, uniforms, manifest, heights) {
   const { origin, step, log_scale: logScale } = manifest.encoding;
   gl.uniform3fv(uniforms.origin, origin);
   gl.uniform3fv(uniforms.stride, step);
@@ -198,39 +186,30 @@ function setConstants(gl, uniforms, manifest) {
   gl.uniform3fv(uniforms.zenith, manifest.sky.zenith);
   gl.uniform3fv(uniforms.horizon, manifest.sky.horizon);
   gl.uniform3fv(uniforms.ground, manifest.ground_colour);
-}
-
-/**
- * @param {GL} gl
- * @param {Uniforms} uniforms
- * @param {HeightField} heights
- * @param {import("../terrain/camera.js").Camera} camera
- */
-function setSurface(gl, uniforms, heights, { eye: [x, y] }) {
-  if (heights.kind === "flat" || heights.kind === "sphere") return;
-  if (heights.kind === "hills") {
+  if (heights.kind === "sphere") {
+    const rate = rateOf(heights, manifest.tile_side);
+    gl.uniform1f(uniforms.radius, heights.radius);
+    gl.uniform1f(uniforms.rate, rate);
+    gl.uniform1f(uniforms.stretch, heights.radius * rate);
+  } else if (heights.kind === "hills") {
     gl.uniform1i(uniforms.octaves, heights.amplitudes.length);
     gl.uniform1ui(uniforms.salt, heights.salt);
     gl.uniform1fv(uniforms["amplitude[0]"], padded(heights.amplitudes, MAX_OCTAVES));
     gl.uniform1fv(uniforms["scale[0]"], padded(heights.scales, MAX_OCTAVES));
-  } else {
+  } else if (heights.kind === "image") {
     gl.uniform1i(uniforms.relief, RELIEF);
     gl.uniform1i(uniforms.mirrored, Number(heights.mirrored));
     gl.uniform1fv(uniforms["scale[0]"], [heights.perUnit]);
   }
-  const { cells, places } = heights.under(x, y);
-  gl.uniform2iv(uniforms["cellUnder[0]"], cells);
-  gl.uniform2fv(uniforms["placeUnder[0]"], places);
 }
 
 /**
- * @param {GL} gl
- * @param {Uniforms} uniforms
- * @param {import("../terrain/camera.js").Camera} camera
- * @param {FrameAnswer} frame
- * @param {number} side
+ * What depends on the view.
+ *
+ * @param {GL} gl @param {Uniforms} uniforms @param {HeightField} heights @param {number} side
+ * @param {import("../terrain/camera.js").Camera} camera @param {FrameAnswer} frame
  */
-function setView(gl, uniforms, camera, { i0, j0, switches, bands, marks }, side) {
+function setView(gl, uniforms, heights, side, camera, { i0, j0, eye, switches, bands, marks }) {
   const [x, y, z] = camera.eye;
   setAxes(gl, uniforms, camera);
   gl.uniform3f(uniforms.corner, i0 * side - x, j0 * side - y, -z);
@@ -239,15 +218,14 @@ function setView(gl, uniforms, camera, { i0, j0, switches, bands, marks }, side)
   gl.uniform1fv(uniforms["switches[0]"], padded(switches.slice(0, -1), MAX_LEVELS));
   gl.uniform1fv(uniforms["bands[0]"], padded(bands, MAX_LEVELS));
   gl.uniform1uiv(uniforms["marks[0]"], marks);
-}
-
-/** @param {GL} gl @param {Uniforms} uniforms @param {import("../terrain/sphere.js").Sphere} sphere @param {number} side @param {number[]} moved */
-function setSphere(gl, uniforms, sphere, side, moved) {
-  const rate = rateOf(sphere, side);
-  gl.uniform3fv(uniforms.moved, moved);
-  gl.uniform1f(uniforms.radius, sphere.radius);
-  gl.uniform1f(uniforms.rate, rate);
-  gl.uniform1f(uniforms.stretch, sphere.radius * rate);
+  if (heights.kind === "sphere") {
+    setHorizon(gl, uniforms, heights, camera.eye);
+    gl.uniform3fv(uniforms.moved, eye.map((v, k) => v - camera.eye[k]));
+  } else if (heights.kind !== "flat") {
+    const { cells, places } = heights.under(x, y);
+    gl.uniform2iv(uniforms["cellUnder[0]"], cells);
+    gl.uniform2fv(uniforms["placeUnder[0]"], places);
+  }
 }
 
 /** @param {number[]} list @param {number} length */
@@ -263,8 +241,7 @@ function createRelief(gl, { pixels, columns, rows }) {
 /**
  * Consecutive pages of a texture row are uploaded together.
  *
- * @param {GL} gl
- * @param {FrameAnswer["uploads"]} uploads
+ * @param {GL} gl @param {FrameAnswer["uploads"]} uploads
  */
 function uploadPages(gl, { numbers, data }) {
   for (let k = 0; k < numbers.length;) {
@@ -317,8 +294,7 @@ function createBlocks(gl) {
 /**
  * Blocks of pages 0, 1, ... of the near block's order; its entries name their cells themselves.
  *
- * @param {number} pages
- * @param {number} count
+ * @param {number} pages @param {number} count
  */
 function nearBlocks(pages, count) {
   const words = new Uint32Array(BLOCK * pages);

@@ -1,20 +1,32 @@
-// An open terrain: its manifest and surface, the worker that chooses what is drawn, and the reading of its chunks. What
-// the page and the importable terrain (terrain_api.js) have in common.
+// An open terrain: its manifest and surface, the worker that chooses what is drawn, and the reading of its chunks. The
+// page and the importable terrain (terrain_api.js) have this in common.
 
 import { initialChunks, readChunks, readHeightMap, readManifest, readPictures } from "../data/bundle.js";
 import { chunkKey, listChunks } from "../data/layout.js";
+import { REACH } from "../terrain/cells.js";
 import { createHeights } from "../terrain/heights.js";
-import { createWorkerClient } from "../worker/worker_client.js";
+import { findEnd, findReach } from "../terrain/sphere_cells.js";
 
 const MOST_PENDING = 12; // chunks on their way while a view waits for more: it may have changed before they arrive
 const TURN = 4; // milliseconds until what is pending is looked at again
+const WIDER = 1.25; // times the picture's size, so that a turn finds tiles before the worker has answered
+const MIN_LOW = 1e-4; // sine of the angle below the horizon at which tiles end, at least
 
 /**
+ * @typedef {import("../worker/frame_builder.js").FrameAnswer} FrameAnswer
+ *
+ * i, j: the cell; tile: the one in it, of the first material that shows; level to last: the levels of detail that are
+ * drawn; order: index of the direction of its pre-sorted order, NO_ORDER where it is sorted by depth.
+ * @typedef {{ i: number, j: number, tile: number, level: number, last: number, order: number }} DrawnCell
+ *
  * What is read before anything is drawn.
  * @typedef {{ source: import("../data/source.js").Source, manifest: import("../data/manifest.js").Manifest,
  *   pixels: Float32Array | null, pictures: import("../terrain/classes.js").Pictures }} TerrainFiles
  *
- * @typedef {Omit<import("../worker/worker_client.js").Handlers, "onRefused">} Handlers
+ * @typedef {{ onRecords: (records: import("../worker/worker.js").Records) => void,
+ *   onFrame: (frame: FrameAnswer) => void, onError: (error: Error) => void }} Handlers
+ * @typedef {Handlers & { onRefused: (chunk: import("../worker/worker.js").Refused) => void }} ClientHandlers
+ * @typedef {ReturnType<typeof createWorkerClient>} WorkerClient
  * @typedef {ReturnType<typeof openTerrain>} OpenTerrain
  */
 
@@ -29,15 +41,10 @@ export async function readTerrain(source) {
   return { source, manifest, pixels, pictures: await readPictures(manifest, source) };
 }
 
-/**
- * Start the worker of a terrain.
- *
- * @param {TerrainFiles} files
- * @param {Handlers} handlers
- */
+/** Start the worker of a terrain. @param {TerrainFiles} files @param {Handlers} handlers */
 export function openTerrain({ source, manifest, pixels, pictures }, { onRecords, onFrame, onError }) {
   let begun = false; // the first chunks were read
-  /** @type {import("../worker/frame_builder.js").FrameAnswer | null} */
+  /** @type {FrameAnswer | null} */
   let last = null;
   /** @type {unknown} */
   let failure = null; // of reading a chunk that a view needs
@@ -105,19 +112,15 @@ export function openTerrain({ source, manifest, pixels, pictures }, { onRecords,
      * Ask the worker for the exact frame of a camera until no chunk of it is missing; while the first chunks are read,
      * once. Throws what the reading throws.
      *
-     * @param {import("../terrain/camera.js").Camera} camera
-     * @param {number} budget
-     * @param {() => void} [check] throws to give up
+     * @param {import("../terrain/camera.js").Camera} camera @param {number} budget
      */
-    async askForAll(camera, budget, check = () => {}) {
+    async askForAll(camera, budget) {
       do {
         client.ask(camera, budget, true);
         await client.answered();
-        check();
         while (begun && last?.missing.length && pending.size && !stop.signal.aborted) {
           if (failure) throw failure;
           await new Promise((done) => setTimeout(done, TURN));
-          check();
         }
       } while (begun && last?.missing.length && !stop.signal.aborted);
     },
@@ -129,5 +132,106 @@ export function openTerrain({ source, manifest, pixels, pictures }, { onRecords,
   };
 }
 
+/**
+ * The page's end of the worker: views go out, frames come back; the page draws the last frame and never waits.
+ *
+ * @param {Omit<import("../worker/worker.js").Begin, "kind">} bundle @param {ClientHandlers} handlers
+ */
+function createWorkerClient(bundle, { onRecords, onRefused, onFrame, onError }) {
+  const worker = new Worker(new URL("../worker/worker.js", import.meta.url), { type: "module" });
+  let id = 0, answered = 0, busy = false, ended = false;
+  /** @type {{ id: number, resolve: () => void, reject: (error: Error) => void }[]} */
+  let waiting = [];
+  /** @param {import("../worker/worker.js").Request} request @param {Transferable[]} [moved] */
+  const post = (request, moved = []) => worker.postMessage(request, moved);
+  /** @param {Error} error */
+  const fail = (error) => {
+    for (const { reject } of waiting.splice(0)) reject(error);
+    onError(error);
+  };
+  /** @param {FrameAnswer} frame */
+  const takeFrame = (frame) => {
+    answered = frame.id;
+    busy = answered < id;
+    onFrame(frame);
+    const due = waiting.filter((one) => one.id <= answered);
+    waiting = waiting.filter((one) => one.id > answered);
+    for (const { resolve } of due) resolve();
+  };
+  worker.addEventListener("message", (event) => {
+    if (ended) return;
+    const reply = /** @type {import("../worker/worker.js").Reply} */ (event.data);
+    if (reply.kind === "failed") fail(Object.assign(new Error(reply.message), { name: reply.name }));
+    else if (reply.kind === "frame") takeFrame(reply.frame);
+    else if (reply.kind === "records") onRecords(reply);
+    else onRefused(reply);
+  });
+  worker.addEventListener("error", (event) => {
+    event.preventDefault();
+    fail(new Error(event.message || "the worker did not start"));
+  });
+  post({ kind: "begin", ...bundle });
+  return {
+    /** Is no answer outstanding? */
+    get idle() {
+      return !busy;
+    },
+    /** @param {import("../data/bundle.js").Chunk} chunk */
+    add: (chunk) => post({ kind: "chunk", chunk }, [chunk.buffer]),
+    /** Post all records again: the GPU has lost them. */
+    restore: () => post({ kind: "restore" }),
+    /** Paint points: I, J and material of each. @param {Int32Array} points */
+    paint: (points) => post({ kind: "paint", points }),
+    /** @param {import("../worker/worker.js").Changes} changes */
+    adjust: (changes) => post({ kind: "adjust", changes }),
+    /**
+     * Ask for the frame of a camera.
+     *
+     * @param {import("../terrain/camera.js").Camera} camera @param {number} budget
+     * @param {boolean} patient exactly this view, with every batch made; else a wider one, soon
+     */
+    ask(camera, budget, patient) {
+      const wider = patient ? camera : { ...camera, width: camera.width * WIDER, height: camera.height * WIDER };
+      busy = true;
+      post({ kind: "view", id: ++id, camera: wider, budget, patient });
+    },
+    /** Resolves when the last view so far is answered. @returns {Promise<void>} */
+    answered: () => (answered >= id
+      ? Promise.resolve()
+      : new Promise((resolve, reject) => waiting.push({ id, resolve, reject }))),
+    /** Stop the worker; whoever waits goes on. */
+    end() {
+      ended = true;
+      for (const { resolve } of waiting.splice(0)) resolve();
+      worker.terminate();
+    },
+  };
+}
+
 /** @param {number[]} values */
 const mean = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
+
+/**
+ * Where the tiles of a picture end and its backdrop begins: `end` and `low` of the options that renderers take.
+ *
+ * @param {{ manifest: import("../data/manifest.js").Manifest, heights: import("../terrain/heights.js").HeightField }} terrain
+ * @param {FrameAnswer | null} frame the last one
+ * @param {import("../terrain/camera.js").Camera} camera
+ */
+export function backdropOptions({ manifest, heights }, frame, camera) {
+  const farthest = REACH * manifest.tile_side;
+  if (heights.kind === "sphere") {
+    return findEnd(heights, camera.eye, frame?.reach ?? findReach({ side: manifest.tile_side }, heights, camera.eye));
+  }
+  return { end: frame?.reach ?? farthest, low: Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest) };
+}
+
+/** The cells of a frame, back to front. @param {FrameAnswer} frame @returns {DrawnCell[]} */
+export function listDrawnCells({ drawn, i0, j0 }) {
+  const cells = [];
+  for (let k = 0; k < drawn.length; k += 6) {
+    const [di, dj, tile, level, last, order] = drawn.subarray(k, k + 6);
+    cells.push({ i: i0 + di, j: j0 + dj, tile, level, last, order });
+  }
+  return cells;
+}

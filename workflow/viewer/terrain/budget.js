@@ -31,9 +31,7 @@ const NEVER = -1; // switch distance of a level that is not used
 /**
  * The cells and levels to draw from a camera, with at most `budget` Gaussians where the coarsest levels allow it.
  *
- * @param {TerrainTables} terrain
- * @param {Camera} camera
- * @param {number} budget
+ * @param {TerrainTables} terrain @param {Camera} camera @param {number} budget
  * @returns {Selection}
  */
 export function selectCells(terrain, camera, budget) {
@@ -64,9 +62,7 @@ export function selectCells(terrain, camera, budget) {
 /**
  * The largest factor between two that passes a test; the smallest factor counts as passing.
  *
- * @param {number} smallest
- * @param {number} largest
- * @param {(factor: number) => boolean} passes
+ * @param {number} smallest @param {number} largest @param {(factor: number) => boolean} passes
  */
 function largestFactor(smallest, largest, passes) {
   if (smallest >= largest || passes(largest)) return largest;
@@ -99,8 +95,7 @@ function distancesAt({ switches, bands }, above, [least, reach], shrink) {
 /**
  * The factor under which only the coarsest level is drawn.
  *
- * @param {TerrainTables} terrain
- * @param {number} above
+ * @param {TerrainTables} terrain @param {number} above
  */
 function leastShrink({ switches, bands }, above) {
   const farthest = switches.slice(0, -1).map((distance, l) => distance + bands[l]);
@@ -110,8 +105,7 @@ function leastShrink({ switches, bands }, above) {
 /**
  * Height of the eye over the ground; at least the near plane's distance.
  *
- * @param {TerrainTables} terrain
- * @param {Camera} camera
+ * @param {TerrainTables} terrain @param {Camera} camera
  */
 function eyeHeight({ heights, near, sphere }, { eye: [x, y, z] }) {
   if (sphere) return Math.max(near, Math.hypot(x, y, z) - sphere.radius);
@@ -175,9 +169,7 @@ function fitsRoom(terrain, cells, distances) {
 /**
  * Set a cell's levels and their count. Returns: is there anything to draw?
  *
- * @param {TerrainTables} terrain
- * @param {Cell} cell
- * @param {Distances} distances
+ * @param {TerrainTables} terrain @param {Cell} cell @param {Distances} distances
  */
 function chooseLevels(terrain, cell, { switches, bands, reach }) {
   if (cell.nearest >= reach) return false;
@@ -195,8 +187,7 @@ function chooseLevels(terrain, cell, { switches, bands, reach }) {
  * @param {TerrainTables} terrain
  * @param {{ nearest: number, farthest: number, lo: number, hi: number, whole: boolean, missing: number }} span
  * @param {number} arrived bits of levels
- * @param {number[]} switches
- * @param {number[]} bands
+ * @param {number[]} switches @param {number[]} bands
  */
 export function pickLevels({ levels }, span, arrived, switches, bands) {
   let lo = 0, hi = 0;
@@ -238,8 +229,7 @@ function missingChunks(terrain, cells) {
 /**
  * Add the keys of missing levels of a tile or an object.
  *
- * @param {Set<number>} chunks
- * @param {number} tile
+ * @param {Set<number>} chunks @param {number} tile
  * @param {number} missing bits of levels
  */
 export function addMissing(chunks, tile, missing) {
@@ -249,9 +239,7 @@ export function addMissing(chunks, tile, missing) {
 /**
  * Where even the coarsest levels exceed the budget: the cells nearest to the eye, at least one, and their reach.
  *
- * @param {Cell[]} cells
- * @param {number} budget
- * @param {number} reach
+ * @param {Cell[]} cells @param {number} budget @param {number} reach
  */
 function nearestCells(cells, budget, reach) {
   let count = cells.reduce((sum, cell) => sum + cell.count, 0);

@@ -1,25 +1,23 @@
 // Cells of the tile grid: which tile lies in each, and where the surface is, cached while cells stay in view.
 
-import { RING } from "./cell_ring.js";
+import { RING } from "./caches.js";
 import { tileAt } from "./choice.js";
 import { frameAt, locate } from "./sphere.js";
 import { columnOf, tileOn } from "./sphere_edges.js";
-import { createThing } from "./things.js";
+import { createThing } from "./scatter.js";
 
 /** @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables */
 
 export const REACH = 48; // tile sides to the last tiles: 97 x 97 cells
 const PARTS = 8; // heights within a cell are sampled at (PARTS + 1)^2 points
-/** @type {import("./things.js").Thing[]} */
+/** @type {import("./scatter.js").Thing[]} */
 const NONE = [];
 
 /**
  * The tile under a point of the ground; on a sphere x and y are longitude and latitude, i is a column of all faces.
  *
  * @param {import("../data/manifest.js").Manifest} manifest
- * @param {import("./heights.js").HeightField} heights
- * @param {number} x
- * @param {number} y
+ * @param {import("./heights.js").HeightField} heights @param {number} x @param {number} y
  */
 export function tileUnder({ tile_side: side, salt, tiles, materials }, heights, x, y) {
   const variants = tiles.length / (16 * materials.length);
@@ -50,7 +48,7 @@ export function createCellCache(levels) {
     i: doubles().fill(NaN), j: doubles(), tile: new Uint16Array(n), h: doubles(), east: doubles(), north: doubles(),
     low: doubles(), high: doubles(), borders: 0,
     tiles: /** @type {number[][]} */ (new Array(n)), counts: new Int32Array(n * levels),
-    things: /** @type {import("./things.js").Thing[][]} */ (new Array(n)),
+    things: /** @type {import("./scatter.js").Thing[][]} */ (new Array(n)),
     border: /** @type {(Border | null)[]} */ (new Array(n)),
   };
 }
@@ -58,9 +56,7 @@ export function createCellCache(levels) {
 /**
  * Index of a cell in the cache; tiles, objects and surface are computed when it enters.
  *
- * @param {TerrainTables} terrain
- * @param {number} i
- * @param {number} j
+ * @param {TerrainTables} terrain @param {number} i @param {number} j
  */
 export function lookUpCell(terrain, i, j) {
   const { cache, side, heights } = terrain, at = (j & (RING - 1)) * RING + (i & (RING - 1));
@@ -82,8 +78,7 @@ export function lookUpCell(terrain, i, j) {
  *
  * @param {TerrainTables} terrain
  * @param {number} at index in the cache
- * @param {number} i
- * @param {number} j
+ * @param {number} i @param {number} j
  */
 function coverCell({ cache, salt, variants, each, tiles, classes, scatter, levels }, at, i, j) {
   const first = tileAt(i, j, salt, variants), bits = classes ? classes.materialsIn(i, j) : 1;
@@ -115,8 +110,7 @@ function coverCell({ cache, salt, variants, each, tiles, classes, scatter, level
 /**
  * Cover cells again when they are next in view: their objects have changed, or their classes (`stale`) too.
  *
- * @param {CellCache} cache
- * @param {boolean} stale
+ * @param {CellCache} cache @param {boolean} stale
  * @param {[number, number] | null} [cell] null: all cells
  */
 export function forgetCells(cache, stale, cell = null) {

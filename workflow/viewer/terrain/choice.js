@@ -1,15 +1,12 @@
 // Tile choice: the Wang tile of every cell, by an integer hash of its edges.
 // The same integers as dav_gswt/terrain/choice.py; tests/golden/tile_choice.json holds both to it.
 
-export const WEST = 0, SOUTH = 1, CENTRE = 2; // axis of a hash: west edge, south edge, centre variant
+const WEST = 0, SOUTH = 1, CENTRE = 2; // axis of a hash: west edge, south edge, centre variant
 
 /**
  * 32 well mixed bits for cell (i, j). All arithmetic is modulo 2^32, negative coordinates in two's complement.
  *
- * @param {number} i
- * @param {number} j
- * @param {number} axis
- * @param {number} salt
+ * @param {number} i @param {number} j @param {number} axis @param {number} salt
  */
 export function hashCell(i, j, axis, salt) {
   const h = mix(Math.imul(i, 0x8da6b343) ^ Math.imul(axis, 0xcb1ab31f) ^ salt);
@@ -29,9 +26,7 @@ function mix(h) {
  * The centre c is that of the hash. Where i + j is odd it is the next one that makes the tile differ from all of its
  * neighbours, which are even, so equal tiles are never adjacent.
  *
- * @param {number} i
- * @param {number} j
- * @param {number} salt
+ * @param {number} i @param {number} j @param {number} salt
  * @param {number} variants number of centres
  * @param {number} [period] (i + period, j + period) is the same cell as (i, j); 0: none
  */
@@ -66,10 +61,7 @@ function centreOf(i, j, salt, variants, period) {
 /**
  * The hash of the cell with 0 <= j < period that is the same as (i, j).
  *
- * @param {number} i
- * @param {number} j
- * @param {number} axis
- * @param {number} salt
+ * @param {number} i @param {number} j @param {number} axis @param {number} salt
  * @param {number} period
  */
 function hashFirst(i, j, axis, salt, period) {

@@ -18,9 +18,7 @@ export const squareOf = (u) => Math.min(Math.max(Math.floor(u * LATTICE), 0), LA
 /**
  * Materials that may have a Gaussian in a cell: those that come within `slack` of all others in a square.
  *
- * @param {Lattice} lattice
- * @param {number} materials
- * @param {number} slack
+ * @param {Lattice} lattice @param {number} materials @param {number} slack
  */
 export function findMaterials(lattice, materials, slack) {
   let bits = 0;
@@ -39,8 +37,7 @@ export function findMaterials(lattice, materials, slack) {
 /**
  * Shares of the squares of a cell's lattice by the material with the highest score in the middle, of equals the first.
  *
- * @param {Lattice} lattice
- * @param {number} materials
+ * @param {Lattice} lattice @param {number} materials
  */
 export function measureShares(lattice, materials) {
   const shares = new Float64Array(materials), square = 1 / (LATTICE * LATTICE), above = POINTS * materials;
@@ -60,11 +57,9 @@ export function measureShares(lattice, materials) {
 /**
  * What happens to a material's Gaussians in each square of a cell's lattice, and from LOW on to those without a bonus.
  *
- * @param {Lattice} lattice
- * @param {number} materials
+ * @param {Lattice} lattice @param {number} materials
  * @param {number} m the material
- * @param {number} wave
- * @param {number} most
+ * @param {number} wave @param {number} most
  */
 export function decideSquares(lattice, materials, m, wave, most) {
   const states = new Uint8Array(2 * LOW);
@@ -87,10 +82,7 @@ export function decideSquares(lattice, materials, m, wave, most) {
 /**
  * Largest lead of material m over o in a square: a difference of scores is bilinear there, so it is at a corner.
  *
- * @param {Lattice} lattice
- * @param {number} materials
- * @param {number} square
- * @param {number} m
+ * @param {Lattice} lattice @param {number} materials @param {number} square @param {number} m
  * @param {number} o
  */
 function mostLead(lattice, materials, square, m, o) {

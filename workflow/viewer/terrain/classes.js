@@ -1,12 +1,12 @@
 // Classes of the terrain: which material lies at a place, and which Gaussians stay where materials meet.
 // The same numbers as dav_gswt/terrain/classes.py, where the idea is; tests/golden/classes.json holds both to it.
 
-import { createCellRing } from "./cell_ring.js";
+import { createCellRing } from "./caches.js";
 import {
   decideSquares, findMaterials, GOES, LATTICE, LOW, measureShares, POINTS, squareOf, SURE, UNDECIDED,
 } from "./class_squares.js";
-import { createNoise, wrapIndex } from "./heights.js";
-import { createJitter, MAX_OCTAVES, octaveGains, SHIFT } from "./jitter.js";
+import { createNoise, SHIFT, wrapIndex } from "./heights.js";
+import { createJitter, MAX_OCTAVES, octaveGains } from "./jitter.js";
 import { applyPaint, createPainted } from "./painted.js";
 
 /**
@@ -39,11 +39,9 @@ const PAINT = 1.25; // lead of what is painted over all others, as a multiple of
 /**
  * The class function of a terrain.
  *
- * @param {ClassesEntry} entry
- * @param {number} materials
+ * @param {ClassesEntry} entry @param {number} materials
  * @param {number} side of a tile
- * @param {HeightField} heights
- * @param {Pictures} [pictures]
+ * @param {HeightField} heights @param {Pictures} [pictures]
  */
 export function createClasses(entry, materials, side, heights, pictures = new Map()) {
   const { jitter, rise } = entry, wave = 2 * jitter.amplitude, here = new Float64Array(materials);
@@ -52,7 +50,7 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
   const rule = entry.rule.map((term) => (term.kind === "noise" ? { ...term, biases: [...term.biases] } : term));
   const addTerms = rule.map((term) => createTerm(term, { materials, side, heights, pictures, salt: entry.salt }));
   const jitterAt = createJitter(entry, materials), waves = new Float64Array(materials);
-  const corners = Array.from({ length: 4 }, () => new Float64Array(materials));
+  const spare = new Float64Array(POINTS * POINTS * materials); // corners of one square
   /** @type {WeakMap<Float32Array, { material: number, squares: Uint8Array }>} */
   const squaresOf = new WeakMap(); // by the centres of a chunk
   let kept = new Uint32Array(0);
@@ -64,10 +62,7 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
   /**
    * Scores of all materials at a point of the lattice, `at` an index in `out`.
    *
-   * @param {number} i
-   * @param {number} j
-   * @param {Float64Array} out
-   * @param {number} at
+   * @param {number} i @param {number} j @param {Float64Array} out @param {number} at
    */
   function latticeScores(i, j, out, at) {
     out.fill(0, at, at + materials);
@@ -89,27 +84,24 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
    * Scores of all materials at a place of a cell, in tile sides from its corner; without jitter. The next call
    * overwrites them.
    *
-   * @param {number} i
-   * @param {number} j
-   * @param {number} u
-   * @param {number} v
+   * @param {number} i @param {number} j @param {number} u @param {number} v
    */
   function scoresAt(i, j, u, v) {
     const a = squareOf(u), b = squareOf(v), { lattice } = cells.get(i, j);
-    if (lattice) return interpolate(lattice, a, b, u * LATTICE - a, v * LATTICE - b);
-    for (let k = 0; k < 4; k++) latticeScores(i * LATTICE + a + (k & 1), j * LATTICE + b + (k >> 1), corners[k], 0);
-    const s = u * LATTICE - a, t = v * LATTICE - b;
-    const [sw, se, nw, ne] = corners;
-    for (let m = 0; m < materials; m++) here[m] = between(sw[m], se[m], nw[m], ne[m], s, t);
-    return here;
+    for (let k = 0; k < (lattice ? 0 : 4); k++) {
+      const x = a + (k & 1), y = b + (k >> 1);
+      latticeScores(i * LATTICE + x, j * LATTICE + y, spare, (y * POINTS + x) * materials);
+    }
+    return interpolate(lattice ?? spare, a, b, u * LATTICE - a, v * LATTICE - b);
   }
 
   /** @param {Lattice} lattice @param {number} a @param {number} b @param {number} s @param {number} t */
   function interpolate(lattice, a, b, s, t) {
     const south = (b * POINTS + a) * materials, north = south + POINTS * materials;
     for (let m = 0; m < materials; m++) {
-      here[m] = between(lattice[south + m], lattice[south + materials + m], lattice[north + m],
-        lattice[north + materials + m], s, t);
+      const sw = lattice[south + m], nw = lattice[north + m];
+      const low = sw + s * (lattice[south + materials + m] - sw), high = nw + s * (lattice[north + materials + m] - nw);
+      here[m] = low + t * (high - low);
     }
     return here;
   }
@@ -120,8 +112,7 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
   /**
    * The square of the lattice under each Gaussian of a chunk, and LOW where it has no bonus: the same in all cells.
    *
-   * @param {Float32Array} centres
-   * @param {number} material
+   * @param {Float32Array} centres @param {number} material
    */
   function squaresUnder(centres, material) {
     const known = squaresOf.get(centres);
@@ -157,15 +148,13 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
     /**
      * Which materials may have a Gaussian in a cell: bit m for material m.
      *
-     * @param {number} i
-     * @param {number} j
+     * @param {number} i @param {number} j
      */
     materialsIn: (i, j) => cells.get(i, j).bits,
     /**
      * Shares of a cell by material, without jitter: of the squares of its lattice, by the score in their middle.
      *
-     * @param {number} i
-     * @param {number} j
+     * @param {number} i @param {number} j
      */
     sharesIn(i, j) {
       const { bits, lattice } = cells.get(i, j);
@@ -175,9 +164,7 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
     /**
      * Indices of the Gaussians of a material's tile that stay in cell (i, j).
      *
-     * @param {number} i
-     * @param {number} j
-     * @param {{ centres: Float32Array, count: number }} chunk
+     * @param {number} i @param {number} j @param {{ centres: Float32Array, count: number }} chunk
      * @param {number} material
      */
     keep(i, j, { centres, count }, material) {
@@ -213,9 +200,7 @@ const paintLead = ({ jitter, rise }) => PAINT * (2 * jitter.amplitude + rise.mos
 /**
  * By how much a material's score exceeds the highest of the others, without jitter.
  *
- * @param {Float64Array} scores
- * @param {number} material
- * @param {number} bonus
+ * @param {Float64Array} scores @param {number} material @param {number} bonus
  */
 function leadOf(scores, material, bonus) {
   let most = -Infinity;
@@ -226,30 +211,13 @@ function leadOf(scores, material, bonus) {
 /**
  * Is a material's score the highest, with jitter?
  *
- * @param {Float64Array} scores
- * @param {Float64Array} moved
- * @param {number} material
+ * @param {Float64Array} scores @param {Float64Array} moved @param {number} material
  * @param {number} bonus
  */
 function isHighest(scores, moved, material, bonus) {
   const own = scores[material] + moved[material] + bonus;
   for (let m = 0; m < scores.length; m++) if (m !== material && !(own >= scores[m] + moved[m])) return false;
   return true;
-}
-
-/**
- * Bilinear between the south-western, south-eastern, north-western and north-eastern corner of a square.
- *
- * @param {number} sw
- * @param {number} se
- * @param {number} nw
- * @param {number} ne
- * @param {number} s
- * @param {number} t
- */
-function between(sw, se, nw, ne, s, t) {
-  const south = sw + s * (se - sw), north = nw + s * (ne - nw);
-  return south + t * (north - south);
 }
 
 /**
@@ -288,10 +256,7 @@ function createTerm(term, { materials, side, heights, pictures, salt }) {
 /**
  * Gradient noise of a material at lattice points, in [-1, 1].
  *
- * @param {number} wavelength
- * @param {number} octaves
- * @param {number} material
- * @param {number} salt
+ * @param {number} wavelength @param {number} octaves @param {number} material @param {number} salt
  */
 function createClassNoise(wavelength, octaves, material, salt) {
   const step = 1 / (wavelength * LATTICE), { gains, total } = octaveGains(octaves);
@@ -312,10 +277,7 @@ function createClassNoise(wavelength, octaves, material, salt) {
 /**
  * Share of each value among the four pixels around a place, by the distances to their centres.
  *
- * @param {PictureTerm} term
- * @param {Uint8Array} pixels
- * @param {number} x
- * @param {number} y
+ * @param {PictureTerm} term @param {Uint8Array} pixels @param {number} x @param {number} y
  * @param {Float64Array} shares
  */
 function pictureShares({ rows, columns, width, beyond }, pixels, x, y, shares) {

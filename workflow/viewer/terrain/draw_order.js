@@ -1,5 +1,7 @@
-// Draw order of cells and tiles: back to front, with little or no sorting.
+// Draw order of cells and tiles: back to front, with little or no sorting; and a sort of Gaussians by depth.
 // The same as dav_gswt/terrain/draw_order.py; tests/golden/draw_order.json holds both to it.
+
+const BITS = 11, DIGITS = 1 << BITS; // of the radix sort
 
 /**
  * Call `visit(di, dj)` for the cells of a window of `most` cells to every side of the eye's, back to front.
@@ -7,8 +9,7 @@
  * A ray from the eye crosses cell edges only away from it, in i and in j: a cell with more steps |di| + |dj| never
  * hides one with fewer, and cells of equal steps never hide each other. Equal steps are visited by j, then by i.
  *
- * @param {number} most
- * @param {(di: number, dj: number) => void} visit
+ * @param {number} most @param {(di: number, dj: number) => void} visit
  */
 export function visitBackToFront(most, visit) {
   for (let steps = 2 * most; steps >= 0; steps--) {
@@ -25,8 +26,7 @@ export function visitBackToFront(most, visit) {
 /**
  * Is a cell in the 3 x 3 block about the eye's cell, which is drawn last and sorted by depth?
  *
- * @param {number} di
- * @param {number} dj
+ * @param {number} di @param {number} dj
  */
 export const inNearBlock = (di, dj) => Math.abs(di) <= 1 && Math.abs(dj) <= 1;
 
@@ -37,8 +37,7 @@ export const inNearBlock = (di, dj) => Math.abs(di) <= 1 && Math.abs(dj) <= 1;
  * @param {number[][]} directions
  * @param {number[]} orders indices into directions, those that the tile keeps
  * @param {number[]} to from the eye to the tile's centre
- * @param {number} east
- * @param {number} north
+ * @param {number} east @param {number} north
  */
 export function nearestOrder(directions, orders, to, east, north) {
   const x = to[0] + east * to[2], y = to[1] + north * to[2], z = to[2];
@@ -51,4 +50,46 @@ export function nearestOrder(directions, orders, to, east, north) {
     }
   }
   return best;
+}
+
+/**
+ * A stable radix sort of float bits, with buffers of its own: `sort(depths, n)` gives the indices of the first n depths
+ * from back to front. The next call overwrites the result.
+ *
+ * @typedef {(depths: Float32Array, n: number) => Uint32Array} DepthSorter
+ * @returns {DepthSorter}
+ */
+export function createDepthSorter() {
+  let keys = new Uint32Array(0), indices = [keys, keys];
+  const counts = new Uint32Array(3 * DIGITS);
+  return function sort(depths, n) {
+    if (keys.length < n) {
+      keys = new Uint32Array(2 * n);
+      indices = [new Uint32Array(2 * n), new Uint32Array(2 * n)];
+    }
+    const bits = new Uint32Array(depths.buffer, depths.byteOffset, n);
+    counts.fill(0);
+    for (let k = 0; k < n; k++) {
+      const b = bits[k];
+      const key = b >>> 31 ? b : ~b & 0x7fffffff; // float bits as integers that rise as depths fall
+      keys[k] = key;
+      counts[key & (DIGITS - 1)]++;
+      counts[DIGITS + ((key >>> BITS) & (DIGITS - 1))]++;
+      counts[2 * DIGITS + (key >>> (2 * BITS))]++;
+    }
+    for (let pass = 0; pass < 3; pass++) {
+      for (let digit = 0, sum = 0; digit < DIGITS; digit++) {
+        const at = pass * DIGITS + digit, here = counts[at];
+        counts[at] = sum;
+        sum += here;
+      }
+    }
+    let [from, to] = indices;
+    for (let k = 0; k < n; k++) to[counts[keys[k] & (DIGITS - 1)]++] = k;
+    [from, to] = [to, from];
+    for (let k = 0; k < n; k++) to[counts[DIGITS + ((keys[from[k]] >>> BITS) & (DIGITS - 1))]++] = from[k];
+    [from, to] = [to, from];
+    for (let k = 0; k < n; k++) to[counts[2 * DIGITS + (keys[from[k]] >>> (2 * BITS))]++] = from[k];
+    return to.subarray(0, n);
+  };
 }

@@ -11,7 +11,7 @@ import { inNearBlock, visitBackToFront } from "./draw_order.js";
  * in for missing ones and does not fade; missing: bits of the levels that have not arrived; count: of its Gaussians;
  * direction: of its pre-sorted order; spot: where it lies on a sphere, of which di and dj are the column and the row then.
  * @typedef {{ di: number, dj: number, at: number, tile: number, tiles: number[],
- *   border: import("./cells.js").Border | null, things: import("./things.js").Thing[], close: boolean,
+ *   border: import("./cells.js").Border | null, things: import("./scatter.js").Thing[], close: boolean,
  *   nearest: number, farthest: number, arrived: number, lo: number, hi: number, whole: boolean, missing: number,
  *   count: number, direction: number, spot: import("./sphere_cells.js").Spot | null }} Cell
  *
@@ -28,9 +28,7 @@ const SLACK = 1e-6; // cells: more than rounding can move the ends of a row
  * Cells within reach that the picture may show, back to front; never one left out of which anything shows.
  * The next call reuses the same cell objects, so nothing is allocated for a view.
  *
- * @param {TerrainTables} terrain
- * @param {Camera} camera
- * @param {number} reach
+ * @param {TerrainTables} terrain @param {Camera} camera @param {number} reach
  * @returns {Cell[]}
  */
 export function cellsInFrustum(terrain, camera, reach) {
@@ -126,8 +124,7 @@ function rowRanges(planes, { side, x, y, reach, wide, lowest, highest }) {
 /**
  * Near, left, right, bottom and top plane: inward normal and distance, four numbers each.
  *
- * @param {Camera} camera
- * @param {number} near
+ * @param {Camera} camera @param {number} near
  * @returns {number[][]}
  */
 export function frustumPlanes({ right, up, ahead, width, height, focal }, near) {
@@ -137,14 +134,27 @@ export function frustumPlanes({ right, up, ahead, width, height, focal }, near) 
 }
 
 /**
- * Is a box (centre from the eye, half extents) wholly outside one plane?
+ * A function that tells whether a ball about a point, from the eye, is wholly outside one plane.
  *
  * @param {number[][]} planes
- * @param {number} east
- * @param {number} north
- * @param {number} up
- * @param {number} wide
- * @param {number} tall
+ */
+export function createBallTest(planes) {
+  const norms = planes.map(([a, b, c]) => Math.hypot(a, b, c));
+  /** @param {number[]} centre @param {number} radius */
+  return (centre, radius) => {
+    for (let k = 0; k < planes.length; k++) {
+      const plane = planes[k], inside = plane[0] * centre[0] + plane[1] * centre[1] + plane[2] * centre[2] + plane[3];
+      if (inside < -radius * norms[k]) return true;
+    }
+    return false;
+  };
+}
+
+/**
+ * Is a box (centre from the eye, half extents) wholly outside one plane?
+ *
+ * @param {number[][]} planes @param {number} east @param {number} north @param {number} up
+ * @param {number} wide @param {number} tall
  */
 function isOutside(planes, east, north, up, wide, tall) {
   for (let k = 0; k < 5; k++) {

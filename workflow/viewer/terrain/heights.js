@@ -5,8 +5,8 @@ import { hashCell } from "./choice.js";
 import { createSphere } from "./sphere.js";
 
 const HILLS = 3; // axis of the hash of octave 0, after west, south and centre; octave k uses HILLS + k
-const GAIN = 0.4; // height of an octave over that of the one twice as wide
-const SHIFT = [0.37, 0.71]; // of each octave against the last, in its own cells
+export const GAIN = 0.4; // height of an octave over that of the one twice as wide
+export const SHIFT = [0.37, 0.71]; // of each octave against the last, in its own cells
 const STEEPEST = 2.75; // upper bound of the slope of the noise, per cell
 export const MAX_OCTAVES = 12;
 
@@ -49,10 +49,7 @@ export function createHeights(entry = { kind: "flat" }, pixels = null) {
   return { kind: "flat", low: 0, high: 0, steepest: 0, at: () => [0, 0, 0] };
 }
 
-/**
- * @param {HillsEntry} entry
- * @returns {Hills}
- */
+/** @param {HillsEntry} entry @returns {Hills} */
 function createHills({ height, wavelength, octaves, salt }) {
   const shares = [1];
   for (let k = 1; k < octaves; k++) shares.push(shares[k - 1] * GAIN);
@@ -91,10 +88,7 @@ function createHills({ height, wavelength, octaves, salt }) {
 /**
  * Gradient noise and its derivatives, x and y in cells.
  *
- * @param {number} x
- * @param {number} y
- * @param {number} axis
- * @param {number} salt
+ * @param {number} x @param {number} y @param {number} axis @param {number} salt
  * @param {number[]} out value, derivative by x, derivative by y
  */
 function gradientNoise(x, y, axis, salt, out) {
@@ -120,8 +114,7 @@ function gradientNoise(x, y, axis, salt, out) {
 /**
  * Gradient noise without its derivatives, x and y in cells; remembers the gradients of the last cell.
  *
- * @param {number} axis
- * @param {number} salt
+ * @param {number} axis @param {number} salt
  * @returns {(x: number, y: number) => number}
  */
 export function createNoise(axis, salt) {
@@ -150,11 +143,7 @@ export const fade = (t) => t * t * t * (t * (6 * t - 15) + 10);
 /** @param {number} t */
 const fadeSlope = (t) => 30 * t * t * (t * (t - 2) + 1);
 
-/**
- * @param {ImageEntry} entry
- * @param {Float32Array} pixels
- * @returns {HeightMap}
- */
+/** @param {ImageEntry} entry @param {Float32Array} pixels @returns {HeightMap} */
 function createHeightMap({ rows, columns, width, beyond }, pixels) {
   const perUnit = columns / width, mirrored = beyond !== "clamp";
   /** @param {number} index @param {number} n */
@@ -193,9 +182,7 @@ function createHeightMap({ rows, columns, width, beyond }, pixels) {
 /**
  * Index of a picture's n pixels for any index: mirrored, or the border's.
  *
- * @param {number} index
- * @param {number} n
- * @param {boolean} mirrored
+ * @param {number} index @param {number} n @param {boolean} mirrored
  */
 export function wrapIndex(index, n, mirrored) {
   if (!mirrored) return Math.min(Math.max(index, 0), n - 1);

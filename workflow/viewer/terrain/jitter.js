@@ -1,11 +1,9 @@
 // Jitter of the classes: fine noise that frays the borders of materials. See classes.js.
 
 import { hashCell } from "./choice.js";
-import { fade } from "./heights.js";
+import { fade, GAIN, SHIFT } from "./heights.js";
 
 export const MAX_OCTAVES = 8;
-const GAIN = 0.4; // height of an octave over that of the one twice as wide
-export const SHIFT = [0.37, 0.71]; // of each octave against the last, in its own cells
 const JITTER = 80; // octave k uses JITTER + k for the first four materials, JITTER + MAX_OCTAVES + k for the others
 const CONTRAST = 3; // the jitter is its noise times this, cut at -1 and 1
 const MAX_TABLE = 64; // cells of the finest jitter along a tile's side whose gradients are kept for a cell
@@ -19,8 +17,7 @@ export function octaveGains(octaves) {
 /**
  * The jitter of a rule: fine noise at places of a cell, counted from the cell's own corner.
  *
- * @param {import("./classes.js").ClassesEntry} entry
- * @param {number} materials
+ * @param {import("./classes.js").ClassesEntry} entry @param {number} materials
  */
 export function createJitter({ jitter: { cells: coarse, octaves, amplitude }, salt }, materials) {
   const { gains, total } = octaveGains(octaves);
@@ -43,18 +40,10 @@ export function createJitter({ jitter: { cells: coarse, octaves, amplitude }, sa
     north = j;
   }
 
-  /** Gradients at the four corners of a square. @param {number} x @param {number} y @param {number} octave */
-  function fillCorners(x, y, octave) {
-    for (let k = 0; k < 4; k++) cornerGradients(x + (k & 1), y + (k >> 1), octave, corners, 2 * materials * k);
-  }
-
   /**
    * Gradients of all materials at an integer point: one hash serves four materials, a byte each.
    *
-   * @param {number} x
-   * @param {number} y
-   * @param {number} octave
-   * @param {Float64Array} out
+   * @param {number} x @param {number} y @param {number} octave @param {Float64Array} out
    * @param {number} at
    */
   function cornerGradients(x, y, octave, out, at) {
@@ -74,7 +63,9 @@ export function createJitter({ jitter: { cells: coarse, octaves, amplitude }, sa
       const s = x - column, t = y - row, across = fade(s), along = fade(t), gain = gains[octave];
       const sw = (1 - across) * (1 - along), se = across * (1 - along), nw = (1 - across) * along, ne = across * along;
       const table = dense ? tables[octave] : corners, wide = dense ? cells + 2 : 2, item = 2 * materials;
-      if (!dense) fillCorners(i * cells + column, j * cells + row, octave);
+      for (let k = 0; k < (dense ? 0 : 4); k++) {
+        cornerGradients(i * cells + column + (k & 1), j * cells + row + (k >> 1), octave, corners, item * k);
+      }
       for (let m = 0, a = dense ? (row * wide + column) * item : 0; m < materials; m++, a += 2) {
         const b = a + item, c = a + wide * item, d = c + item;
         const noise = sw * (table[a] * s + table[a + 1] * t) + se * (table[b] * (s - 1) + table[b + 1] * t)

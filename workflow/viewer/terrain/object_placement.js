@@ -2,12 +2,12 @@
 // Port of dav_gswt/terrain/object_placement.py.
 
 import { addMissing, pickLevels } from "./budget.js";
-import { RING } from "./cell_ring.js";
+import { RING } from "./caches.js";
 import { nearestOrder } from "./draw_order.js";
-import { frustumPlanes } from "./frustum.js";
+import { createBallTest, frustumPlanes } from "./frustum.js";
 
 /**
- * @typedef {import("./things.js").Thing} Thing
+ * @typedef {import("./scatter.js").Thing} Thing
  * @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables
  */
 
@@ -18,23 +18,22 @@ import { frustumPlanes } from "./frustum.js";
  * is drawn last, and the object right after it: else the ground of a nearer cell would cover what hangs over it. Where
  * that cell is not visible, the object is drawn with its own.
  *
- * @param {TerrainTables} terrain
- * @param {import("./camera.js").Camera} camera
+ * @param {TerrainTables} terrain @param {import("./camera.js").Camera} camera
  * @param {import("./budget.js").Selection} selection
  */
 export function placeObjects(terrain, camera, { cells, switches, bands, missing }) {
   /** @type {(Thing[] | null)[]} */
   const groups = new Array(cells.length).fill(null);
   if (!terrain.scatter) return groups;
-  const planes = frustumPlanes(camera, terrain.near), norms = planes.map(([a, b, c]) => Math.hypot(a, b, c));
-  const { eye } = camera, drawnWith = terrain.window.fill(-1);
+  const isOutside = createBallTest(frustumPlanes(camera, terrain.near)), drawnWith = terrain.window.fill(-1);
+  const { eye } = camera;
   const i0 = Math.floor(eye[0] / terrain.side), j0 = Math.floor(eye[1] / terrain.side);
   for (let k = 0; k < cells.length; k++) drawnWith[windowIndex(cells[k].di, cells[k].dj)] = k;
   for (let k = 0; k < cells.length; k++) {
     for (const thing of cells[k].things) {
       const { arrived } = terrain.tiles[thing.tile];
       aimThing(thing, terrain, eye, i0, j0);
-      if (isOutside(planes, norms, thing)) continue;
+      if (isOutside(thing.to, thing.farthest - thing.distance)) continue;
       const drawn = pickLevels(terrain, thing, arrived, switches, bands);
       if (thing.missing && !terrain.room) addMissing(missing, thing.tile, thing.missing);
       if (!drawn) continue;
@@ -72,10 +71,7 @@ const nearestTouched = (cell, place, radius) => (
 /**
  * Foot and distances of an object, seen from the eye.
  *
- * @param {Thing} thing
- * @param {TerrainTables} terrain
- * @param {number[]} eye
- * @param {number} i0
+ * @param {Thing} thing @param {TerrainTables} terrain @param {number[]} eye @param {number} i0
  * @param {number} j0
  */
 function aimThing(thing, { side, heights, objects }, eye, i0, j0) {
@@ -93,26 +89,9 @@ function aimThing(thing, { side, heights, objects }, eye, i0, j0) {
 }
 
 /**
- * Does an object lie wholly outside one plane?
- *
- * @param {number[][]} planes
- * @param {number[]} norms lengths of their normals
- * @param {Thing} thing
- */
-function isOutside(planes, norms, { to, distance, farthest }) {
-  const x = to[0], y = to[1], z = to[2], beyond = distance - farthest;
-  for (let k = 0; k < planes.length; k++) {
-    const plane = planes[k];
-    if (plane[0] * x + plane[1] * y + plane[2] * z + plane[3] < beyond * norms[k]) return true;
-  }
-  return false;
-}
-
-/**
  * The order nearest to the viewing direction, turned back as the object is turned.
  *
- * @param {Thing} thing
- * @param {TerrainTables} terrain
+ * @param {Thing} thing @param {TerrainTables} terrain
  */
 function orderThing(thing, { tiles, directions }) {
   const { cos, sin, to: [x, y, z], east, north, tile, lo } = thing, orders = tiles[tile].orders[lo];

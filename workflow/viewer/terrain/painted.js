@@ -12,8 +12,9 @@ const FARTHEST = 2 ** 20; // blocks from the origin
 export const MAX_PAINTED = 2 ** 18; // points
 export const MAX_COORDINATE = BLOCK * FARTHEST; // of a point: painted ones are nearer to the origin
 const SPREAD = [1, 4, 6, 4, 1]; // weights along an axis, by which a painted point counts for those around it
-export const WHOLE = 256; // sum of the products of two weights
+const WHOLE = 256; // sum of the products of two weights
 const REACH = 2; // steps of the lattice to the farthest of them
+const CORNERS = [[-REACH, -REACH], [REACH, -REACH], [-REACH, REACH], [REACH, REACH]];
 
 /**
  * A sparse set of painted points.
@@ -29,19 +30,22 @@ export function createPainted(lattice) {
   /** @param {number} i @param {number} j of the block */
   const isNear = (i, j) => i >= -FARTHEST && i < FARTHEST && j >= -FARTHEST && j < FARTHEST;
 
+  /** The block of a point. @param {number} i @param {number} j */
+  function blockOf(i, j) {
+    const a = Math.floor(i / BLOCK), b = Math.floor(j / BLOCK);
+    return isNear(a, b) ? blocks.get(keyOf(a, b)) : undefined;
+  }
+
   /** The material of a point, or -1. @param {number} i @param {number} j */
   function get(i, j) {
-    const a = Math.floor(i / BLOCK), b = Math.floor(j / BLOCK);
-    const block = isNear(a, b) ? blocks.get(keyOf(a, b)) : undefined;
-    return block ? block.values[(j - b * BLOCK) * BLOCK + i - a * BLOCK] - 1 : -1;
+    const block = blockOf(i, j);
+    return block ? block.values[(j - block.j * BLOCK) * BLOCK + i - block.i * BLOCK] - 1 : -1;
   }
 
   /**
    * Paint a point; material -1: back to the rule. A point beyond MAX_COORDINATE stays as it is.
    *
-   * @param {number} i
-   * @param {number} j
-   * @param {number} material
+   * @param {number} i @param {number} j @param {number} material
    */
   function set(i, j, material) {
     const a = Math.floor(i / BLOCK), b = Math.floor(j / BLOCK), key = keyOf(a, b);
@@ -81,22 +85,19 @@ export function createPainted(lattice) {
     /**
      * Weights of the materials painted at and around a point, in units of 1 / WHOLE. Returns: their sum.
      *
-     * @param {number} i
-     * @param {number} j
+     * @param {number} i @param {number} j
      * @param {Float64Array} out by material; as it was where nothing is painted around
      */
     weightsAt(i, j, out) {
-      if (!count) return 0;
       let sum = 0;
-      const west = Math.floor((i - REACH) / BLOCK), east = Math.floor((i + REACH) / BLOCK);
-      const south = Math.floor((j - REACH) / BLOCK), north = Math.floor((j + REACH) / BLOCK);
-      if (!isNear(west, south) || !isNear(east, north)) return 0;
-      for (let b = south; b <= north; b++) {
-        for (let a = west; a <= east; a++) {
-          const block = blocks.get(keyOf(a, b));
-          if (!block) continue;
-          if (!sum) out.fill(0);
-          sum += addWeights(block, i, j, out);
+      if (!count || !CORNERS.some(([x, y]) => blockOf(i + x, j + y))) return 0;
+      out.fill(0);
+      for (let y = -REACH; y <= REACH; y++) {
+        for (let x = -REACH; x <= REACH; x++) {
+          const material = get(i + x, j + y), weight = SPREAD[x + REACH] * SPREAD[y + REACH];
+          if (material < 0) continue;
+          out[material] += weight;
+          sum += weight;
         }
       }
       return sum;
@@ -138,29 +139,6 @@ export function findRunFault(runs, materials) {
       && Math.abs(i) < MAX_COORDINATE && i + length < MAX_COORDINATE;
   });
   return sound && sum <= MAX_PAINTED ? null : "runs";
-}
-
-/**
- * Add the weights of a block's points about (i, j) by material. Returns: their sum.
- *
- * @param {{ i: number, j: number, values: Uint8Array }} block
- * @param {number} i
- * @param {number} j
- * @param {Float64Array} out
- */
-function addWeights({ i: a, j: b, values }, i, j, out) {
-  const x0 = a * BLOCK, y0 = b * BLOCK, x1 = x0 + BLOCK - 1, y1 = y0 + BLOCK - 1;
-  let sum = 0;
-  for (let y = Math.max(j - REACH, y0); y <= Math.min(j + REACH, y1); y++) {
-    for (let x = Math.max(i - REACH, x0); x <= Math.min(i + REACH, x1); x++) {
-      const value = values[(y - y0) * BLOCK + x - x0];
-      if (!value) continue;
-      const weight = SPREAD[x - i + REACH] * SPREAD[y - j + REACH];
-      out[value - 1] += weight;
-      sum += weight;
-    }
-  }
-  return sum;
 }
 
 /**

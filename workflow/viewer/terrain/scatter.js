@@ -1,7 +1,7 @@
 // Scatter: where objects stand on the terrain, as a pure function of the cell.
 // The same numbers as dav_gswt/terrain/scatter.py, where the idea is; tests/golden/scatter.json holds both to it.
 
-import { createCellRing } from "./cell_ring.js";
+import { createCellRing } from "./caches.js";
 import { hashCell } from "./choice.js";
 
 /**
@@ -13,6 +13,15 @@ import { hashCell } from "./choice.js";
  * turn: in degrees, counter-clockwise; size: factor; radius: of the footprint, in tile sides.
  * @typedef {{ i: number, j: number, u: number, v: number, number: number, turn: number, size: number,
  *   radius: number }} Instance
+ *
+ * An object in a cell, and what the last view made of it. tile, tiles: its number after all tiles; border: none; cos,
+ * sin: of its turn; h, east, north: surface under its foot; x, y: of the foot, in cells from the eye's; to: from the
+ * eye to the foot; nearest, farthest: bounds of the distances of its Gaussians; lo to hi, whole, missing: as of a cell;
+ * order: position among the orders that it keeps, and direction: which that is.
+ * @typedef {Instance & { tile: number, tiles: number[], border: null, cos: number, sin: number,
+ *   h: number, east: number, north: number, x: number, y: number, to: number[], distance: number, nearest: number,
+ *   farthest: number, lo: number, hi: number, whole: boolean, missing: number, order: number,
+ *   direction: number }} Thing
  *
  * An instance that may stand, its square (a, b) of the grid and its place x, y there, and the hash that decides.
  * @typedef {{ instance: Instance, reach: number, a: number, b: number, x: number, y: number,
@@ -27,8 +36,7 @@ export const MAX_RADIUS = 1; // of a footprint, in tile sides: at most 4 cells a
 /**
  * The scatter of a terrain.
  *
- * @param {ScatterEntry} entry
- * @param {ScatterObject[]} objects
+ * @param {ScatterEntry} entry @param {ScatterObject[]} objects
  * @param {number} side of a tile
  * @param {import("./classes.js").Classes | null} classes null: one material
  */
@@ -54,10 +62,7 @@ export function createScatter({ cells: n, turn, size, salt }, objects, side, cla
   /**
    * The candidate of square (a, b) in cell (i, j), if it is an object whose footprint lies inside its material.
    *
-   * @param {number} i
-   * @param {number} j
-   * @param {number} a
-   * @param {number} b
+   * @param {number} i @param {number} j @param {number} a @param {number} b
    * @returns {Candidate | null}
    */
   function findCandidate(i, j, a, b) {
@@ -123,13 +128,7 @@ export function createScatter({ cells: n, turn, size, salt }, objects, side, cla
         }
       }
     },
-    /**
-     * The objects whose feet lie in a cell.
-     *
-     * @param {number} i
-     * @param {number} j
-     * @returns {Instance[]}
-     */
+    /** Objects that stand in a cell. @param {number} i @param {number} j @returns {Instance[]} */
     instancesIn: (i, j) => standing.get(i, j),
   };
 }
@@ -143,9 +142,7 @@ function leads(p, q) {
 /**
  * By object, the sum of the probabilities of those on a material up to it.
  *
- * @param {ScatterObject[]} objects
- * @param {number[]} probabilities
- * @param {number} m
+ * @param {ScatterObject[]} objects @param {number[]} probabilities @param {number} m
  */
 function sumProbabilities(objects, probabilities, m) {
   let sum = 0;
@@ -155,11 +152,8 @@ function sumProbabilities(objects, probabilities, m) {
 /**
  * The material with the highest score at a place, of equals the first.
  *
- * @param {import("./classes.js").Classes} classes
- * @param {number} i
- * @param {number} j
- * @param {number} u
- * @param {number} v
+ * @param {import("./classes.js").Classes} classes @param {number} i @param {number} j
+ * @param {number} u @param {number} v
  */
 export function materialAt(classes, i, j, u, v) {
   const bits = classes.materialsIn(i, j);
@@ -173,8 +167,7 @@ export function materialAt(classes, i, j, u, v) {
 /**
  * Does the score of the material exceed the others by the jitter's amplitude in four places of the footprint's rim?
  *
- * @param {import("./classes.js").Classes} classes
- * @param {Instance} instance
+ * @param {import("./classes.js").Classes} classes @param {Instance} instance
  * @param {number} material
  */
 function liesInside(classes, { i, j, u, v, radius }, material) {
@@ -187,4 +180,21 @@ function liesInside(classes, { i, j, u, v, radius }, material) {
     }
   }
   return true;
+}
+
+/**
+ * An object that stands in a cell of the cache.
+ *
+ * @param {Instance} instance
+ * @param {number} first number of the first object
+ * @returns {Thing}
+ */
+export function createThing({ i, j, u, v, number, turn, size, radius }, first) {
+  const angle = (turn * Math.PI) / 180;
+  return {
+    i, j, u, v, number, turn, size, radius, tile: first + number, tiles: [first + number], border: null,
+    cos: Math.cos(angle), sin: Math.sin(angle), h: NaN, east: 0, north: 0,
+    x: 0.5, y: 0.5, to: [0.5, 0.5, 0.5], distance: 0.5, nearest: 0.5, farthest: 0.5, lo: 0, hi: 0, whole: false,
+    missing: 0, order: 0, direction: 0,
+  };
 }

@@ -19,10 +19,7 @@ export const QUARTER = Math.PI / 2;
  * @typedef {import("./heights.js").Bounds & { kind: "sphere", radius: number, cells: number }} Sphere
  */
 
-/**
- * @param {SphereEntry} entry
- * @returns {Sphere}
- */
+/** @param {SphereEntry} entry @returns {Sphere} */
 export const createSphere = ({ radius, cells }) => (
   { kind: "sphere", radius, cells, low: 0, high: 0, steepest: 0, at: () => [0, 0, 0] });
 
@@ -49,8 +46,7 @@ export function directionOf(face, s, t, out) {
 /**
  * The face under a point, and the place on it in cells from its south-western corner.
  *
- * @param {{ cells: number }} sphere
- * @param {number[]} point
+ * @param {{ cells: number }} sphere @param {number[]} point
  */
 export function locate({ cells }, point) {
   const outs = FACES.map(([, , out]) => dot(out, point)), face = outs.indexOf(Math.max(...outs));
@@ -66,8 +62,7 @@ export function locate({ cells }, point) {
  * @param {number} z above the ground
  * @param {number} s tangent of the tile's middle to the east
  * @param {number} t to the north
- * @param {number} radius
- * @param {number} rate
+ * @param {number} radius @param {number} rate
  * @param {number[]} out the point, and from 3 on the derivative, column by column
  */
 export function bend(x, y, z, s, t, radius, rate, out) {
@@ -95,8 +90,7 @@ export function bend(x, y, z, s, t, radius, rate, out) {
 /**
  * East, north and up at a place, in degrees; at the poles those of the longitude.
  *
- * @param {number} longitude
- * @param {number} latitude
+ * @param {number} longitude @param {number} latitude
  */
 export function frameAt(longitude, latitude) {
   const east = (longitude * Math.PI) / 180, north = (latitude * Math.PI) / 180;
@@ -109,8 +103,7 @@ export function frameAt(longitude, latitude) {
  *
  * @param {{ x: number, y: number, yaw: number }} place
  * @param {number} east world units
- * @param {number} north
- * @param {number} radius
+ * @param {number} north @param {number} radius
  */
 export function walkOn({ x, y, yaw }, east, north, radius) {
   const long = Math.hypot(east, north), angle = long / radius;

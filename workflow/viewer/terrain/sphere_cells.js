@@ -1,8 +1,8 @@
 // Cells of a sphere that an eye may see, and their draw order. Port of dav_gswt/terrain/sphere_cells.py.
 
-import { RING } from "./cell_ring.js";
+import { createRecentCache, RING } from "./caches.js";
 import { REACH } from "./cells.js";
-import { blankCell, frustumPlanes, RIM } from "./frustum.js";
+import { blankCell, createBallTest, frustumPlanes, RIM } from "./frustum.js";
 import { directionOf, dot, FACES, QUARTER, rateOf, tangentAt } from "./sphere.js";
 import { columnOf, isCovered, isFrayed, tileOn } from "./sphere_edges.js";
 
@@ -25,9 +25,7 @@ const MOST_BORDERS = 20_000; // cells at edges whose Gaussians are remembered
 /**
  * Distance to the last tiles: longer from above, where more of the ground is in view.
  *
- * @param {Pick<TerrainTables, "side">} terrain
- * @param {Sphere} sphere
- * @param {number[]} eye
+ * @param {Pick<TerrainTables, "side">} terrain @param {Sphere} sphere @param {number[]} eye
  */
 export function findReach({ side }, { radius }, eye) {
   const reach = REACH * side;
@@ -38,9 +36,7 @@ export function findReach({ side }, { radius }, eye) {
  * Where the last tiles are blended into the backdrop (end), and the sine of the angle there below the horizon (low);
  * see dav_gswt/terrain/sphere_backdrop.py.
  *
- * @param {Sphere} sphere
- * @param {number[]} eye
- * @param {number} reach
+ * @param {Sphere} sphere @param {number[]} eye @param {number} reach
  */
 export function findEnd({ radius }, eye, reach) {
   const far = Math.hypot(...eye), height = Math.max(far - radius, 0), square = height * (2 * radius + height);
@@ -52,8 +48,7 @@ export function findEnd({ radius }, eye, reach) {
  * The eye's own cell in the grid of each face, +1 or -1 (the eye is behind the face: the order turns round), and the
  * face's place in the order of faces, from back to front.
  *
- * @param {{ cells: number }} sphere
- * @param {number[]} eye
+ * @param {{ cells: number }} sphere @param {number[]} eye
  */
 export function aimFaces({ cells }, eye) {
   const along = FACES.map((axes) => axes.map((axis) => dot(axis, eye)));
@@ -71,8 +66,7 @@ export const isClose = (own, i, j) => own.sign > 0 && Math.abs(i - own.i) <= 1 &
 /**
  * Is cell a drawn before cell b? Negative: yes.
  *
- * @param {ReturnType<typeof aimFaces>} own
- * @param {{ face: number, i: number, j: number }} a
+ * @param {ReturnType<typeof aimFaces>} own @param {{ face: number, i: number, j: number }} a
  * @param {{ face: number, i: number, j: number }} b
  */
 export function compareCells(own, a, b) {
@@ -86,14 +80,13 @@ export function compareCells(own, a, b) {
  * A function as `cellsInFrustum` for a sphere. Each face is halved again and again, and a square is culled with all of
  * its cells where its bounding ball lies outside of one plane of the frustum, out of reach, or below the horizon.
  *
- * @param {TerrainTables} terrain
- * @param {Sphere} sphere
+ * @param {TerrainTables} terrain @param {Sphere} sphere
  */
 export function createSphereCells(terrain, sphere) {
   const { side, salt, variants, tiles, levels, cache } = terrain, { cells: n, radius } = sphere;
   const rate = rateOf(sphere, side), keys = new Float64Array(KNOWN).fill(NaN), numbers = new Uint16Array(KNOWN);
-  /** @type {Map<number, import("./cells.js").Border>} */
-  const borders = new Map();
+  /** @type {ReturnType<typeof createRecentCache<number, import("./cells.js").Border>>} */
+  const borders = createRecentCache(MOST_BORDERS, () => 1);
   let serial = 0;
 
   /** @param {number} face @param {number} i @param {number} j */
@@ -110,38 +103,19 @@ export function createSphereCells(terrain, sphere) {
   function borderOf(face, i, j) {
     if (!isFrayed(sphere, face, i, j)) return null;
     const column = columnOf(sphere, face, i), key = column * (n + 2) + j + 1, old = borders.get(key);
-    const border = old ?? { i: column, j, serial: ++serial, kept: new Map(), last: null, batch: null, stale: false };
-    borders.delete(key);
-    borders.set(key, border); // the latest last
-    for (const oldest of borders.keys()) {
-      if (borders.size <= MOST_BORDERS) break;
-      borders.delete(oldest);
-    }
-    return border;
+    return borders.keep(key, old
+      ?? { i: column, j, serial: ++serial, kept: new Map(), last: null, batch: null, stale: false });
   }
 
-  /**
-   * @param {Camera} camera
-   * @param {number} reach
-   * @returns {Cell[]}
-   */
+  /** @param {Camera} camera @param {number} reach @returns {Cell[]} */
   return (camera, reach) => {
     const { eye } = camera, far = Math.hypot(...eye), own = aimFaces(sphere, eye), [low, high] = terrain.z;
-    const planes = frustumPlanes(camera, terrain.near), overhang = RIM * terrain.largest;
+    const isOutside = createBallTest(frustumPlanes(camera, terrain.near)), overhang = RIM * terrain.largest;
     const sky = acos((radius + low) / far) + acos((radius + low) / (radius + high)) + overhang / radius;
     const tall = Math.max(Math.abs(low), Math.abs(high)), up = eye.map((v) => v / far);
-    const middle = [0, 0, 0], away = [0, 0, 0], norms = planes.map(([a, b, c]) => Math.hypot(a, b, c));
+    const middle = [0, 0, 0], away = [0, 0, 0];
     /** @type {{ face: number, i: number, j: number, nearest: number, farthest: number, spot: Spot }[]} */
     const found = [];
-
-    /** Is a ball wholly outside one plane? @param {number[]} centre @param {number} wide */
-    function isOutside([x, y, z], wide) {
-      for (let k = 0; k < 5; k++) {
-        const plane = planes[k];
-        if (plane[0] * x + plane[1] * y + plane[2] * z + plane[3] + wide * norms[k] < 0) return true;
-      }
-      return false;
-    }
 
     /** @param {number} face @param {number} i @param {number} j @param {number} size */
     function visit(face, i, j, size) {

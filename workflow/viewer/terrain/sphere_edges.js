@@ -2,12 +2,11 @@
 // The same as dav_gswt/terrain/sphere_edges.py, which explains it; tests/golden/sphere.json holds both to it.
 
 import { tileAt } from "./choice.js";
-import { createNoise } from "./heights.js";
+import { createNoise, SHIFT } from "./heights.js";
 import { QUARTER } from "./sphere.js";
 
 const FRAY = 120; // axis of the hash of edge 0; edge k uses FRAY + 2 k and the next
 const FINE = [3, 9]; // cells of the two octaves of the noise, on a tile's side
-const SHIFT = [0.37, 0.71]; // of the second octave
 const WIDTH = 0.3, CONTRAST = 2.5; // tile sides: most that an edge is moved; factor on the noise, which is cut then
 const TAPER = 0.5; // of the distance from a corner, in tile sides
 const LEVEL = 0.03, LIFT = 2, HIGHEST = 0.2; // what is higher reaches over the edge
@@ -15,12 +14,8 @@ const LEVEL = 0.03, LIFT = 2, HIGHEST = 0.2; // what is higher reaches over the 
 /**
  * The tile in a cell of a face, or of its tiling beyond its edges.
  *
- * @param {{ cells: number }} sphere
- * @param {number} face
- * @param {number} i
- * @param {number} j
- * @param {number} salt
- * @param {number} variants
+ * @param {{ cells: number }} sphere @param {number} face @param {number} i @param {number} j
+ * @param {number} salt @param {number} variants
  */
 export function tileOn({ cells: n }, face, i, j, salt, variants) {
   return tileAt(((face + 1) >> 1) * n + i, (face >> 1) * n + j, salt, variants, 3 * n);
@@ -29,10 +24,7 @@ export function tileOn({ cells: n }, face, i, j, salt, variants) {
 /**
  * Is a cell of a face, or beyond one of its turned edges by one and not at a corner?
  *
- * @param {{ cells: number }} sphere
- * @param {number} face
- * @param {number} i
- * @param {number} j
+ * @param {{ cells: number }} sphere @param {number} face @param {number} i @param {number} j
  */
 export function isCovered({ cells: n }, face, i, j) {
   const odd = face & 1, insideI = i >= 0 && i < n, insideJ = j >= 0 && j < n;
@@ -42,19 +34,14 @@ export function isCovered({ cells: n }, face, i, j) {
 /**
  * Does a cell lie at a turned edge of its face, or beyond it?
  *
- * @param {{ cells: number }} sphere
- * @param {number} face
- * @param {number} i
- * @param {number} j
+ * @param {{ cells: number }} sphere @param {number} face @param {number} i @param {number} j
  */
 export const isFrayed = ({ cells: n }, face, i, j) => (face & 1 ? i >= n - 1 || j <= 0 : i <= 0 || j >= n - 1);
 
 /**
  * Which Gaussians of tiles at turned edges stay.
  *
- * @param {{ cells: number }} sphere
- * @param {number} side
- * @param {number} salt
+ * @param {{ cells: number }} sphere @param {number} side @param {number} salt
  */
 export function createFraying({ cells }, side, salt) {
   const perCell = QUARTER / cells, half = 0.5 * cells;
@@ -73,10 +60,7 @@ export function createFraying({ cells }, side, salt) {
   /**
    * Does a Gaussian stay? a, b: in cells from the face's south-western corner; z: tile sides.
    *
-   * @param {number} face
-   * @param {number} a
-   * @param {number} b
-   * @param {number} z
+   * @param {number} face @param {number} a @param {number} b @param {number} z
    */
   function stays(face, a, b, z) {
     const odd = face & 1, u = a - half, v = b - half;
@@ -92,8 +76,7 @@ export function createFraying({ cells }, side, salt) {
      * Indices of a tile's Gaussians that stay in a cell.
      *
      * @param {number} column of all faces, see `columnOf`
-     * @param {number} j
-     * @param {{ centres: Float32Array, count: number }} chunk
+     * @param {number} j @param {{ centres: Float32Array, count: number }} chunk
      */
     keep(column, j, { centres, count }) {
       const face = Math.floor(column / (cells + 2)), i = column - face * (cells + 2) - 1, found = new Uint32Array(count);

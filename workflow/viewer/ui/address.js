@@ -15,7 +15,7 @@ const EVERY = 500; // milliseconds between updates of the address
  *
  * @param {Walker} walker
  */
-export function formatPlace(walker) {
+function formatPlace(walker) {
   /** @param {number} unit */
   const digits = (unit) => Math.min(15, Math.max(0, Math.ceil(3 - Math.log10(unit))));
   const fine = Math.min(12, digits(walker.floor)), degrees = (180 * walker.floor) / (Math.PI * walker.radius);

@@ -1,10 +1,11 @@
-// Files dropped onto the page: a bundle's folder, its zip, a gswt.zip for the public renderer, or a JSON file of a fly
-// path or of painted materials.
+// Files dropped onto the page: a bundle's folder, its zip, a gswt.zip for the public renderer, or a JSON file of
+// painted materials.
 
-import { PageError } from "../data/errors.js";
+import { filesOf, openSource as openFiles, sourceOf } from "../data/bundle.js";
+import { PageError } from "../data/checks.js";
 import { NAME } from "../data/manifest.js";
-import { filesOf, openSource as openFiles, sourceOf } from "../data/open.js";
-import { MAX_BYTES, MAX_FILES, tooLarge } from "../data/source.js";
+import { MAX_FILES } from "../data/source.js";
+import { readPaintFile } from "./paint_keep.js";
 
 /**
  * @typedef {import("../data/source.js").Source} Source
@@ -33,35 +34,16 @@ export function listenToDrops(handlers) {
   });
 }
 
-/**
- * @param {FileSystemEntry[]} entries
- * @param {File[]} loose
- * @param {DropHandlers} handlers
- */
+/** @param {FileSystemEntry[]} entries @param {File[]} loose @param {DropHandlers} handlers */
 async function handleDrop(entries, loose, { openSource, loadJson }) {
   const files = entries.length ? await listFiles(entries) : new Map(loose.map((file) => [file.name, file]));
   const only = files.size === 1 ? [...files.values()][0] : null;
-  if (only && /\.json$/i.test(only.name) && only.name !== NAME) return loadJson(await parseJson(only));
+  if (only && /\.json$/i.test(only.name) && only.name !== NAME) return loadJson(await readPaintFile(only));
   if (only && /\.zip$/i.test(only.name)) return openSource(await openFiles(only));
   return openSource(await sourceOf(filesOf(files)));
 }
 
-/** @param {File} file */
-async function parseJson(file) {
-  if (file.size > MAX_BYTES) throw tooLarge(file.name);
-  try {
-    return JSON.parse(await file.text());
-  } catch (error) {
-    const { message } = /** @type {Error} */ (error);
-    throw new PageError(`${file.name} is not readable as JSON (${message}). Drop a file that this page saved.`);
-  }
-}
-
-/**
- * All files of dropped entries, folders included, by their paths.
- *
- * @param {FileSystemEntry[]} entries
- */
+/** All files of dropped entries and folders, by path. @param {FileSystemEntry[]} entries */
 async function listFiles(entries) {
   /** @type {Map<string, File>} */
   const files = new Map();

@@ -1,11 +1,9 @@
 // The first view: the scene's name, a still until the terrain itself is as sharp, and a hint until the first step.
 
 import { element } from "./dom.js";
+import { PLACE_KEYS } from "./walker.js";
 
 const FADE = 700; // milliseconds, a little longer than in style.css
-const STEP = 0.02; // of the eye's height; a turn by degrees counts alike
-
-/** @typedef {ReturnType<typeof createFirstView>} FirstView */
 
 /** @param {{ onStep: () => void }} handlers called when somebody moves */
 export function createFirstView({ onStep }) {
@@ -42,7 +40,8 @@ export function createFirstView({ onStep }) {
     /** A picture was drawn. @param {import("./walker.js").Walker} place @param {number} overlay */
     note(place, overlay) {
       if (overlay) showTerrain();
-      if (!begin || !isStep(begin, place)) return;
+      const start = begin;
+      if (!start || PLACE_KEYS.every((key) => place[key] === start[key])) return;
       begin = null;
       hint.hidden = true;
       title.classList.add("leaving");
@@ -51,10 +50,3 @@ export function createFirstView({ onStep }) {
     },
   };
 }
-
-/** @param {import("./walker.js").Walker} a @param {import("./walker.js").Walker} b */
-const isStep = (a, b) => Math.hypot(unitsOf(b, a.x - b.x), unitsOf(b, a.y - b.y), a.eye - b.eye) > STEP * a.eye
-  || Math.abs(a.yaw - b.yaw) + Math.abs(a.pitch - b.pitch) > 100 * STEP;
-
-/** World units of a change of x or y, which are degrees on a planet. @param {import("./walker.js").Walker} walker @param {number} change */
-const unitsOf = ({ radius }, change) => (radius ? (change * radius * Math.PI) / 180 : change);

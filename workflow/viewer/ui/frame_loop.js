@@ -1,19 +1,23 @@
-// The frame loop: draws while something changes, holds the frame rate by drawing less, and draws finer at rest.
+// The frame loop: it draws while something changes, holds the frame rate by drawing less, and at rest draws ever finer
+// pictures until all Gaussians are drawn. Each of these is drawn in slices beside the one that is shown.
 
-import { BUDGET } from "../draw/frame_pacing.js";
-import { createGamepads } from "./gamepads.js";
-import { keepPace } from "./kept_pace.js";
+import { BUDGET } from "../draw/pacing.js";
 import { stepWalker } from "./walker.js";
 
+/**
+ * @typedef {import("./viewer.js").Viewer} Viewer
+ * @typedef {import("./viewer.js").Scene} Scene
+ */
+
 const MAX_STEP = 250; // milliseconds of walking that one frame makes up for
+const QUIET = 700; // milliseconds at rest before its progress is said: fast devices are done by then
 
-/** @param {import("./viewer.js").Viewer} viewer */
+/** @param {Viewer} viewer */
 export function runFrameLoop(viewer) {
-  const { pacing, flyPath, resting, tour } = viewer;
-  const pads = createGamepads();
-  let last = performance.now(), drew = false, paced = keepPace(viewer.gl, pacing);
+  const { pacing, resting, tour } = viewer;
+  let last = performance.now(), drew = false, paced = false;
 
-  /** May a frame be drawn? While chunks arrive, previews at most. @param {import("./viewer.js").Scene} scene @param {number} now */
+  /** May a frame be drawn? While chunks arrive, previews at most. @param {Scene} scene @param {number} now */
   const mayDraw = ({ renderer, manifest, coarse }, now) => {
     if (viewer.loaded) return true;
     const due = renderer?.preview.isDue(now, coarse >= manifest.tiles.length) ?? false;
@@ -24,7 +28,7 @@ export function runFrameLoop(viewer) {
     return due;
   };
 
-  /** @param {import("./viewer.js").Scene} scene @param {number} now @param {boolean} may */
+  /** @param {Scene} scene @param {number} now @param {boolean} may */
   const ask = (scene, now, may) => {
     if (viewer.stale) resting.restart(scene, now);
     if (viewer.stale && may && scene.client.idle) viewer.askWorker(viewer.loaded ? pacing.budget : BUDGET.least, false);
@@ -36,13 +40,10 @@ export function runFrameLoop(viewer) {
     requestAnimationFrame(next);
     const { scene } = viewer, gap = now - last;
     last = now;
-    if (!scene || viewer.suspended) return;
-    const { walker, renderer } = scene;
-    const flown = flyPath.step(walker, gap / 1000);
-    const seconds = Math.min(gap, MAX_STEP) / 1000, stepped = stepWalker(walker, seconds), pushed = pads.step(walker, seconds);
-    if (pushed && tour.on) dispatchEvent(new Event("gamepadinput"));
+    if (!scene) return;
+    const { walker, renderer } = scene, stepped = stepWalker(walker, Math.min(gap, MAX_STEP) / 1000);
     const toured = tour.step(walker, scene.heights, gap / 1000);
-    if (stepped || pushed || flown || toured) viewer.dirty = viewer.stale = true;
+    if (stepped || toured) viewer.dirty = viewer.stale = true;
     const may = mayDraw(scene, now);
     ask(scene, now, may);
     // the frame of a picture at rest may take the GPU seconds: it is drawn in slices alone
@@ -54,4 +55,75 @@ export function runFrameLoop(viewer) {
     drew = due;
   };
   requestAnimationFrame(next);
+}
+
+/** Pictures at rest, and pictures to save, which wait for the finest. @param {Viewer} viewer */
+export function createResting(viewer) {
+  let budget = 0, since = 0, done = 0; // budget of the picture that is under way; share of all work
+  /** @type {((canvas: HTMLCanvasElement) => void)[]} */
+  const waiting = [];
+  const handOver = () => {
+    for (const take of waiting.splice(0)) take(viewer.canvas);
+  };
+
+  /** @param {import("../draw/renderer.js").Renderer} renderer @param {Scene} scene */
+  function finish({ picture, rest }, { frame }) {
+    viewer.show(picture);
+    rest.finish(budget, frame?.shrink === 1);
+    if (!rest.whole || frame?.missing.length) return; // a chunk that arrives begins anew
+    viewer.hud.showRefining(null);
+    viewer.options.onWhole();
+    handOver(); // now: the next turn may find the canvas empty
+  }
+
+  return {
+    /** Something changed. @param {Scene} scene @param {number} now */
+    restart({ renderer }, now) {
+      const { budget: drawn, scale } = viewer.pacing;
+      renderer?.picture.cancel();
+      renderer?.rest.restart(now, scale < 1 ? 0 : drawn);
+      [budget, since, done] = [0, now, 0];
+      viewer.hud.showRefining(null);
+    },
+    /** Go on with the picture that is under way, or with the next. @param {Scene} scene @param {number} now */
+    step(scene, now) {
+      const { renderer, client, frame } = scene;
+      if (!renderer) return;
+      const { picture, rest } = renderer;
+      if (picture.share !== null) {
+        if (picture.advance(now)) finish(renderer, scene);
+      } else if (client.idle && viewer.dirty && frame?.patient) viewer.begin(picture); // not idle: the frame is of an earlier view
+      else if (client.idle && !viewer.dirty) {
+        const next = rest.next(now);
+        if (next) {
+          budget = next;
+          viewer.askWorker(next, true);
+        }
+      }
+      if (rest.whole) return;
+      done = Math.max(done, rest.progress(budget, picture.share ?? 0));
+      if (now - since > QUIET) viewer.hud.showRefining(done);
+    },
+    /** Is the finest picture of the place shown? */
+    get whole() {
+      const { renderer, frame } = viewer.scene ?? {};
+      return !viewer.stale && !frame?.missing.length && (renderer?.rest.whole ?? false);
+    },
+    /** How much of it is drawn, 0 to 1. */
+    get done() {
+      return done;
+    },
+    /**
+     * Call back with the canvas when the finest picture of the place is on it, at once if it is.
+     *
+     * @param {(canvas: HTMLCanvasElement) => void} take must read the canvas before it returns
+     */
+    whenWhole(take) {
+      waiting.push(take);
+      const picture = viewer.scene?.renderer?.picture;
+      if (!picture || !this.whole) return;
+      viewer.show(picture);
+      handOver();
+    },
+  };
 }

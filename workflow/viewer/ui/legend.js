@@ -1,9 +1,10 @@
-// The legend of an overlay: what its colours mean, and what is under the pointer.
+// The legend of an overlay: what its colours mean, and the values under the pointer.
 
-import { uncertaintyRange } from "../data/uncertainty.js";
+import { NO_ORDER, uncertaintyRange } from "../data/layout.js";
 import { levelColour, materialColour, OBJECTS, OVERLAYS, SORTED, uncertaintyColour } from "../draw/overlays.js";
-import { element, swatch } from "./dom.js";
-import { unitName } from "./numbers.js";
+import { hitGround, pointAt, rayThrough } from "../terrain/camera.js";
+import { REACH, tileUnder } from "../terrain/cells.js";
+import { cssColour, element, swatch } from "./dom.js";
 
 /**
  * @typedef {import("../data/manifest.js").Manifest} Manifest
@@ -11,6 +12,10 @@ import { unitName } from "./numbers.js";
  */
 
 const STEPS = 7; // swatches of a scale
+const HINT = "Point at the ground for its values";
+
+/** A unit after a number. @param {string} unit */
+export const unitName = (unit) => (unit === "metre" ? "m" : `${unit}s`);
 
 export function createLegend() {
   const box = element("legend", HTMLElement), value = document.createElement("p");
@@ -21,7 +26,7 @@ export function createLegend() {
     if (value.textContent !== text) value.textContent = text;
   };
   return {
-    /** Show the legend of an overlay; the picture as it is has none. @param {number} overlay @param {Manifest | null} manifest */
+    /** Show a legend; the plain picture has none. @param {number} overlay @param {Manifest | null} manifest */
     show(overlay, manifest) {
       const name = OVERLAYS[overlay];
       shown = name === "picture" ? null : manifest;
@@ -30,13 +35,13 @@ export function createLegend() {
       const list = document.createElement("ul");
       list.append(...entriesOf(name, shown).map(([colour, text]) => {
         const item = document.createElement("li");
-        item.append(...colour ? [swatch(colour)] : [], text);
+        item.append(...colour ? [swatch(cssColour(colour))] : [], text);
         return item;
       }));
       say(HINT);
       box.replaceChildren(list, value);
     },
-    /** What is under the pointer; null: no ground. @param {Under | null} under */
+    /** Tell what is under the pointer; null: no ground. @param {Under | null} under */
     tell(under) {
       if (!shown) return;
       if (!under) return say("No tile here");
@@ -49,23 +54,27 @@ export function createLegend() {
   };
 }
 
-const HINT = "Point at the ground for its values";
-
 /**
- * Colours and what they stand for.
+ * Colours of an overlay and what they stand for.
  *
- * @param {string} name of an overlay
- * @param {Manifest} manifest
+ * @param {string} name @param {Manifest} manifest
  * @returns {[number[] | null, string][]}
  */
-function entriesOf(name, manifest) {
-  if (name === "tile") return [[null, `A colour for each of ${manifest.tiles.length} tiles`]];
-  if (name === "level") return manifest.levels.map(({ level, distance }) => [levelColour(level), levelText(manifest, level, distance)]);
+function entriesOf(name, { tiles, levels, directions, materials, objects, unit }) {
+  if (name === "tile") return [[null, `A colour for each of ${tiles.length} tiles`]];
+  if (name === "level") {
+    return levels.map(({ level, distance }) => {
+      const until = distance === null ? null : `up to ${Number(distance.toPrecision(2))} ${unitName(unit)}`;
+      const text = until ? `${level ? "" : ", finest"}: ${until}` : levels.length > 1 ? ": beyond" : "";
+      return [levelColour(level), `level ${level}${text}`];
+    });
+  }
   if (name === "order") {
-    return [[SORTED, "sorted as seen from here"], [null, `else one of ${manifest.directions.length} orders that were sorted beforehand, a colour each`]];
+    const others = `else one of ${directions.length} orders that were sorted beforehand, a colour each`;
+    return [[SORTED, "sorted as seen from here"], [null, others]];
   }
   if (name === "uncertainty") {
-    const [low, high] = uncertaintyRange(manifest.tiles);
+    const [low, high] = uncertaintyRange(tiles);
     if (low === high) return [[uncertaintyColour(0.5), `${low.toPrecision(2)}, all tiles alike`]];
     return Array.from({ length: STEPS }, (_, k) => {
       const text = k === 0 ? `${low.toPrecision(2)}, sure` : k === STEPS - 1 ? `${high.toPrecision(2)}, unsure` : "";
@@ -73,12 +82,50 @@ function entriesOf(name, manifest) {
     });
   }
   /** @type {[number[], string][]} */
-  const named = manifest.materials.map((material, m) => [materialColour(m), material.name]);
-  return manifest.objects?.length ? [...named, [materialColour(OBJECTS), "objects"]] : named;
+  const named = materials.map((material, m) => [materialColour(m), material.name]);
+  return objects?.length ? [...named, [materialColour(OBJECTS), "objects"]] : named;
 }
 
-/** @param {Manifest} manifest @param {number} level @param {number | null} distance */
-function levelText({ levels, unit }, level, distance) {
-  if (distance !== null) return `level ${level}${level ? "" : ", finest"}: up to ${Number(distance.toPrecision(2))} ${unitName(unit)}`;
-  return `level ${level}${levels.length > 1 ? ": beyond" : ""}`;
+/** Tell the values under the pointer while an overlay is shown. @param {import("./viewer.js").Viewer} viewer */
+export function tellValues(viewer) {
+  const { canvas } = viewer;
+  /** @type {{ clientX: number, clientY: number } | null} */
+  let pointer = null;
+  const tell = () => {
+    const { scene } = viewer;
+    if (viewer.overlay === 0 || !scene || !pointer) return;
+    const across = pointer.clientX / canvas.clientWidth, down = pointer.clientY / canvas.clientHeight;
+    viewer.hud.legend.tell(valuesAt(scene, viewer.camera(scene), across, down));
+  };
+  for (const name of /** @type {const} */ (["pointermove", "pointerdown"])) {
+    canvas.addEventListener(name, (event) => {
+      pointer = event;
+      tell();
+    });
+  }
+  canvas.addEventListener("pointerleave", () => (pointer = null));
+  setInterval(tell, 250); // the ground moves on and is refined under a pointer at rest
+}
+
+/**
+ * Tile, finest level and order that are drawn at a point of the picture; null: there is no ground.
+ *
+ * @param {import("./viewer.js").Scene} scene @param {import("../terrain/camera.js").Camera} camera
+ * @param {number} across @param {number} down
+ * @returns {Under | null}
+ */
+function valuesAt({ manifest, heights, lift, frame }, camera, across, down) {
+  const farthest = REACH * manifest.tile_side;
+  const place = hitGround(camera.eye, rayThrough(camera, across, down), heights, { lift, farthest });
+  if (!place) return null;
+  const { i, j, tile } = tileUnder(manifest, heights, place[0], place[1]), point = pointAt(heights, place[0], place[1]);
+  const distance = Math.hypot(...point.map((v, k) => v - camera.eye[k]));
+  for (let k = 0; frame && k < frame.drawn.length; k += 6) {
+    const [di, dj, , lo, hi, order] = frame.drawn.subarray(k, k + 6);
+    if (frame.i0 + di !== i || frame.j0 + dj !== j) continue;
+    let level = lo;
+    while (level < hi && distance > frame.switches[level]) level += 1;
+    return { tile, level, order: order === NO_ORDER ? null : order };
+  }
+  return { tile, level: null, order: null };
 }

@@ -2,8 +2,8 @@
 
 import { tileColour } from "../draw/overlays.js";
 import { tileUnder } from "../terrain/cells.js";
-import { element, takesLetters } from "./dom.js";
-import { unitName } from "./numbers.js";
+import { cssColour, element, listenToKeys } from "./dom.js";
+import { unitName } from "./legend.js";
 import { moveTo } from "./walker.js";
 
 const CELLS = 9; // along a side
@@ -25,14 +25,12 @@ export function createMinimap(viewer) {
     const { manifest, walker, heights } = scene, side = manifest.tile_side, [west, south] = corner(walker, side);
     pen.fillStyle = PAPER;
     pen.fillRect(0, 0, map.width, map.height);
-    pen.font = "11px system-ui, sans-serif";
-    pen.textAlign = "center";
-    pen.textBaseline = "middle";
+    Object.assign(pen, { font: "11px system-ui, sans-serif", textAlign: "center", textBaseline: "middle" });
     for (let j = Math.floor(south); j < south + CELLS; j++) {
       for (let i = Math.floor(west); i < west + CELLS; i++) {
         const { tile } = tileUnder(manifest, heights, (i + 0.5) * side, (j + 0.5) * side);
         const left = (i - west) * unit, top = map.height - (j + 1 - south) * unit;
-        pen.fillStyle = `rgb(${tileColour(tile).map((v) => Math.round(140 * v)).join(" ")})`;
+        pen.fillStyle = cssColour(tileColour(tile), 140);
         pen.fillRect(left + 0.5, top + 0.5, unit - 1, unit - 1);
         pen.fillStyle = INK;
         pen.fillText(String(tile), left + unit / 2, top + unit / 2);
@@ -52,9 +50,9 @@ export function createMinimap(viewer) {
   };
   button.addEventListener("click", toggle);
   addEventListener("keydown", (event) => {
-    if (event.code === "Escape" && !map.hidden && !event.defaultPrevented) return toggle();
-    if (event.code === "KeyN" && !event.ctrlKey && !event.metaKey && !event.altKey && !takesLetters(event.target)) toggle();
+    if (event.code === "Escape" && !map.hidden && !event.defaultPrevented) toggle();
   });
+  listenToKeys({ KeyN: toggle });
   map.addEventListener("click", ({ offsetX, offsetY }) => {
     const { scene } = viewer;
     if (!scene) return;
@@ -69,19 +67,12 @@ export function createMinimap(viewer) {
 
 /** @param {CanvasRenderingContext2D} pen @param {number} middle @param {number} yaw */
 function drawWalker(pen, middle, yaw) {
+  const arrow = new Path2D("M12 0-8 7-4 0-8-7Z");
   pen.save();
   pen.translate(middle, middle);
   pen.rotate(-yaw);
-  pen.beginPath();
-  pen.moveTo(12, 0);
-  pen.lineTo(-8, 7);
-  pen.lineTo(-4, 0);
-  pen.lineTo(-8, -7);
-  pen.closePath();
-  pen.fillStyle = INK;
-  pen.strokeStyle = "#000000";
-  pen.lineWidth = 1.5;
-  pen.fill();
-  pen.stroke();
+  Object.assign(pen, { fillStyle: INK, strokeStyle: "#000000", lineWidth: 1.5 });
+  pen.fill(arrow);
+  pen.stroke(arrow);
   pen.restore();
 }

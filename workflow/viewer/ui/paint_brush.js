@@ -1,6 +1,6 @@
 // The brush: strokes of a pointer or of the space bar on the ground, and the ring that shows where it is.
 
-import { hitGround, projectPoint, rayThrough } from "../terrain/ray.js";
+import { hitGround, projectPoint, rayThrough } from "../terrain/camera.js";
 import { element, isField } from "./dom.js";
 
 /**
@@ -13,10 +13,7 @@ const DENSEST = 0.5, MOST_DABS = 64; // of a stroke between two events: radii fr
 export const ERASER = -1;
 export const SIZES = { least: 0.2, first: 0.6, most: 4 }; // radius, in tile sides
 
-/**
- * @param {Viewer} viewer
- * @param {(trouble: "far" | "full" | "sky" | null) => void} onDab
- */
+/** @param {Viewer} viewer @param {(trouble: "far" | "full" | "sky" | null) => void} onDab */
 export function createBrush(viewer, onDab) {
   const svg = element("brush", SVGElement), ring = svg.querySelectorAll("polygon");
   let at = [0.5, 0.5]; // of the picture

@@ -1,8 +1,7 @@
 // Painted materials that are kept: in the page's address, or as a file.
 
-import { isPaint, describePaint, MAX_FILE, readPaint } from "../data/paint.js";
-import { decodePaint, encodePaint, MAX_LINK } from "../data/paint_link.js";
-import { PageError } from "../data/errors.js";
+import { PageError } from "../data/checks.js";
+import { decodePaint, describePaint, encodePaint, MAX_FILE, MAX_LINK, readPaint } from "../data/paint.js";
 import { saveFile } from "./dom.js";
 
 /**
@@ -55,8 +54,7 @@ export function createPaintKeep(viewer, onLink) {
     /**
      * Paint what a link holds; "": nothing. Throws a PageError.
      *
-     * @param {string} text
-     * @param {boolean} [undoable]
+     * @param {string} text @param {boolean} [undoable]
      */
     async follow(text, undoable = true) {
       const { scene } = viewer;
@@ -77,17 +75,15 @@ export function createPaintKeep(viewer, onLink) {
       const { scene } = viewer;
       if (scene) scene.painting.load(readPaint(value, scene.manifest));
     },
-    isPaint,
-    /** Read a file that a person has chosen. Throws a PageError. @param {File} file */
-    async open(file) {
-      if (file.size > MAX_FILE) throw new PageError(`${file.name} is too large for painted materials.`);
-      let value;
-      try {
-        value = JSON.parse(await file.text());
-      } catch {
-        throw new PageError(`${file.name} is not readable as JSON. Open a file that “Save” has saved here.`);
-      }
-      this.load(value);
-    },
   };
+}
+
+/** The JSON of a file that a person has chosen. Throws a PageError. @param {File} file @returns {Promise<unknown>} */
+export async function readPaintFile(file) {
+  if (file.size > MAX_FILE) throw new PageError(`${file.name} is too large for painted materials.`);
+  try {
+    return JSON.parse(await file.text());
+  } catch {
+    throw new PageError(`${file.name} is not readable as JSON. Open a file that “Save” has saved here.`);
+  }
 }

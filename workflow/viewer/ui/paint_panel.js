@@ -1,15 +1,14 @@
-// The panel of materials: brushes, history, densities and shares, links and files.
+// The panel of materials: brushes, history, densities of objects, links and files.
 
+import { DENSITY_STEPS, MAX_DENSITY } from "../data/paint.js";
 import { MAX_PAINTED } from "../terrain/painted.js";
-import { element, isField, swatch } from "./dom.js";
+import { createPanel, cssColour, element, isField, swatch } from "./dom.js";
 import { createBrush, ERASER, SIZES } from "./paint_brush.js";
-import { createPaintKeep } from "./paint_keep.js";
-import { addDensities, addShares } from "./paint_sliders.js";
-import { createPanel } from "./panel.js";
+import { createPaintKeep, readPaintFile } from "./paint_keep.js";
 
 /**
  * @typedef {import("./viewer.js").Viewer} Viewer
- * @typedef {ReturnType<typeof createPaintPanel>} PaintPanel
+ * @typedef {import("./painting.js").Painting} Painting
  */
 
 const TROUBLES = {
@@ -53,7 +52,7 @@ export function createPaintPanel(viewer) {
     const label = document.createElement("label"), radio = document.createElement("input");
     Object.assign(radio, { type: "radio", name: "brush", value });
     radio.addEventListener("change", () => choose(value));
-    label.append(radio, ...colour ? [swatch(colour)] : [], name);
+    label.append(radio, ...colour ? [swatch(cssColour(colour))] : [], name);
     label.title = `${name} (${key})`;
     brushes.append(label);
   }
@@ -82,7 +81,7 @@ export function createPaintPanel(viewer) {
   open.addEventListener("click", () => file.click());
   file.addEventListener("change", guarded(async () => {
     const chosen = file.files?.[0];
-    if (chosen) await keep.open(chosen).finally(() => (file.value = ""));
+    if (chosen) keep.load(await readPaintFile(chosen).finally(() => (file.value = "")));
   }));
   size.addEventListener("input", () => {
     brush.radius = Number(size.value);
@@ -106,11 +105,6 @@ export function createPaintPanel(viewer) {
       else choose(LOOK);
     } else if (event.code === "KeyX") choose(String(ERASER));
     else if (/^Digit[1-8]$/.test(event.code)) choose(String(Number(event.code[5]) - 1));
-    else if (event.code === "BracketLeft" || event.code === "BracketRight") {
-      if (event.code === "BracketLeft") size.stepDown(2);
-      else size.stepUp(2);
-      size.dispatchEvent(new Event("input"));
-    }
   });
 
   return {
@@ -134,8 +128,34 @@ export function createPaintPanel(viewer) {
       addBrush(String(ERASER), "eraser", "X", null);
       choose(LOOK);
       element("brushBox", HTMLElement).hidden = materials.length < 2;
-      refreshers = [...addDensities(manifest, painting), ...addShares(manifest, painting)];
+      const box = element("densities", HTMLElement);
+      element("densityBox", HTMLElement).hidden = !objects.length;
+      box.replaceChildren();
+      refreshers = objects.map(({ name, material }, k) => (
+        addDensity(box, materials.length > 1 ? `${name} on ${materials[material].name}` : name, painting, k)));
       update();
     },
+  };
+}
+
+/**
+ * A slider of an object's density. Returns: a function that brings it up to date.
+ *
+ * @param {HTMLElement} box @param {string} name @param {Painting} painting @param {number} object
+ */
+function addDensity(box, name, painting, object) {
+  const label = document.createElement("label"), title = document.createElement("span"), step = 1 / DENSITY_STEPS;
+  const input = document.createElement("input"), output = document.createElement("output");
+  Object.assign(input, { type: "range", min: 0, max: MAX_DENSITY, step });
+  [title.textContent, title.className] = [name, "name"];
+  label.append(title, input, output);
+  box.append(label);
+  for (const kind of ["input", "change"]) { // the second when it is let go
+    input.addEventListener(kind, () => painting.setDensity(object, Number(input.value), kind === "change"));
+  }
+  return () => {
+    const value = painting.densities[object];
+    output.textContent = `${value.toFixed(2)}×`;
+    if (document.activeElement !== input || Math.abs(Number(input.value) - value) > step) input.value = String(value);
   };
 }

@@ -1,18 +1,26 @@
-// The bar: overlays, a picture to keep, the link; and the fly path behind it.
+// The bar: overlays, the picture to save and the link to share; and the ways to go in the menu.
 
 import { OVERLAYS, TITLES } from "../draw/overlays.js";
-import { element, saveFile, takesLetters } from "./dom.js";
-import { tellValues } from "./pointer_values.js";
-import { createSaving } from "./saving.js";
-import { sharePlace } from "./share.js";
+import { replaceAddress } from "./address.js";
+import { element, listenToKeys, saveFile } from "./dom.js";
+import { tellValues } from "./legend.js";
+import { MODES, moveTo } from "./walker.js";
 
 /**
- * @param {import("./viewer.js").Viewer} viewer
- * @param {import("./paint_keep.js").PaintKeep} paint
+ * @typedef {import("./viewer.js").Viewer} Viewer
+ * @typedef {import("./paint_keep.js").PaintKeep} PaintKeep
  */
-export function listenToTools(viewer, paint) {
-  const { flyPath, hud } = viewer, overlay = element("overlay", HTMLSelectElement);
-  const [record, play, save] = ["record", "play", "save"].map((id) => element(id, HTMLButtonElement));
+
+const EVERY = 200; // milliseconds between updates of the progress of saving
+const TOO_LONG = "What is painted is too much for a link. Save it as a file.";
+const SAYS = {
+  walk: "Walking", fly: "Flying: forward is where you look", orbit: "Orbiting: drag to turn about what you look at",
+};
+
+/** @param {Viewer} viewer @param {PaintKeep} paint @param {import("./walker.js").Walker} walker */
+export function listenToTools(viewer, paint, walker) {
+  const overlay = element("overlay", HTMLSelectElement), save = createSaving(viewer);
+  const share = () => sharePlace(viewer, paint), modes = [...element("modes", HTMLElement).querySelectorAll("input")];
   for (const [k, name] of OVERLAYS.entries()) overlay.add(new Option(TITLES[k], name));
   let pointed = false; // the list was opened by a pointer: letters are commands again after the choice
   overlay.addEventListener("pointerdown", () => (pointed = true));
@@ -21,36 +29,69 @@ export function listenToTools(viewer, paint) {
     viewer.showOverlay(overlay.selectedIndex);
     if (pointed) overlay.blur();
   });
+  /** Choose a way to go; who walks again stands on the ground. @param {number} number */
+  const choose = (number) => {
+    const mode = MODES[number % MODES.length];
+    if (mode === "walk" && walker.mode !== "walk") {
+      moveTo(walker, { eye: walker.floor });
+      viewer.redraw();
+    }
+    walker.mode = mode;
+    for (const radio of modes) radio.checked = radio.value === mode;
+    viewer.hud.say(SAYS[mode]);
+  };
+  for (const [k, radio] of modes.entries()) radio.addEventListener("change", () => choose(k));
   tellValues(viewer);
-  const update = () => {
-    record.textContent = flyPath.mode === "record" ? "Stop recording" : "Record";
-    play.textContent = flyPath.mode === "play" ? "Stop playing" : "Play";
-    play.disabled = save.disabled = !flyPath.path.length;
-  };
-  /** @param {"record" | "play"} mode */
-  const toggle = (mode) => {
-    if (flyPath.mode === mode) flyPath.stop();
-    else flyPath[mode]();
-    viewer.redraw();
-    update();
-    if (flyPath.mode === "record") hud.say("Recording: walk, and press R to stop.");
-  };
-  const savePath = () =>
-    saveFile(new Blob([JSON.stringify(flyPath, null, 1)], { type: "application/json" }), "-flight.json");
-  const savePicture = createSaving(viewer), share = () => sharePlace(viewer, paint);
-  record.addEventListener("click", () => toggle("record"));
-  play.addEventListener("click", () => toggle("play"));
-  save.addEventListener("click", savePath);
+  element("keep", HTMLButtonElement).addEventListener("click", save);
   element("copyLink", HTMLButtonElement).addEventListener("click", share);
-  /** @type {Record<string, () => void>} */
-  const keys = {
-    KeyR: () => toggle("record"), KeyP: () => toggle("play"), KeyC: savePicture, KeyL: share, KeyI: hud.numbers.toggle,
+  listenToKeys({
+    KeyC: save, KeyL: share, KeyI: viewer.hud.numbers.toggle,
     KeyO: () => viewer.showOverlay((viewer.overlay + 1) % OVERLAYS.length),
-  };
-  addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || takesLetters(event.target)) return;
-    keys[event.code]?.();
+    KeyV: () => choose(MODES.indexOf(walker.mode) + 1),
   });
-  setInterval(update, 250);
-  update();
+}
+
+/** A function that saves the finest picture of this place, which takes a slow device a while. @param {Viewer} viewer */
+function createSaving(viewer) {
+  const button = element("keep", HTMLButtonElement);
+  let busy = false;
+  return async () => {
+    if (busy) return;
+    busy = true;
+    button.setAttribute("aria-busy", "true");
+    const timer = setInterval(() => {
+      const done = Math.round(100 * viewer.resting.done);
+      viewer.hud.say(`Saving the picture: ${done} %. It is taken where you stand still.`);
+    }, EVERY);
+    try {
+      saveFile(await viewer.takePicture(), ".png");
+      viewer.hud.say("The picture is saved.");
+    } catch (error) {
+      viewer.fail(error);
+    } finally {
+      clearInterval(timer);
+      button.removeAttribute("aria-busy");
+      busy = false;
+    }
+  };
+}
+
+/** Share the address, as the device does it or on the clipboard. @param {Viewer} viewer @param {PaintKeep} paint */
+async function sharePlace(viewer, paint) {
+  const link = await paint.findLink();
+  if (link === null) return viewer.hud.say(TOO_LONG);
+  const address = new URL(location.href);
+  address.hash = viewer.address(link);
+  replaceAddress(address.hash);
+  try {
+    if (document.documentElement.classList.contains("touch") && navigator.share) {
+      await navigator.share({ title: document.title, url: address.href });
+      return;
+    }
+    await navigator.clipboard.writeText(address.href);
+    viewer.hud.say("The link to this place is copied.");
+  } catch (error) {
+    const { name } = /** @type {Error} */ (error);
+    if (name !== "AbortError") viewer.hud.say("The link to this place is in the address bar.");
+  }
 }

@@ -1,12 +1,12 @@
 // The tour: a flight over the terrain without anybody at the controls. It winds, sinks and rises slowly, stays above what
 // lies ahead, and goes on until somebody touches anything.
 
+import { element, listenToKeys } from "./dom.js";
 import { goBy, moveTo } from "./walker.js";
 
 /**
  * @typedef {import("./walker.js").Walker} Walker
  * @typedef {{ at: (x: number, y: number) => number[] }} Surface
- * @typedef {ReturnType<typeof createTour>} Tour
  */
 
 const LOW = 1.3, HIGH = 5; // heights over the ground ahead, in lowest eyes
@@ -37,9 +37,7 @@ export function createTour() {
     /**
      * Go on for some seconds. Returns: did the walker move?
      *
-     * @param {Walker} walker
-     * @param {Surface} surface
-     * @param {number} seconds
+     * @param {Walker} walker @param {Surface} surface @param {number} seconds
      */
     step(walker, surface, seconds) {
       if (!on) return false;
@@ -73,3 +71,35 @@ export function createTour() {
 
 /** From 0 to 1 with no jolt at either end. @param {number} t */
 const smooth = (t) => t * t * (3 - 2 * t);
+
+/**
+ * The tour's button and key. Any input ends it. `?tour` in the address begins it, except where the
+ * system asks for less motion.
+ *
+ * @param {import("./viewer.js").Viewer} viewer @param {() => void} closePanels
+ */
+export function listenToTour(viewer, closePanels) {
+  const { tour, hud } = viewer, button = element("tour", HTMLButtonElement);
+  const stop = () => {
+    if (!tour.on) return;
+    tour.stop();
+    hud.say("The tour ends here: walk on.");
+  };
+  const start = () => {
+    const { scene } = viewer;
+    if (!scene) return;
+    tour.start(scene.walker, scene.heights);
+    closePanels();
+    hud.say("A tour. Any key or touch ends it.");
+  };
+  button.addEventListener("click", start); // which no pointer reaches without ending the last one
+  for (const kind of ["keydown", "pointerdown", "wheel", "drop"]) {
+    const end = (/** @type {Event} */ event) => {
+      if (!(event instanceof KeyboardEvent && event.code === "KeyT")) stop(); // its own key ends it below
+    };
+    addEventListener(kind, end, { capture: true, passive: true });
+  }
+  listenToKeys({ KeyT: () => (tour.on ? stop() : start()) });
+  const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  if (new URLSearchParams(location.search).has("tour") && !calm) start();
+}

@@ -1,27 +1,24 @@
 // The viewer: an open bundle, the walker in it, and what the worker and the GPU make of both.
 
-import { PageError } from "../data/errors.js";
+import { PageError } from "../data/checks.js";
 import { listChunks } from "../data/layout.js";
-import { BUDGET, createFramePacing } from "../draw/frame_pacing.js";
-import { createFrameStats } from "../draw/frame_stats.js";
 import { OVERLAYS } from "../draw/overlays.js";
+import { BUDGET, createFramePacing, createFrameStats } from "../draw/pacing.js";
 import { createRenderer } from "../draw/renderer.js";
-import { backdropOptions } from "../scene/backdrop_options.js";
-import { listDrawnCells } from "../scene/drawn_cells.js";
-import { openTerrain, readTerrain } from "../scene/open_terrain.js";
+import { backdropOptions, listDrawnCells, openTerrain, readTerrain } from "../scene/open_terrain.js";
 import { cameraAt } from "../terrain/camera.js";
 import { tileUnder } from "../terrain/cells.js";
 import { formatAddress, parseOverlay, parsePlace } from "./address.js";
 import { element } from "./dom.js";
-import { createFlyPath } from "./fly_path.js";
+import { createResting } from "./frame_loop.js";
 import { createPainting } from "./painting.js";
-import { createResting } from "./resting.js";
 import { createTour } from "./tour.js";
 import { createWalker, moveTo } from "./walker.js";
 
 /**
  * @typedef {import("../data/source.js").Source} Source
  * @typedef {import("./walker.js").Walker} Walker
+ * @typedef {import("../draw/renderer.js").SlicedPicture} SlicedPicture
  *
  * An open bundle. renderer: null while the graphics context is lost; frame: the worker's last; coarse: chunks of the
  * coarsest level that have arrived.
@@ -50,13 +47,10 @@ export class Viewer {
   /** @type {string | null} */
   error = null;
   overlay = 0;
-  split = 0; // share of the picture, from the left, without the overlay
   dirty = true; // the picture must be drawn again
   stale = true; // the worker must be asked again
-  suspended = false; // something else has the worker and the GPU: the frame loop rests
   pacing = createFramePacing();
   stats = createFrameStats();
-  flyPath = createFlyPath();
   tour = createTour();
   resting = createResting(this);
   /** @type {Walker | null} */
@@ -65,10 +59,8 @@ export class Viewer {
   #restored = Promise.resolve(); // pending while the graphics context is lost
 
   /**
-   * @param {HTMLCanvasElement} canvas
-   * @param {import("../draw/gl.js").GL} gl
-   * @param {import("./hud.js").Hud} hud
-   * @param {Options} options
+   * @param {HTMLCanvasElement} canvas @param {import("../draw/gl.js").GL} gl
+   * @param {import("./hud.js").Hud} hud @param {Options} options
    */
   constructor(canvas, gl, hud, options) {
     this.canvas = canvas;
@@ -116,7 +108,7 @@ export class Viewer {
       this.overlay = parseOverlay(location.hash);
       this.options.onFirstScene(walker);
     }
-    this.hud.showTools();
+    element("tools", HTMLElement).hidden = false;
     this.#showLegend();
     this.drawFrame(); // sky and far ground at once
     await this.options.onScene(this.scene, first);
@@ -167,7 +159,7 @@ export class Viewer {
     this.#tellNumbers(scene, start);
   }
 
-  /** Begin the picture of the worker's last frame in slices. @param {import("../draw/sliced_picture.js").SlicedPicture} picture */
+  /** Begin the picture of the worker's last frame in slices. @param {SlicedPicture} picture */
   begin(picture) {
     const { scene } = this;
     if (!scene) return;
@@ -176,7 +168,7 @@ export class Viewer {
     this.dirty = false;
   }
 
-  /** Show a picture that was drawn in slices. @param {import("../draw/sliced_picture.js").SlicedPicture} picture */
+  /** Show a picture that was drawn in slices. @param {SlicedPicture} picture */
   show(picture) {
     const { scene } = this;
     if (!scene) return;
@@ -193,7 +185,7 @@ export class Viewer {
 
   /** @param {Scene} scene @param {import("../terrain/camera.js").Camera} camera */
   drawOptions(scene, camera) {
-    return { ...backdropOptions(scene, scene.frame, camera), overlay: this.overlay, split: this.split };
+    return { ...backdropOptions(scene, scene.frame, camera), overlay: this.overlay };
   }
 
   /** @param {Scene} scene @param {number} now */

@@ -49,8 +49,7 @@ export function createWalker({ tile_side: side, eye_floor: floor, heights }, pla
 /**
  * Change any parts of the place, within bounds; what is not a finite number, or beyond all bounds, stays as it was.
  *
- * @param {Walker} walker
- * @param {Partial<Place>} place
+ * @param {Walker} walker @param {Partial<Place>} place
  */
 export function moveTo(walker, place) {
   for (const key of PLACE_KEYS) {
@@ -66,34 +65,21 @@ export function moveTo(walker, place) {
 /**
  * Move by the held keys for some seconds. Returns: did anything change?
  *
- * @param {Walker} walker
- * @param {number} seconds
+ * @param {Walker} walker @param {number} seconds
  */
 export function stepWalker(walker, seconds) {
-  /** @param {Action} action */
-  const on = (action) => Number(walker.held.has(action));
-  return moveBy(walker, {
-    forward: on("forward") - on("back"), right: on("right") - on("left"), turn: on("turnLeft") - on("turnRight"),
-    tilt: 0, rise: on("higher") - on("lower"), run: on("run"),
-  }, seconds);
-}
-
-/**
- * Move as somebody wants to for some seconds; all wishes from -1 to 1. Returns: did anything change?
- *
- * @param {Walker} walker
- * @param {{ forward: number, right: number, turn: number, tilt: number, rise: number, run: number }} wish
- * @param {number} seconds
- */
-export function moveBy(walker, { forward, right, turn, tilt, rise, run }, seconds) {
-  if (!forward && !right && !turn && !rise && !tilt) return false;
+  /** @param {Action} more @param {Action} less */
+  const push = (more, less) => Number(walker.held.has(more)) - Number(walker.held.has(less));
+  const forward = push("forward", "back"), right = push("right", "left");
+  const turn = push("turnLeft", "turnRight"), rise = push("higher", "lower");
+  if (!forward && !right && !turn && !rise) return false;
   const yaw = (walker.yaw * Math.PI) / 180, pitch = walker.mode === "fly" ? (walker.pitch * Math.PI) / 180 : 0;
-  const stride = (SPEED * walker.eye * seconds * (1 + (RUN - 1) * run)) / Math.max(1, Math.hypot(forward, right));
-  const along = forward * Math.cos(pitch);
-  goBy(walker, stride * (along * Math.cos(yaw) + right * Math.sin(yaw)), stride * (along * Math.sin(yaw) - right * Math.cos(yaw)));
+  const speed = SPEED * walker.eye * (walker.held.has("run") ? RUN : 1);
+  const stride = (speed * seconds) / Math.max(1, Math.hypot(forward, right)), along = forward * Math.cos(pitch);
+  const east = along * Math.cos(yaw) + right * Math.sin(yaw), north = along * Math.sin(yaw) - right * Math.cos(yaw);
+  goBy(walker, stride * east, stride * north);
   moveTo(walker, {
     yaw: walker.yaw + turn * TURN * seconds,
-    pitch: walker.pitch + tilt * TURN * seconds,
     eye: walker.eye * Math.exp(rise * RISE * seconds) + stride * forward * Math.sin(pitch),
   });
   return true;

@@ -3,9 +3,9 @@
 // times: a chunk that is evicted after its last reading is lost, and a coarser level is drawn instead.
 
 import { CACHE_BYTES, chunkKey, CODE_SHIFT, ROW } from "../data/layout.js";
-import { parseChunk } from "../data/records.js";
+import { parseChunk } from "../data/layout.js";
+import { createPagePool } from "../terrain/caches.js";
 import { RIM } from "../terrain/frustum.js";
-import { createPagePool } from "./page_pool.js";
 
 const MOST_READS = 3;
 export const WISHED = 0.5; // added to the stamp of chunks that a view needs: they outlive what stands in for them
@@ -19,8 +19,7 @@ export const WISHED = 0.5; // added to the stamp of chunks that a view needs: th
 
 /**
  * @param {import("./terrain_tables.js").TerrainTables} terrain
- * @param {import("../data/manifest.js").Manifest} manifest
- * @param {number} rows
+ * @param {import("../data/manifest.js").Manifest} manifest @param {number} rows
  * @param {(tile: number) => void} onEvict
  */
 export function createChunkStore(terrain, { encoding }, rows, onEvict) {
@@ -57,9 +56,7 @@ export function createChunkStore(terrain, { encoding }, rows, onEvict) {
   /**
    * Rows for a chunk, or null if everything else was used at this stamp or later.
    *
-   * @param {number} key
-   * @param {{ count: number, buffer: ArrayBuffer }} chunk
-   * @param {number} stamp
+   * @param {number} key @param {{ count: number, buffer: ArrayBuffer }} chunk @param {number} stamp
    */
   const allocate = (key, { count, buffer }, stamp) => {
     while (bytes + buffer.byteLength > CACHE_BYTES) if (!evictOldest(stamp)) return null;
@@ -69,8 +66,7 @@ export function createChunkStore(terrain, { encoding }, rows, onEvict) {
     /**
      * Add a chunk. Returns: is there room for it? What is being drawn is evicted only for a chunk that the view needs.
      *
-     * @param {import("../data/bundle.js").Chunk} chunk
-     * @param {number} stamp
+     * @param {import("../data/bundle.js").Chunk} chunk @param {number} stamp
      */
     add(chunk, stamp) {
       const { tile, level, count, buffer } = chunk, key = chunkKey(tile, level);
@@ -95,20 +91,9 @@ export function createChunkStore(terrain, { encoding }, rows, onEvict) {
       this.touch(tile, level, needed ? stamp + WISHED : stamp);
       return true;
     },
-    /**
-     * A chunk that is at hand.
-     *
-     * @param {number} tile
-     * @param {number} level
-     */
+    /** A chunk that is at hand. @param {number} tile @param {number} level */
     get: (tile, level) => stored(chunkKey(tile, level)),
-    /**
-     * Mark a chunk as used.
-     *
-     * @param {number} tile
-     * @param {number} level
-     * @param {number} stamp
-     */
+    /** Mark a chunk as used. @param {number} tile @param {number} level @param {number} stamp */
     touch(tile, level, stamp) {
       const last = level === coarsest ? Infinity : stamp;
       stored(chunkKey(tile, level)).stamp = last;

@@ -6,17 +6,15 @@ import { lookUpCell, REACH } from "../terrain/cells.js";
 import { nearestOrder } from "../terrain/draw_order.js";
 import { placeObjects } from "../terrain/object_placement.js";
 import { bend, dot, FACES, rateOf } from "../terrain/sphere.js";
-import { cellMark, createBlockList, createPlaceList } from "./block_list.js";
-import { createBorders } from "./borders.js";
 import { createChunkStore, WISHED } from "./chunk_store.js";
+import { createDrawLists } from "./draw_lists.js";
 import { createNearSorter } from "./near_sort.js";
-import { adjustCover, paintPoints } from "./repaint.js";
-import { createSortedBatches } from "./sorted_batches.js";
-import { createTerrainTables } from "./terrain_tables.js";
+import { createBorders, createSortedBatches } from "./sorted_batches.js";
+import { adjustCover, createTerrainTables, paintPoints } from "./terrain_tables.js";
 
 /**
  * @typedef {import("../terrain/frustum.js").Cell} Cell
- * @typedef {import("../terrain/things.js").Thing} Thing
+ * @typedef {import("../terrain/scatter.js").Thing} Thing
  * @typedef {import("../terrain/camera.js").Camera} Camera
  * @typedef {import("./terrain_tables.js").TerrainTables} TerrainTables
  * @typedef {ReturnType<typeof placeObjects>} Groups
@@ -51,7 +49,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
   const borders = createBorders(terrain, store);
   const batches = createSortedBatches(store, terrain, borders, orderPages(manifest));
   const sortNear = createNearSorter(store, terrain, borders);
-  const blocks = createBlockList(), places = createPlaceList(terrain);
+  const lists = createDrawLists(terrain);
   const levels = new Uint16Array(terrain.tiles.length); // bits
   let stamp = 0;
   const ahead = { i0: 0, j0: 0, row: REACH + 1 }; // of the window about the eye, the next row to cover
@@ -80,8 +78,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
    * The cells of the near block, what the GPU knows of them, and the objects that are drawn with them: the nearest ones
    * as far as there are codes, and the rest.
    *
-   * @param {Cell[]} cells
-   * @param {Groups} groups
+   * @param {Cell[]} cells @param {Groups} groups
    */
   function gatherNear(cells, groups) {
     const close = [], marks = new Uint32Array(9), things = [];
@@ -89,8 +86,8 @@ export function createFrameBuilder(manifest, heights, pictures) {
       const cell = cells[k];
       if (!cell.close) continue;
       cell.direction = NO_ORDER;
-      if (cell.spot) places.addSpot(cell.spot, cellMark(cell, terrain)); // place k is that of the k-th close cell
-      else marks[(cell.dj + 1) * 3 + cell.di + 1] = cellMark(cell, terrain);
+      if (cell.spot) lists.addSpot(cell.spot, lists.mark(cell)); // place k is that of the k-th close cell
+      else marks[(cell.dj + 1) * 3 + cell.di + 1] = lists.mark(cell);
       close.push(cell);
       things.push(...groups[k] ?? NONE);
     }
@@ -102,9 +99,9 @@ export function createFrameBuilder(manifest, heights, pictures) {
       const many = thing.hi - thing.lo + 1;
       if (room < many) break;
       room -= many;
-      const mark = cellMark(thing, terrain);
+      const mark = lists.mark(thing);
       near.push({
-        thing, codes: Array.from({ length: many }, (_, l) => PLACES + places.add(thing, mark, thing.lo + l)),
+        thing, codes: Array.from({ length: many }, (_, l) => PLACES + lists.addThing(thing, mark, thing.lo + l)),
       });
     }
     return { close, marks, near, rest: things.slice(near.length).reverse() };
@@ -113,8 +110,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
   /**
    * Batches of the far cells, by index; made from the nearest on, which matter most when time is short.
    *
-   * @param {Cell[]} cells
-   * @param {number[]} eye
+   * @param {Cell[]} cells @param {number[]} eye
    * @param {import("./sorted_batches.js").IsLate} isLate
    */
   function getBatches(cells, eye, isLate) {
@@ -136,8 +132,8 @@ export function createFrameBuilder(manifest, heights, pictures) {
     for (let k = 0; k < things.length; k++) {
       const thing = things[k], batch = batches.get(thing, thing.order, stamp, isLate);
       if (!batch) continue;
-      const mark = cellMark(thing, terrain);
-      blocks.add(MIDDLE, mark, batch, 1 + places.add(thing, mark, thing.lo));
+      const mark = lists.mark(thing);
+      lists.addBatch(MIDDLE, mark, batch, 1 + lists.addThing(thing, mark, thing.lo));
     }
   }
 
@@ -153,9 +149,9 @@ export function createFrameBuilder(manifest, heights, pictures) {
   return {
     store,
     batches,
-    /** Gaussians so far that were tested for staying in a cell, sorted for an order of their chunk, and merged. */
+    /** Gaussians so far that were tested for staying in a cell, and that were sorted for a batch. */
     get work() {
-      return { tested: borders.tested, ...batches.work };
+      return { tested: borders.tested, sorted: batches.sorted };
     },
     /** @param {Int32Array} points see `paintPoints` */
     paint: (points) => paintPoints(terrain, points),
@@ -179,8 +175,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
     /**
      * The frame of a view.
      *
-     * @param {Camera} camera
-     * @param {number} budget
+     * @param {Camera} camera @param {number} budget
      * @param {boolean} patient make every batch, however long that takes
      * @returns {Frame}
      */
@@ -200,23 +195,23 @@ export function createFrameBuilder(manifest, heights, pictures) {
         return late;
       };
       touch(cells, groups);
-      blocks.clear();
-      places.clear();
+      lists.clear();
       const { close, marks, near: things, rest } = gatherNear(cells, groups);
       const made = getBatches(cells, eye, isLate);
       for (let k = 0; k < cells.length; k++) {
         const cell = cells[k], batch = made[k];
         if (cell.close) continue;
-        const mark = cellMark(cell, terrain);
-        if (batch && cell.spot) blocks.add(MIDDLE, mark, batch, 1 + places.addSpot(cell.spot, mark));
-        else if (batch) blocks.add(cell, mark, batch);
+        const mark = lists.mark(cell);
+        if (batch && cell.spot) lists.addBatch(MIDDLE, mark, batch, 1 + lists.addSpot(cell.spot, mark));
+        else if (batch) lists.addBatch(cell, mark, batch);
         addThings(groups[k] ?? NONE, isLate);
       }
       addThings(rest, isLate);
       const uploads = batches.takeUploads(), updated = performance.now();
       const near = sortNear(close, camera, selection, things);
       return {
-        ...selection, i0: terrain.sphere ? 0 : i0, j0: terrain.sphere ? 0 : j0, eye, near, marks, uploads, incomplete, blocks: blocks.copy(), places: places.copy(),
+        ...selection, ...lists.copy(), i0: terrain.sphere ? 0 : i0, j0: terrain.sphere ? 0 : j0, eye, near, marks,
+        uploads, incomplete,
         milliseconds: { update: updated - start, sort: performance.now() - updated },
       };
     },
@@ -226,10 +221,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
 /**
  * The order of a cell's batch: position among those that its finest drawn level keeps, which all its levels do.
  *
- * @param {Cell} cell
- * @param {TerrainTables} terrain
- * @param {number[]} eye
- * @param {number} i0
+ * @param {Cell} cell @param {TerrainTables} terrain @param {number[]} eye @param {number} i0
  * @param {number} j0
  */
 function orderOf(cell, { side, cache, z, directions, tiles, sphere }, eye, i0, j0) {
@@ -248,8 +240,7 @@ function orderOf(cell, { side, cache, z, directions, tiles, sphere }, eye, i0, j
  * The direction to a cell of a sphere as its own Gaussians have it, before they are bent: depths along it rise as those
  * along the direction from the eye to the tile's middle do.
  *
- * @param {import("../terrain/sphere.js").Sphere} sphere
- * @param {number} side
+ * @param {import("../terrain/sphere.js").Sphere} sphere @param {number} side
  * @param {import("../terrain/sphere_cells.js").Spot} spot
  * @param {number[]} z range of heights
  */

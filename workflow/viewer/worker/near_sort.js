@@ -2,15 +2,15 @@
 // there, with those of the objects that are drawn with its cells.
 
 import { CODE_SHIFT, MAX_LEVELS, SLOTS } from "../data/layout.js";
-import { createDepthSorter } from "../terrain/depth_sort.js";
+import { createRecentCache } from "../terrain/caches.js";
+import { createDepthSorter } from "../terrain/draw_order.js";
 import { frustumPlanes, RIM } from "../terrain/frustum.js";
 import { bend, FACES, rateOf } from "../terrain/sphere.js";
 import { STRETCH } from "../terrain/sphere_cells.js";
 
 /**
  * @typedef {import("../terrain/frustum.js").Cell} Cell
- * @typedef {import("../terrain/things.js").Thing} Thing
- * @typedef {import("../terrain/cells.js").Border} Border
+ * @typedef {import("../terrain/scatter.js").Thing} Thing
  * @typedef {import("../terrain/camera.js").Camera} Camera
  * @typedef {Pick<import("./terrain_tables.js").TerrainTables, "side" | "near" | "deviations" | "heights" | "sphere">} Tables
  * @typedef {{ centres: Float32Array, sizes: Uint8Array, entries: Uint32Array, count: number }} NearChunk
@@ -18,13 +18,14 @@ import { STRETCH } from "../terrain/sphere_cells.js";
  * An object in the block, and the codes of its levels from lo on.
  * @typedef {{ thing: Thing, codes: number[] }} NearThing
  *
- * Gaussians of one chunk in a cell: all of it, or those that stay. x, y, z: of the chunk's origin, from the eye; lift:
- * of the surface under each, if it is not level; size: factor on deviations.
- * @typedef {{ chunk: NearChunk, lift: Float32Array | null, x: number, y: number, z: number, size: number, code: number,
- *   begin: number, end: number }} Part
+ * Gaussians of one chunk in a cell: all of it, or those that stay. lift: of the surface under each, if it is not level;
+ * x, y, z: of the chunk's origin, from the eye; size: factor on deviations.
+ * @typedef {{ chunk: NearChunk, lift: Float32Array | null }} Placed
+ * @typedef {Placed & { x: number, y: number, z: number, size: number, code: number, begin: number, end: number }} Part
+ * @typedef {{ switches: number[], bands: number[] }} Distances
  */
 
-const CACHED = 256; // chunks in cells, and objects, whose heights or places are kept
+const CELLS = 256, THINGS = 512; // chunks in cells, and of objects, whose heights or places are kept
 const MARGIN = 0.65; // of the picture's side from its centre: where projections of farther splats are linearised
 const INDEX = (1 << CODE_SHIFT) - 1; // bits of an entry
 
@@ -32,85 +33,55 @@ const INDEX = (1 << CODE_SHIFT) - 1; // bits of an entry
  * A function that gives the entries of the close cells' Gaussians that have a weight and may reach into the picture,
  * back to front.
  *
- * @param {{ get: (tile: number, level: number) => NearChunk }} store
- * @param {Tables} terrain
- * @param {Pick<import("./borders.js").Borders, "keep">} borders
+ * @param {{ get: (tile: number, level: number) => NearChunk }} store @param {Tables} terrain
+ * @param {Pick<import("./sorted_batches.js").Borders, "keep">} borders
  */
 export function createNearSorter(store, terrain, borders) {
-  const sort = createDepthSorter(), findLift = createLiftCache(terrain), findTurned = createTurnCache(terrain);
-  const findKept = createKeptCache(borders), findBent = createBendCache(terrain);
+  const sort = createDepthSorter(), recallCell = createRecall(CELLS), recallThing = createRecall(THINGS);
   let depths = new Float32Array(0), candidates = new Uint32Array(0);
 
   /**
-   * The parts of a cell: its levels and materials.
+   * The parts of a cell: its levels and materials. place: of a cell on a sphere.
    *
-   * @param {Cell} cell
-   * @param {number[]} eye
-   * @param {{ switches: number[], bands: number[] }} distances
-   * @returns {Part[]}
+   * @param {Cell} cell @param {number} place @param {number[]} eye @param {Distances} distances
    */
-  function partsOfCell({ di, dj, tiles, border, lo, hi, whole: single }, eye, distances) {
-    const { side } = terrain, i = Math.floor(eye[0] / side) + di, j = Math.floor(eye[1] / side) + dj, parts = [];
-    const place = { x: i * side - eye[0], y: j * side - eye[1], z: -eye[2], size: 1 }, slot = (dj + 1) * 3 + di + 1;
+  function partsOfCell({ di, dj, tiles, border, lo, hi, whole, spot }, place, eye, distances) {
+    const { side } = terrain, slot = spot ? place : (dj + 1) * 3 + di + 1;
+    const i = spot ? di : Math.floor(eye[0] / side) + di, j = spot ? dj : Math.floor(eye[1] / side) + dj;
+    const [x, y, z] = spot ? spot.centre : [i * side - eye[0], j * side - eye[1], -eye[2]];
+    /** @type {Part[]} */
+    const parts = [];
     for (let level = lo; level <= hi; level++) {
-      const range = rangeOf(level, single, distances);
       for (const tile of tiles) {
-        const whole = store.get(tile, level), key = `${i},${j},${level},${tile},${border?.serial ?? 0}`;
-        const chunk = border ? findKept(key, border, tile, level, whole) : whole;
-        const lift = findLift(key, i, j, chunk), code = SLOTS + MAX_LEVELS * slot + level;
-        if (chunk.count) parts.push({ chunk, lift, ...place, code, begin: range.begin, end: range.end });
+        const all = store.get(tile, level), code = SLOTS + MAX_LEVELS * slot + level;
+        const placed = recallCell(`${i},${j},${level},${tile},${border?.serial ?? 0}`, all, () => {
+          const kept = border ? gather(all, borders.keep(border, tile, level)) : all;
+          return spot ? bendChunk(kept, spot, terrain) : { chunk: kept, lift: liftsUnder(kept, i, j, terrain) };
+        });
+        if (placed.chunk.count) parts.push({ ...placed, x, y, z, size: 1, code, ...rangeOf(level, whole, distances) });
       }
     }
     return parts;
   }
 
-  /**
-   * The parts of a cell of a sphere.
-   *
-   * @param {Cell} cell
-   * @param {import("../terrain/sphere_cells.js").Spot} spot
-   * @param {number} place
-   * @param {{ switches: number[], bands: number[] }} distances
-   * @returns {Part[]}
-   */
-  function partsOnSphere({ di, dj, tile, border, lo, hi, whole }, spot, place, distances) {
-    const [x, y, z] = spot.centre, parts = [];
-    for (let level = lo; level <= hi; level++) {
-      const all = store.get(tile, level), key = `${di},${dj},${level},${tile},${border?.serial ?? 0}`;
-      const chunk = findBent(key, spot, border ? findKept(key, border, tile, level, all) : all);
-      const code = SLOTS + MAX_LEVELS * place + level;
-      if (chunk.count) parts.push({ chunk, lift: null, x, y, z, size: 1, code, ...rangeOf(level, whole, distances) });
-    }
-    return parts;
-  }
-
-  /**
-   * The parts of an object: its levels.
-   *
-   * @param {NearThing} near
-   * @param {{ switches: number[], bands: number[] }} distances
-   * @returns {Part[]}
-   */
+  /** The parts of an object: its levels. @param {NearThing} near @param {Distances} distances @returns {Part[]} */
   function partsOfThing({ thing, codes }, distances) {
-    const { lo, whole, tile, to: [x, y, z], size } = thing;
+    const { lo, whole, tile, i, j, u, v, to: [x, y, z], size } = thing;
     return codes.map((code, k) => {
-      const chunk = findTurned(thing, lo + k, store.get(tile, lo + k));
-      const { begin, end } = rangeOf(lo + k, whole, distances);
-      return { chunk, lift: null, x, y, z, size, code, begin, end };
+      const level = lo + k, all = store.get(tile, level);
+      const placed = recallThing(`${i},${j},${u},${v},${level},${tile}`, all, () => turnChunk(all, thing, terrain));
+      return { ...placed, x, y, z, size, code, ...rangeOf(level, whole, distances) };
     });
   }
 
   /**
-   * @param {Cell[]} cells
-   * @param {Camera} camera
-   * @param {{ switches: number[], bands: number[] }} distances
-   * @param {NearThing[]} [things]
+   * @param {Cell[]} cells @param {Camera} camera
+   * @param {Distances} distances @param {NearThing[]} [things]
    */
   return function sortNear(cells, camera, distances, things = []) {
     const { near, deviations } = terrain, { eye, ahead } = camera;
     const [a0, b0, c0, across, a1, b1, c1, , a2, b2, c2, along, a3, b3, c3] = sidePlanes(camera, terrain);
-    const parts = cells.flatMap((cell, k) => (
-      cell.spot ? partsOnSphere(cell, cell.spot, k, distances) : partsOfCell(cell, eye, distances)));
+    const parts = cells.flatMap((cell, k) => partsOfCell(cell, k, eye, distances));
     parts.push(...things.flatMap((one) => partsOfThing(one, distances)));
     const most = parts.reduce((sum, { chunk }) => sum + chunk.count, 0);
     if (depths.length < most) [depths, candidates] = [new Float32Array(2 * most), new Uint32Array(2 * most)];
@@ -139,9 +110,8 @@ export function createNearSorter(store, terrain, borders) {
 /**
  * The distances between which a level has a weight.
  *
- * @param {number} level
- * @param {boolean} whole
- * @param {{ switches: number[], bands: number[] }} distances
+ * @param {number} level @param {boolean} whole
+ * @param {Distances} distances
  */
 const rangeOf = (level, whole, { switches, bands }) => ({
   begin: whole || !level ? 0 : Math.max(0, switches[level - 1] - bands[level - 1]),
@@ -149,110 +119,74 @@ const rangeOf = (level, whole, { switches, bands }) => ({
 });
 
 /**
- * Values by a key, with what they were made from; the most recent ones are kept.
+ * A function that recalls the most recent values by key, or makes one anew where it was made from another chunk.
  *
- * @template K, T
+ * @param {number} most
  */
-function createRecentCache() {
-  /** @type {Map<K, { from: unknown, value: T }>} */
-  const known = new Map();
-  /** @param {K} key @param {unknown} from @param {() => T} make */
+function createRecall(most) {
+  /** @type {ReturnType<typeof createRecentCache<string, Placed & { from: NearChunk }>>} */
+  const known = createRecentCache(most, () => 1);
+  /** @param {string} key @param {NearChunk} from @param {() => Placed} make */
   return (key, from, make) => {
-    const old = known.get(key), entry = old && old.from === from ? old : { from, value: make() };
-    known.delete(key);
-    known.set(key, entry); // the latest last
-    for (const oldest of known.keys()) {
-      if (known.size <= CACHED) break;
-      known.delete(oldest);
-    }
-    return entry.value;
+    const old = known.get(key);
+    return known.keep(key, old && old.from === from ? old : { ...make(), from });
+  };
+}
+
+/** A chunk's Gaussians that stay in a cell; null: all. @param {NearChunk} chunk @param {Uint32Array | null} kept */
+function gather(chunk, kept) {
+  if (!kept) return chunk;
+  const count = kept.length, centres = new Float32Array(3 * count);
+  for (let m = 0; m < 3 * count; m++) centres[m] = chunk.centres[3 * kept[Math.floor(m / 3)] + (m % 3)];
+  return {
+    centres, sizes: Uint8Array.from(kept, (k) => chunk.sizes[k]),
+    entries: Uint32Array.from(kept, (k) => chunk.entries[k]), count,
   };
 }
 
 /**
- * A function that gives the Gaussians of a chunk that stay in a cell.
+ * Heights of the surface under a chunk in a cell; null: level ground.
  *
- * @param {Pick<import("./borders.js").Borders, "keep">} borders
+ * @param {NearChunk} chunk @param {number} i @param {number} j @param {Tables} terrain
  */
-function createKeptCache(borders) {
-  const recall = /** @type {ReturnType<typeof createRecentCache<string, NearChunk>>} */ (createRecentCache());
-  /** @param {string} key @param {Border} border @param {number} tile @param {number} level @param {NearChunk} chunk */
-  return (key, border, tile, level, chunk) => recall(key, chunk, () => {
-    const kept = borders.keep(border, tile, level), count = kept ? kept.length : chunk.count;
-    if (!kept) return chunk;
-    const centres = new Float32Array(3 * count), sizes = new Uint8Array(count), entries = new Uint32Array(count);
-    for (let m = 0; m < count; m++) {
-      const k = kept[m];
-      for (let axis = 0; axis < 3; axis++) centres[3 * m + axis] = chunk.centres[3 * k + axis];
-      sizes[m] = chunk.sizes[k];
-      entries[m] = chunk.entries[k];
-    }
-    return { centres, sizes, entries, count };
-  });
+function liftsUnder({ centres, count }, i, j, { heights, side }) {
+  if (heights.kind === "flat") return null;
+  const lift = new Float32Array(count);
+  for (let k = 0; k < count; k++) lift[k] = heights.at(i * side + centres[3 * k], j * side + centres[3 * k + 1])[0];
+  return lift;
 }
 
 /**
- * A function that gives the heights of the surface under a chunk in a cell; null: level ground.
+ * The chunk of a cell on a sphere, from the place of the cell's middle on the ground.
  *
- * @param {Tables} terrain
+ * @param {NearChunk} chunk @param {import("../terrain/sphere_cells.js").Spot} spot @param {Tables} terrain
+ * @returns {Placed}
  */
-function createLiftCache({ heights, side }) {
-  const recall = /** @type {ReturnType<typeof createRecentCache<string, Float32Array>>} */ (createRecentCache());
-  /** @param {string} key @param {number} i @param {number} j @param {NearChunk} chunk */
-  return (key, i, j, chunk) => (heights.kind === "flat" ? null : recall(key, chunk, () => {
-    const { centres, count } = chunk, lift = new Float32Array(count);
-    for (let k = 0; k < count; k++) lift[k] = heights.at(i * side + centres[3 * k], j * side + centres[3 * k + 1])[0];
-    return lift;
-  }));
-}
-
-/**
- * A function that gives the chunk of a cell on a sphere, from the place of the cell's middle on the ground.
- *
- * @param {Tables} terrain
- */
-function createBendCache({ sphere, side }) {
-  const recall = /** @type {ReturnType<typeof createRecentCache<string, NearChunk>>} */ (createRecentCache());
+function bendChunk(chunk, { face, s, t }, { sphere, side }) {
+  const { centres, count } = chunk, out = new Float32Array(3 * count), made = [0, 0, 0], axes = FACES[face];
   const rate = sphere ? rateOf(sphere, side) : 0, half = 0.5 * side;
-  /** @param {string} key @param {import("../terrain/sphere_cells.js").Spot} spot @param {NearChunk} chunk */
-  return (key, { face, s, t }, chunk) => recall(key, chunk, () => {
-    const { centres, count } = chunk, out = new Float32Array(3 * count), made = [0, 0, 0], axes = FACES[face];
-    for (let k = 0; k < 3 * count; k += 3) {
-      bend(centres[k] - half, centres[k + 1] - half, centres[k + 2], s, t, sphere?.radius ?? 0, rate, made);
-      for (let c = 0; c < 3; c++) out[k + c] = made[0] * axes[0][c] + made[1] * axes[1][c] + made[2] * axes[2][c];
-    }
-    return { ...chunk, centres: out };
-  });
+  for (let k = 0; k < 3 * count; k += 3) {
+    bend(centres[k] - half, centres[k + 1] - half, centres[k + 2], s, t, sphere?.radius ?? 0, rate, made);
+    for (let c = 0; c < 3; c++) out[k + c] = made[0] * axes[0][c] + made[1] * axes[1][c] + made[2] * axes[2][c];
+  }
+  return { chunk: { ...chunk, centres: out }, lift: null };
 }
 
 /**
- * A function that gives the chunk of an object with its Gaussians on the surface, from the foot.
+ * The chunk of an object with its Gaussians on the surface, from the foot.
  *
- * @param {Tables} terrain
+ * @param {NearChunk} chunk @param {Thing} thing @param {Tables} terrain
+ * @returns {Placed}
  */
-function createTurnCache({ heights, side }) {
-  /** @typedef {{ from: NearChunk, value: NearChunk }[]} Levels */
-  const recall = /** @type {ReturnType<typeof createRecentCache<Thing, Levels>>} */ (createRecentCache());
-
-  /** @param {Thing} thing @param {NearChunk} chunk @returns {NearChunk} */
-  function turn({ i, j, u, v, cos, sin, size, h }, { centres, sizes, entries, count }) {
-    const out = new Float32Array(3 * count);
-    for (let k = 0; k < 3 * count; k += 3) {
-      const x = size * (cos * centres[k] - sin * centres[k + 1]);
-      const y = size * (sin * centres[k] + cos * centres[k + 1]);
-      out[k] = x;
-      out[k + 1] = y;
-      out[k + 2] = size * centres[k + 2] + heights.at((i + u) * side + x, (j + v) * side + y)[0] - h;
-    }
-    return { centres: out, sizes, entries, count };
+function turnChunk(chunk, { i, j, u, v, cos, sin, size, h }, { heights, side }) {
+  const { centres, count } = chunk, out = new Float32Array(3 * count);
+  for (let k = 0; k < 3 * count; k += 3) {
+    const x = size * (cos * centres[k] - sin * centres[k + 1]), y = size * (sin * centres[k] + cos * centres[k + 1]);
+    out[k] = x;
+    out[k + 1] = y;
+    out[k + 2] = size * centres[k + 2] + heights.at((i + u) * side + x, (j + v) * side + y)[0] - h;
   }
-
-  /** @param {Thing} thing @param {number} level @param {NearChunk} chunk */
-  return (thing, level, chunk) => {
-    const levels = recall(thing, null, () => []);
-    if (levels[level]?.from !== chunk) levels[level] = { from: chunk, value: turn(thing, chunk) };
-    return levels[level].value;
-  };
+  return { chunk: { ...chunk, centres: out }, lift: null };
 }
 
 /**
@@ -261,8 +195,7 @@ function createTurnCache({ heights, side }) {
  * of at most MARGIN of the picture's side over the focal length (draw/shaders.js): sqrt(1 + s^2) times a deviation,
  * which the surface's slope shears by less than 1 + slope.
  *
- * @param {Camera} camera
- * @param {Tables} terrain
+ * @param {Camera} camera @param {Tables} terrain
  */
 function sidePlanes(camera, { heights: { steepest }, sphere }) {
   const stretch = sphere ? STRETCH : 1 + steepest;

@@ -1,39 +1,79 @@
 // Sorted batches: the Gaussians of one tile or object, or of all tiles in a cell where materials meet, of one level or
-// of several merged, in one direction's order, as pages for the GPU. They are made when first needed and evicted when
+// of several together, in one direction's order, as pages for the GPU. They are made when first needed and evicted when
 // long unused.
 
-import { MAX_LEVELS, MAX_ORDERS, PAGE } from "../data/layout.js";
+import { chunkKey, MAX_LEVELS, MAX_ORDERS, PAGE } from "../data/layout.js";
+import { createPagePool, createRecentCache } from "../terrain/caches.js";
+import { createDepthSorter } from "../terrain/draw_order.js";
 import { materialAt } from "../terrain/scatter.js";
-import { createDepthOrders } from "./depth_orders.js";
-import { createPagePool } from "./page_pool.js";
-import { createRunMerger } from "./run_merge.js";
 
 /**
+ * @typedef {import("../terrain/cells.js").Border} Border
+ * @typedef {ReturnType<typeof createBorders>} Borders
+ *
  * What a batch is of: see Cell. A batch of a border is of that cell alone.
- * @typedef {{ tile: number, tiles: number[], border: import("../terrain/cells.js").Border | null, lo: number,
+ * @typedef {{ tile: number, tiles: number[], border: Border | null, lo: number,
  *   hi: number }} Source
  *
  * Is there no more time? spent: milliseconds of making batches of borders since `takeUploads`, ahead of the view too.
  * @typedef {(border: boolean, spent: number) => boolean} IsLate
  *
  * A batch: its pages, and the number of entries in them.
- * @typedef {import("./page_pool.js").PoolEntry} Batch
+ * @typedef {import("../terrain/caches.js").PoolEntry} Batch
  */
+
+const MOST_BYTES = 64e6; // of indices of Gaussians that stay, of all cells
+
+/**
+ * Which Gaussians of each tile stay in the cells where materials meet. That depends on the place alone, so it is found
+ * when first needed and kept while there is room.
+ *
+ * @param {Pick<import("./terrain_tables.js").TerrainTables, "keeper" | "each">} terrain
+ * @param {{ get: (tile: number, level: number) => { centres: Float32Array, count: number } }} store
+ * @param {number} [most] bytes
+ */
+export function createBorders({ keeper, each }, store, most = MOST_BYTES) {
+  /** @type {ReturnType<typeof createRecentCache<Border, number>>} */
+  const known = createRecentCache(most, (bytes) => bytes, (border) => border.kept.clear());
+  let tested = 0;
+  return {
+    /**
+     * Indices of a tile's Gaussians that stay in a cell; null: nothing goes anywhere.
+     *
+     * @param {Border} border @param {number} tile @param {number} level
+     */
+    keep(border, tile, level) {
+      const key = chunkKey(tile, level), old = border.kept.get(key);
+      if (old || !keeper) return old ?? null;
+      const chunk = store.get(tile, level), kept = keeper.keep(border.i, border.j, chunk, Math.floor(tile / each));
+      border.kept.set(key, kept);
+      known.keep(border, (known.get(border) ?? 0) + kept.byteLength);
+      tested += chunk.count;
+      return kept;
+    },
+    /** Gaussians that were tested so far. */
+    get tested() {
+      return tested;
+    },
+    get bytes() {
+      return known.size;
+    },
+  };
+}
 
 /**
  * @param {import("./chunk_store.js").ChunkStore} store
- * @param {import("./terrain_tables.js").TerrainTables} terrain
- * @param {import("./borders.js").Borders} borders
+ * @param {import("./terrain_tables.js").TerrainTables} terrain @param {Borders} borders
  * @param {number} capacity pages
  */
 export function createSortedBatches(store, terrain, borders, capacity) {
-  const pool = createPagePool(capacity), depthOrders = createDepthOrders(store, terrain), runs = createRunMerger();
+  const pool = createPagePool(capacity), sort = createDepthSorter();
   const owners = terrain.tiles.length, orderKeys = MAX_LEVELS * MAX_LEVELS * MAX_ORDERS;
   /** @type {{ pages: Uint32Array, entries: Uint32Array }[]} */
   let filled = [];
   /** @type {{ source: Source, order: number }[]} */
   let late = []; // substitutes stand in for these, of the last view
-  let spent = 0;
+  let spent = 0, sorted = 0, depths = new Float32Array(0), unsorted = new Uint32Array(0);
   /** @param {Source} source @param {number} order */
   const keyOf = ({ tile, border, lo, hi }, order) =>
     ((((border?.serial ?? 0) * owners + tile) * MAX_LEVELS + lo) * MAX_LEVELS + hi) * MAX_ORDERS + order;
@@ -41,9 +81,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
   /**
    * Entries of one level in a stored order.
    *
-   * @param {number} tile
-   * @param {number} level
-   * @param {number} order
+   * @param {number} tile @param {number} level @param {number} order
    */
   function levelEntries(tile, level, order) {
     const { entries, orders, count } = store.get(tile, level), from = order * count;
@@ -53,32 +91,46 @@ export function createSortedBatches(store, terrain, borders, capacity) {
   }
 
   /**
-   * Entries of several levels or tiles, merged by depth so that none covers another.
+   * Entries of several levels or tiles, sorted by depth so that none covers another.
    *
-   * @param {Source} source
-   * @param {number} order
+   * @param {Source} source @param {number} order
    */
-  function mergedEntries({ tile: first, tiles, border, lo, hi }, order) {
-    const along = terrain.tiles[first].orders[lo][order], direction = terrain.directions[along];
-    runs.clear();
+  function sortedEntries({ tile: first, tiles, border, lo, hi }, order) {
+    const [x, y, z] = terrain.directions[terrain.tiles[first].orders[lo][order]];
+    let n = 0;
     for (let level = lo; level <= hi; level++) {
       for (const tile of tiles) {
-        const kept = border && borders.keep(border, tile, level);
-        runs.add(store.get(tile, level), depthOrders.get(tile, level, along), direction, kept);
+        const { centres, entries, count } = store.get(tile, level), kept = border && borders.keep(border, tile, level);
+        const many = kept ? kept.length : count;
+        makeRoom(n, n + many);
+        for (let m = 0; m < many; m++, n++) {
+          const k = kept ? kept[m] : m;
+          depths[n] = centres[3 * k] * x + centres[3 * k + 1] * y + centres[3 * k + 2] * z;
+          unsorted[n] = entries[k];
+        }
       }
     }
-    const merged = runs.merge(), entries = new Uint32Array(padded(merged.length));
-    entries.set(merged);
-    return { entries, count: merged.length };
+    const sequence = sort(depths, n), entries = new Uint32Array(padded(n));
+    for (let k = 0; k < n; k++) entries[k] = unsorted[sequence[k]];
+    sorted += n;
+    return { entries, count: n };
+  }
+
+  /** Widen the buffers of what is sorted, of which some is used. @param {number} used @param {number} most */
+  function makeRoom(used, most) {
+    if (depths.length >= most) return;
+    const [far, entries] = [depths, unsorted];
+    depths = new Float32Array(2 * most);
+    unsorted = new Uint32Array(2 * most);
+    depths.set(far.subarray(0, used));
+    unsorted.set(entries.subarray(0, used));
   }
 
   /**
    * Batches that may stand in for one that there is no time to make: of another direction; of a border what it showed
    * last, or the tile of the material in its middle.
    *
-   * @param {Source} source
-   * @param {number} order
-   * @param {number} stamp
+   * @param {Source} source @param {number} order @param {number} stamp
    * @returns {Batch | null}
    */
   function substitute(source, order, stamp) {
@@ -98,9 +150,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
   /**
    * A batch, made now if need be; null: there is no room.
    *
-   * @param {Source} source
-   * @param {number} order
-   * @param {number} stamp
+   * @param {Source} source @param {number} order @param {number} stamp
    * @param {IsLate} [isLate] then a substitute is used if there is one
    * @returns {Batch | null}
    */
@@ -119,7 +169,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
       return other;
     }
     const begin = border ? performance.now() : 0;
-    const { entries, count } = lo === hi && !border ? levelEntries(tile, lo, order) : mergedEntries(source, order);
+    const { entries, count } = lo === hi && !border ? levelEntries(tile, lo, order) : sortedEntries(source, order);
     const batch = pool.allocate(key, entries.length / PAGE, stamp, count);
     if (!batch) return null;
     filled.push({ pages: batch.pages, entries });
@@ -136,11 +186,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
     begin() {
       late = [];
     },
-    /**
-     * Make a batch that was late for the last view. Returns: was there one?
-     *
-     * @param {number} stamp
-     */
+    /** Make a batch that was late. Returns: was there one? @param {number} stamp */
     makeLate(stamp) {
       const next = late.shift();
       if (!next) return false;
@@ -148,9 +194,9 @@ export function createSortedBatches(store, terrain, borders, capacity) {
       if (tiles.every((tile) => (terrain.tiles[tile].arrived & levels) === levels)) get(source, order, stamp);
       return true;
     },
-    /** Gaussians that were sorted and merged so far. */
-    get work() {
-      return { sorted: depthOrders.sorted, merged: runs.merged };
+    /** Gaussians that were sorted so far. */
+    get sorted() {
+      return sorted;
     },
     /** What was made since the last call: page numbers, and PAGE entries for each. */
     takeUploads() {
@@ -185,7 +231,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
 /** @param {number} count */
 const padded = (count) => Math.ceil(count / PAGE) * PAGE;
 
-/** @param {import("../terrain/cells.js").Border} border @param {number} key @param {Batch} batch */
+/** @param {Border} border @param {number} key @param {Batch} batch */
 function remember(border, key, batch) {
   border.last = key;
   border.batch = batch;

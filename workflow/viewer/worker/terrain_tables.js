@@ -1,10 +1,11 @@
-// Tables of a terrain for the worker: sizes and orders of its tiles and objects, level distances, classes, scatter.
+// Tables of a terrain for the worker: sizes and orders of its tiles and objects, level distances, classes, scatter; and
+// what painting changes of them.
 
 import { NEAR, ROW, viewRoom } from "../data/layout.js";
-import { deviationOf } from "../data/records.js";
-import { shareOfRange, uncertaintyRange } from "../data/uncertainty.js";
-import { RING } from "../terrain/cell_ring.js";
-import { createCellCache } from "../terrain/cells.js";
+import { deviationOf } from "../data/layout.js";
+import { shareOfRange, uncertaintyRange } from "../data/layout.js";
+import { RING } from "../terrain/caches.js";
+import { createCellCache, forgetCells } from "../terrain/cells.js";
 import { createClasses } from "../terrain/classes.js";
 import { RIM } from "../terrain/frustum.js";
 import { createScatter } from "../terrain/scatter.js";
@@ -79,4 +80,42 @@ export function createTerrainTables(manifest, heights, pictures) {
   };
   if (sphere) tables.sphereCells = createSphereCells(tables, sphere);
   return tables;
+}
+
+/**
+ * Paint points of the lattice of scores, and forget the cells about them.
+ *
+ * @param {TerrainTables} terrain
+ * @param {Int32Array} points I, J and material (-1: as the rule) of each
+ */
+export function paintPoints({ classes, scatter, cache }, points) {
+  if (!classes) return;
+  /** @type {Map<string, [number, number]>} */
+  const touched = new Map();
+  for (let k = 0; k < points.length; k += 3) {
+    const i = points[k], j = points[k + 1];
+    classes.painted.set(i, j, points[k + 2]);
+    for (const [a, b] of classes.painted.cellsAround(i, j)) touched.set(`${a},${b}`, [a, b]);
+  }
+  const margin = scatter?.margin ?? 0;
+  for (const [i, j] of touched.values()) {
+    classes.forget(i, j);
+    scatter?.forget(i, j);
+    for (let b = j - margin; b <= j + margin; b++) {
+      for (let a = i - margin; a <= i + margin; a++) forgetCells(cache, a === i && b === j, [a, b]);
+    }
+  }
+}
+
+/**
+ * Change what the noise of the rule adds to each material, and the probabilities of the objects.
+ *
+ * @param {TerrainTables} terrain
+ * @param {{ offsets: number[] | null, probabilities: number[] | null }} changes null: as they are
+ */
+export function adjustCover({ classes, scatter, cache }, { offsets, probabilities }) {
+  if (offsets) classes?.setOffsets(offsets);
+  if (scatter && probabilities) scatter.setProbabilities(probabilities);
+  else if (scatter && offsets) scatter.clear();
+  forgetCells(cache, offsets !== null);
 }

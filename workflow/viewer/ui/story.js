@@ -1,14 +1,25 @@
 // How this was made: a plan of the photos over the ground, the rounds, and the photos themselves; read when asked for.
 
+import { isNatural, PageError } from "../data/checks.js";
 import { webSource } from "../data/source.js";
-import { readStory, SHEET, STORY } from "../data/story.js";
-import { element } from "./dom.js";
-import { createPanel } from "./panel.js";
-
-/** @typedef {import("../data/story.js").Story} Story */
+import { createPanel, element, swatch } from "./dom.js";
 
 const SVG = "http://www.w3.org/2000/svg", SIZE = 240, MARGIN = 16;
 const ROUNDS = ["#e3b778", "#7fc4e8", "#8fd18a", "#e79bc0", "#d8d06a", "#b7a6f0"]; // colours, from the start on
+const STORY = "story.json", SHEET = "photos.jpg";
+const MOST = 10_000; // photos
+
+/**
+ * at: place seen from the middle of the ground; look: direction on the ground; picture: number in the sheet.
+ * @typedef {{ round: number, at: number[], look: number[], picture?: number }} StoryPhoto
+ *
+ * preset: whose fit was tested, where it is not the terrain's own.
+ * @typedef {{ photos: number, psnr: number | null, preset?: string }} StoryRound
+ *
+ * half: half the side of the ground that tiles are cut from; thumb: pixels along a side of a photo in the sheet.
+ * @typedef {{ unit: string, half: number, photos: StoryPhoto[], rounds: StoryRound[],
+ *   thumb: number, columns: number, pictures: number }} Story
+ */
 
 /** @param {(error: unknown) => void} onError */
 export function createStoryPanel(onError) {
@@ -60,18 +71,12 @@ function drawPlan({ photos, half }) {
 
 /** @param {Story} story */
 function listRounds({ rounds }) {
-  const table = document.createElement("table"), head = table.createTHead().insertRow();
-  for (const title of ["", "photos", "PSNR"]) {
-    const cell = document.createElement("th");
-    cell.textContent = title;
-    head.append(cell);
-  }
+  const table = document.createElement("table");
+  table.createTHead().innerHTML = "<tr><th></th><th>photos</th><th>PSNR</th></tr>";
   const rows = table.createTBody();
   for (const [k, { photos, psnr, preset }] of rounds.entries()) {
-    const row = rows.insertRow(), mark = document.createElement("i");
-    mark.className = "swatch";
-    mark.style.backgroundColor = ROUNDS[k % ROUNDS.length];
-    row.insertCell().append(mark, k ? ` round ${k}` : " start");
+    const row = rows.insertRow();
+    row.insertCell().append(swatch(ROUNDS[k % ROUNDS.length]), k ? ` round ${k}` : " start");
     row.insertCell().append(k ? `+ ${photos}` : String(photos));
     row.insertCell().append(psnr === null ? "none" : `${psnr.toFixed(1)} dB${preset ? ` (${preset})` : ""}`);
   }
@@ -94,4 +99,19 @@ function showPhotos({ photos, thumb, columns }) {
     list.append(photo);
   }
   return list;
+}
+
+/** story.json, checked. Throws a PageError. @param {any} value parsed JSON @returns {Story} */
+export function readStory(value) {
+  const finite = (/** @type {any} */ v) => Array.isArray(v) && v.every(Number.isFinite);
+  const { unit, half, photos, rounds, thumb, columns, pictures } = value ?? {};
+  const sound = typeof unit === "string" && unit.length <= 40 && half > 0 && Number.isFinite(half)
+    && [thumb, columns, pictures].every(isNatural) && thumb > 0 && thumb <= 512 && columns > 0 && columns <= 64
+    && Array.isArray(photos) && photos.length <= MOST && Array.isArray(rounds) && rounds.length <= MOST
+    && photos.every((one) => isNatural(one?.round) && finite(one.at) && one.at.length === 3 && finite(one.look)
+      && one.look.length === 2 && (one.picture === undefined || (isNatural(one.picture) && one.picture < pictures)))
+    && rounds.every((one) => isNatural(one?.photos) && (one.psnr === null || Number.isFinite(one.psnr))
+      && (one.preset === undefined || (typeof one.preset === "string" && one.preset.length <= 40)));
+  if (!sound) throw new PageError(`${STORY} is not as the workflow writes it. Make the page again.`);
+  return { unit, half, photos, rounds, thumb, columns, pictures };
 }
