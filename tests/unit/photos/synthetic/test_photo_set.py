@@ -69,10 +69,10 @@ def dark(monkeypatch):
         none = np.zeros(0, int)
         return ColmapModel(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
 
-    known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 16.0, (), frozenset())
+    known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 16.0, ())
     monkeypatch.setattr(synthetic, "render", lambda scene, camera: np.zeros((64, 64, 3), np.float32))
     monkeypatch.setattr(truth, "write_truth", lambda path, scene, camera: path.write_text(str(camera.centre.tolist())))
-    monkeypatch.setattr(synthetic, "load_labels", lambda scene: known)
+    monkeypatch.setattr(synthetic, "load_scene", lambda scene: synthetic.LoadedScene(None, known))
     monkeypatch.setattr(photo_set, "triangulate_points", nothing)
 
 
@@ -85,7 +85,8 @@ def test_test_views_are_written_by_group_and_every_picture_with_its_truth(dark, 
     assert frame.test == tuple(name for group in groups.values() for name in group)
     assert frame.images == frame.registered == 3
     stored = read_colmap_model(tmp_path / "sparse")
-    for name, camera in zip(frame.test, synthetic.test_views(entry), strict=True):
+    tests = [camera for cameras in synthetic.test_views(entry).values() for camera in cameras]
+    for name, camera in zip(frame.test, tests, strict=True):
         assert stored.camera(name).centre == pytest.approx(camera.centre)
         assert (tmp_path / "truth" / name).with_suffix(".exr").read_text() == str(camera.centre.tolist())
     pictures = sorted(p.name for p in (tmp_path / "images").iterdir())
