@@ -16,7 +16,6 @@ RESULTS = "results"
 RESERVED = ("logs", "benchmarks", "snapshots", "weights", "prior", "sweeps", "tables", "figures", "tradeoff")
 RESERVED = (*RESERVED, "stability", "forced_choice", "gallery")
 SNAPSHOTS = f"{RESULTS}/snapshots"  # of running fits: outside the outputs, so that a killed fit can go on
-LPIPS_WEIGHTS = f"{RESULTS}/weights/lpips_alexnet.safetensors"
 MOBILESAM = f"{RESULTS}/weights/mobilesam"  # a folder
 
 # One directory level a stage, which names only the settings that the stage adds. <name> stands for another entry.
@@ -37,18 +36,6 @@ TREE = {
     "bundle": "<tiles>/bundle_tau{tau}",
     "terrain": "<bundle>/terrain",
     "seams": "<bundle>/seams",
-}
-CONTENTS = {  # what a reader finds at each stage
-    "photos": "undistorted photos, their COLMAP model, ground.json, report.html",
-    "start": "views.json: photos to start from, the pool, test photos",
-    "coarse": "field.ply, ground.exr, metrics.json of the first fit",
-    "scored": "scores.csv, uncertainty.exr: scores of candidate poses",
-    "round": "poses.json, capture/, field.ply, scores.csv, metrics.json of round t",
-    "materials": "materials.json, a picture and an exemplar of each material, its objects (with `materials: auto`)",
-    "levels": "level{l}.ply: levels of detail",
-    "tiles": "seams.json and tiles/lod{l}_tile_{T}.ply",
-    "bundle": "davgswt.json, chunks/, gswt.zip, exports/",
-    "terrain": "page/, walker.png, oblique.png, above.png",
 }
 
 NAME = rf"(?!(?:{'|'.join(RESERVED)})(?:/|$))[a-z][a-z0-9_-]*"
@@ -200,22 +187,3 @@ def policy_pattern(policy: str) -> str:
     zeros = ZERO_SETTINGS.get(policy, ())
     p_drop, lam = ("0" if key in zeros else "[^_]+" for key in ("p_drop", "lam"))
     return f"{policy}(?!_none_)(?=_[a-z0-9_-]+_pdrop{p_drop}_lam{lam}_)"
-
-
-def describe_tree() -> str:
-    """The tree as text, for results/README.md."""
-    shown = [(f"{RESULTS}/{stage_template(stage)}/", contents) for stage, contents in CONTENTS.items()]
-    return "\n".join(f"{path}\n    {contents}" for path, contents in shown)
-
-
-# Old top-level keys of the config that the study has now: `study.` and the new name.
-STUDY_TABLES = {
-    "lod": "lod",
-    "frames": "frames",
-    "calibration": "calibration",
-    "benchmark": "view_benchmark",
-    "seam_study": "seams",
-    "perceptual_study": "forced_choice",
-    "sweeps": "sweeps",
-    "tradeoff": "tradeoff",
-}

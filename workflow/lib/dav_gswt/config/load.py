@@ -11,7 +11,6 @@ from pydantic import BaseModel, ValidationError
 from dav_gswt.config.model import Config
 from dav_gswt.config.tables import matching_table, renamed_keys
 from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.paths import STUDY_TABLES
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -77,9 +76,6 @@ def check_config(config: Mapping) -> dict:
 
     Raises: InputError: the first key that is unknown, renamed or out of range, and what it may be.
     """
-    for old, new in STUDY_TABLES.items():
-        if old in config:
-            raise InputError(f"config: {old}: is called `study.{new}` now; move it there ({REFERENCE})")
     config = {key: value for key, value in config.items() if key not in ALIASES} | {
         key: config[alias] for alias, key in ALIASES.items() if alias in config
     }
