@@ -24,14 +24,13 @@ def digest_code(script: Path) -> str:
     found = list(_imported_modules(script))
     while found:
         module = found.pop()
-        if module not in files:
-            file = _file_of(module)
-            assert file is not None, f"{module}: only modules with a file are ever found"
+        if module not in files and (file := _file_of(module)):
             files[module] = file
             found += _imported_modules(file)
     digest = sha256("".join(_read_code(files[module]) for module in sorted(files)).encode())
     if "dav_gswt.raster" in files:
-        digest.update(_core_sources())
+        core = sorted(f for f in (LIBRARY / "raster/core").iterdir() if f.suffix in (".cpp", ".h", ".txt"))
+        digest.update(b"".join(file.read_bytes() for file in core))
     return digest.hexdigest()[:12]
 
 
@@ -64,15 +63,11 @@ def _imported_modules(file: Path) -> tuple[str, ...]:
     """The library modules that a file imports, and the packages that they lie in."""
     found: set[str] = set()
     for origin, names, plain in _IMPORT.findall(file.read_text(encoding="utf-8")):
-        found.update(_parents_of(plain or origin))
+        parts = (plain or origin).split(".")
+        found.update(".".join(parts[: n + 1]) for n in range(len(parts)))  # the packages that it lies in, too
         named = re.findall(r"\w+", re.sub(r" as \w+|#.*", "", names))
         found.update(f"{origin}.{name}" for name in named if _file_of(f"{origin}.{name}"))
     return tuple(sorted(found))
-
-
-def _parents_of(module: str) -> list[str]:
-    parts = module.split(".")
-    return [".".join(parts[: n + 1]) for n in range(len(parts))]
 
 
 @cache
@@ -81,9 +76,3 @@ def _file_of(module: str) -> Path | None:
     place = LIBRARY.joinpath(*module.split(".")[1:])
     files = (place / "__init__.py", place.with_suffix(".py"))
     return next((file for file in files if file.is_file()), None)
-
-
-@cache
-def _core_sources() -> bytes:
-    files = sorted(f for f in (LIBRARY / "raster/core").iterdir() if f.suffix in (".cpp", ".h", ".txt"))
-    return b"".join(file.read_bytes() for file in files)

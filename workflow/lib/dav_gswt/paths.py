@@ -62,16 +62,7 @@ WILDCARDS = {
     "tau": FRACTION,
 }
 _STOPS = {"photos": "_upto", "marginal_gain": "_gain"}  # keys of the config's `stop`, and their marks in a path
-_EXTERNAL = {
-    "policy": "external",
-    "prior": "none",
-    "p_drop": "0",
-    "lam": "0",
-    "k": 0,
-    "stop": "",
-    "t": 0,
-    "inpainted": "",
-}
+_EXTERNAL = dict(policy="external", prior="none", p_drop="0", lam="0", k=0, stop="", t=0, inpainted="")
 
 
 def encode_number(value: int | float | str) -> str:
@@ -96,11 +87,6 @@ def decode_stop(text: str) -> dict[str, int | float]:
     return stop
 
 
-def encode_inpainted(inpaint: bool, prior: str) -> str:
-    """The directory level of an inpainted field below its round; empty without inpainting."""
-    return f"/inpainted_{prior}" if inpaint else ""
-
-
 def encode_branch(config: Mapping, scene: str, policy: str | None = None, changes: Mapping | None = None) -> dict:
     """The wildcards of what is made of a scene, by the config or by settings that replace some of the config's.
 
@@ -119,14 +105,10 @@ def encode_branch(config: Mapping, scene: str, policy: str | None = None, change
     policy = resolve_policy(policy or settings["policy"], entry.get("agent"))
     unread = ZERO_SETTINGS.get(policy, ()) if policy in PRIOR_POLICIES else ("p_drop", "lam")
     numbers = {key: "0" if key in unread else encode_number(settings[key]) for key in ("p_drop", "lam")}
-    return (
-        fit
-        | {"policy": policy, "prior": settings["prior"] if policy in PRIOR_POLICIES else "none"}
-        | numbers
-        | {"k": settings["k"], "stop": encode_stop(config["stop"]), "t": settings["rounds"]}
-        | {"inpainted": encode_inpainted(config["inpaint"], config["prior"])}
-        | tiles
-    )
+    rounds = {"k": settings["k"], "stop": encode_stop(config["stop"]), "t": settings["rounds"]}
+    rounds["inpainted"] = f"/inpainted_{config['prior']}" if config["inpaint"] else ""  # a level below the round
+    prior = settings["prior"] if policy in PRIOR_POLICIES else "none"
+    return fit | {"policy": policy, "prior": prior} | numbers | rounds | tiles
 
 
 def stage_template(stage: str) -> str:
