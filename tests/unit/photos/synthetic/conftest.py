@@ -7,18 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dav_gswt.photos.synthetic import flowers, grass, land, meadow, oasis, planet, truth
+from dav_gswt.photos.synthetic import flowers, grass, land, meadow, oasis, planet
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.synthetic.meshes import Mesh
 
 GOLDEN = Path(__file__).with_name("golden.json")
 RINGS = {meadow: {"NEAR": 3.0, "FAR": 6.0}, oasis: {"NEAR": 3.0, "FAR": 6.0}, flowers: {"NEAR": 3.0}}
 RINGS[grass] = {"NEAR": 3.0, "MIDDLE": 4.0, "FAR": 6.0, "REACH": 5.0}
-
-
-def forget_scenes():
-    """Clear the caches of scenes, for families that make other land than before."""
-    synthetic.load_scene.cache_clear(), truth.load_parts.cache_clear()
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +44,9 @@ def small_land():
         patch.setattr(planet, "SORTS", tuple((*sort, 6.0, 3, min(fine, 2)) for *sort, _, _, fine in planet.SORTS))
         patch.setattr(land, "STONE_SQUARE", 4.0)
         patch.setattr(land, "make_ground_mesh", make_coarse_ground)
-        forget_scenes()
+        synthetic.load_scene.cache_clear()
         yield heights
-    forget_scenes()
+    synthetic.load_scene.cache_clear()
 
 
 @pytest.fixture

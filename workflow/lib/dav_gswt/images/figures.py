@@ -2,6 +2,7 @@
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -15,7 +16,7 @@ OKABE_ITO = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  
 KINDS = ((0.90, 0.62, 0.0), (0.0, 0.62, 0.45), (0.0, 0.45, 0.70), (0.80, 0.47, 0.65))  # of kinds of ground
 
 
-def make_figure(width: float, height: float, **padding: float):
+def make_figure(width: float, height: float, **padding: Any):
     """An empty figure, inches wide and high, 120 dots an inch. padding: of matplotlib's ConstrainedLayoutEngine."""
     from matplotlib.figure import Figure  # here, not above: it takes a second to load, and most jobs draw nothing
     from matplotlib.layout_engine import ConstrainedLayoutEngine

@@ -148,6 +148,8 @@ def _write_pixels(path: Path | str, spec: oiio.ImageSpec, pixels: Array) -> None
     spec["png:compressionLevel"] = 2  # a third of the time of the default, 6; files are 3 % smaller to 4 % larger
     with atomic_file(path) as part:
         file = oiio.ImageOutput.create(str(part))  # by the ending, which need not be .png
+        if file is None:
+            raise ValueError(f"{path}: {_first_line(oiio.geterror())}")
         done = file.open(str(part), spec) and file.write_image(pixels)
         trouble = "" if done else file.geterror()
         whole = file.close() and (part.suffix.lower() != ".png" or _is_whole_png(part))

@@ -27,21 +27,11 @@ def describe_renderer() -> dict[str, str | None]:
     return {"mitsuba": metadata.version("mitsuba"), "variant": VARIANT, "llvm": None}
 
 
-def render_light(world, camera: Camera, samples: int, seed: int) -> Float32[Array, "h w 3"]:
+def render_light(world, camera: Camera, samples: int, seed) -> Float32[Array, "h w 3"]:
     """Linear light of a view. samples: rays a pixel, at least."""
     view = mi.load_dict(make_sensor(camera, {"type": "multijitter", "sample_count": samples}))
     light = mi.render(world, sensor=view, spp=view.sampler().sample_count(), seed=seed)
     return np.array(light, np.float32)[..., :3]
-
-
-def render_depth(world, camera: Camera) -> Float32[Array, "h w"]:
-    """Depth (camera z) along the ray through every pixel's centre; infinite where the sky is seen."""
-    view = mi.load_dict(make_sensor(camera, {"type": "stratified", "sample_count": 1, "jitter": False}))
-    # not mitsuba's map of depths beside the picture (`aov`): that lists all shapes anew for every pixel
-    integrator = mi.load_dict({"type": "depth", "block_size": BLOCK})
-    distance = np.array(mi.render(world, sensor=view, integrator=integrator, spp=1), np.float64)[..., 0]
-    steps = np.linalg.norm(camera.rays()[1], axis=-1)
-    return np.where(distance > 0, NEAR + distance / steps, np.inf).astype(np.float32)
 
 
 def make_sensor(camera: Camera, sampler: dict) -> dict:
@@ -104,12 +94,6 @@ def build_scene(land: Land):
         group = {"type": "ref", "id": f"kind{int(kind)}"}
         parts[f"plant{i}"] = {"type": "instance", "group": group, "to_world": _instance_transform(*place)}
     return mi.load_dict(parts)
-
-
-def isolate_shapes(world) -> dict:
-    """The ground and the stones of a scene, if there are any, each as a scene without light."""
-    found = {shape.id(): shape for shape in world.shapes() if shape.id() in ("ground", "stones")}
-    return {name: mi.load_dict({"type": "scene", name: shape}) for name, shape in found.items()}
 
 
 def _instance_transform(x, y, z, size, yaw, along_x, along_y):

@@ -14,7 +14,7 @@ from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import ColmapModel, model_from_reconstruction, silence_pycolmap, write_colmap_model
-from dav_gswt.photos.synthetic import labels, mitsuba_scene, truth
+from dav_gswt.photos.synthetic import labels, mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 
 _log = logging.getLogger(__name__)
@@ -29,9 +29,8 @@ LEAST_OVERLAP = 0.1  # share of the exemplar that both views of a pair must see
 def render_set(entry: dict, folder: Path) -> None:
     """Fill a photos/ folder: images/, truth/, sparse/ (exact cameras, triangulated points), ground.json.
 
-    truth/ has a file of each view (see `truth`), and a map of the ground where a family has labels (`labels`).
-    entry: a synthetic scene of the config. Points come from the start views alone; test views are in the model, but
-    observe nothing. ground.json names them by group, and says what rendered.
+    truth/ has a map of the ground where a family has labels (`labels`). entry: a synthetic scene of the config. Points
+    come from the start views alone; test views are in the model, but observe nothing.
     """
     scene, groups = synthetic.scene_from_config(entry), synthetic.test_views(entry)
     shots = _name_views("view", synthetic.start_views(entry))
@@ -40,7 +39,6 @@ def render_set(entry: dict, folder: Path) -> None:
         (folder / part).mkdir(parents=True, exist_ok=True)
     for name, camera in progress(shots + tests, "render photos"):
         image_files.write_png(folder / "images" / name, synthetic.render(scene, camera))
-        truth.write_truth(folder / "truth" / Path(name).with_suffix(".exr"), scene, camera)
     if (known := synthetic.load_scene(scene).labels) is not None:
         labels.write_label_map(folder / "truth", labels.draw_label_map(known, scene.frame.exemplar))
     points = triangulate_points(folder / "images", shots, entry["seed"])

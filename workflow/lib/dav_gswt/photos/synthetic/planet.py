@@ -101,7 +101,8 @@ def _draw_ground(rng) -> tuple[Float32[Array, "n n 3"], Float[Array, "n n"]]:
     """The ground's colour and its small heights: clods, grit, and dust in ripples where it lies deep."""
     n, p = TEXELS, PERIOD
     spread = noise.make_noise(rng, n, p, 4.0, 0.4, 1.1)
-    dust = smoothstep(*np.quantile(spread, [0.82 - 0.42, 1.18 - 0.42]), spread)  # on 42 % of the ground
+    low, high = np.quantile(spread, [0.82 - 0.42, 1.18 - 0.42])
+    dust = smoothstep(low, high, spread)  # on 42 % of the ground
     grit = smoothstep(0.5, 1.6, noise.make_noise(rng, n, p, 2.2, 0.2, 0.9)) * (1 - dust)
     phase, strength = noise.make_ripples(rng, n, p, 0.34, np.radians(140.0))
     profile = noise.ripple_profile(phase) * strength * dust
