@@ -1,11 +1,10 @@
 """Figures of all benchmarks in one file, results/bench.json: name: value. Running this module does nothing."""
 
-import tempfile
 from pathlib import Path
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
-from dav_gswt.images import lpips_package, lpips_weights
+from dav_gswt.images import lpips_weights
 
 PATH = Path(__file__).resolve().parents[1] / "results" / "bench.json"
 
@@ -27,10 +26,7 @@ def merge_figures(values: dict[str, float | None]) -> None:
 def read_installed_lpips() -> lpips_weights.Weights | None:
     """LPIPS's published weights, or None, said in a line, where they are not installed."""
     try:
-        source = lpips_package.locate_weights("installed")
+        return lpips_weights.read(lpips_weights.locate_weights("installed"))
     except InputError as error:
         print(f"lpips: skipped ({error})")
         return None
-    with tempfile.TemporaryDirectory() as folder:
-        lpips_weights.convert_weights(source, path := Path(folder) / "lpips.safetensors")
-        return lpips_weights.read(path)

@@ -99,7 +99,7 @@ def files_of_model(path, where):
 
 def lpips_weights(wildcards=None):
     """LPIPS's weights as an input of what cuts, scores and measures with them; none where the config says so."""
-    return {} if config["lpips"] == "none" else {"lpips": rules.convert_lpips_weights.output.weights}
+    return {} if config["lpips"] == "none" else {"lpips": locate_weights(config["lpips"])}
 
 
 def segmenter_networks(wildcards=None):

@@ -11,7 +11,7 @@ from dav_gswt.config.load import add_scene_files, check_config, merge_tables, pa
 from dav_gswt.config.rule_keys import PRIOR_KEYS, EntryKeys, select_export_keys, select_preset_keys, select_scene_keys
 from dav_gswt.errors import InputError
 from dav_gswt.files import is_from_future, locate_path
-from dav_gswt.images.lpips_package import locate_weights
+from dav_gswt.images.lpips_weights import locate_weights
 from dav_gswt.materials import mobilesam_package
 from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
 from dav_gswt.sweeps import CELL

@@ -11,7 +11,7 @@ from numpy import ndarray as Array
 from dav_gswt.bundle import level_distances
 from dav_gswt.files import atomic_file, read_json
 from dav_gswt.images import image_files
-from dav_gswt.images.jpeg import encode_jpeg
+from dav_gswt.images.figures import encode_jpeg
 from dav_gswt.materials.store import read_report
 from dav_gswt.sweeps import MEGA, select_metrics
 from dav_gswt.terrain.endless import EndlessTerrain

@@ -28,7 +28,6 @@ READERS: dict[str, list[str]] = {
     "import_field": ["prepare_external_field", "bundle_tiles"],
     "report_photos": [],
     "split_views": [*_SPLIT_READERS, "make_page"],
-    "convert_lpips_weights": ["evaluate_coarse", "evaluate_round", "evaluate_inpainted", "cut_tiles"],
     "fit_coarse": ["evaluate_coarse", "score_coarse", "select_poses", "update_field"],
     "evaluate_coarse": ["make_page"],
     "score_coarse": ["select_poses", "score_round"],
@@ -76,7 +75,7 @@ _TOP_LEVEL: dict[str, tuple[str, ...]] = {
     "inpaint": ("inpaint_field",),
     "levels": ("make_levels",),
     "tau": ("bundle_tiles",),
-    "lpips": ("convert_lpips_weights",),
+    "lpips": ("evaluate_coarse", "evaluate_round", "cut_tiles"),
     "segmenter": ("find_materials",),
     "heights": ("make_page", "render_terrain", "render_flight"),
     "classes": ("make_page", "render_terrain", "render_flight"),
@@ -121,7 +120,6 @@ def follow_rules(first: Iterable[str], scope: Iterable[str] = tuple(READERS)) ->
 def list_rules(kind: str, agent: str) -> list[str]:
     """The rules that a scene of a kind goes through, without those that the default config does not ask for."""
     optional = {
-        "convert_lpips_weights",
         "fetch_mobilesam",
         "find_materials",
         "inpaint_field",
@@ -186,7 +184,6 @@ def list_top_level_reruns(kind: str, key: str) -> list[str]:
             "inpaint": (),
         }.get(key, first)
     more = {
-        "lpips": ["convert_lpips_weights"],
         "inpaint": ["inpaint_field", "evaluate_inpainted"],
         "flight": ["render_flight"],
     }

@@ -31,7 +31,6 @@ from fixtures.fuzzing import (
 from fixtures.random_field import random_field
 from hypothesis import given
 from plyfile import PlyData, PlyElement
-from safetensors.numpy import save
 from torch import nn
 
 from dav_gswt.bundle import gswt
@@ -42,7 +41,7 @@ from dav_gswt.field import GaussianField, read_field, write_field
 from dav_gswt.files import write_json
 from dav_gswt.geometry.camera_layouts import orbit
 from dav_gswt.geometry.poses import Pose
-from dav_gswt.images import image_files, lpips_weights
+from dav_gswt.images import image_files
 from dav_gswt.photos import importers, photo_files
 from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
 from dav_gswt.photos.importers.colmap import import_colmap
@@ -54,7 +53,6 @@ ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "workflow/schemas/davgswt.schema.json"
 PHOTO = ROOT / "resources/photos/brighton_beach/images/DJI_0018.jpg"
 NETWORK = nn.Sequential(nn.Linear(3, 4), nn.Linear(4, 2))
-KERNELS = ((2, 3, 1, 1), (3, 2, 1, 1), (2, 3, 1, 1), (2, 2, 1, 1), (1, 2, 1, 1))  # of LPIPS, made small
 POSE = Pose("pose_0001", 60.0, 10.0, 4.0)
 CAMERA = orbit(60.0, 10.0, 4.0, (0.0, 0.0, 0.0), 8, 6, 60.0)
 SHOTS = [CapturedPhoto("pose_0001.png", POSE, CAMERA, CAMERA, 0.0)]
@@ -108,12 +106,6 @@ def is_header(found) -> bool:
     focal, place, _, (width, height) = found
     right = place is None or all_finite(place) and abs(place[0]) <= 90 and abs(place[1]) <= 180
     return right and (focal is None or 0 < focal < 100 * max(width, height))
-
-
-def write_lpips(folder: Path) -> None:
-    arrays = {f"kernel{i}": np.ones(shape, np.float32) for i, shape in enumerate(KERNELS)}
-    arrays |= {f"{k}{i}": np.ones(s[:1], np.float32) for k in ("bias", "head") for i, s in enumerate(KERNELS)}
-    write_bytes(folder / "a.safetensors", save(arrays))
 
 
 def write_photos(folder: Path) -> None:
@@ -180,13 +172,6 @@ READERS = [
         350,
     ),
     Reader(
-        "weights of LPIPS",
-        write_lpips,
-        lambda path: lpips_weights.read(path, published=False),
-        lambda read: all_finite(*read.kernels[0], *read.biases),
-        1200,
-    ),
-    Reader(
         "nerfstudio",
         lambda folder: write_json(folder / "model.json", imported_models.transforms()),
         read_model,
@@ -220,8 +205,7 @@ def valid(tmp_path_factory):
 @pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
 @fuzz
 @given(random=randoms)
-def test_a_changed_file_is_read_or_refused(valid, monkeypatch, tmp_path, reader, random):
-    monkeypatch.setattr(lpips_weights, "KERNELS", KERNELS)
+def test_a_changed_file_is_read_or_refused(valid, tmp_path, reader, random):
     name, data = random.choice(valid[reader.name])
     folder = empty_folder(tmp_path)
     changed = mutate_bytes(random, data, reader.header) if reader.header else mutate_json(random, json.loads(data))

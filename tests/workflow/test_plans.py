@@ -37,7 +37,7 @@ def test_a_prior_scores_once_for_every_lam_and_anew_for_every_p_drop(planned, tm
     pairs = [("0.15", "0"), ("0.15", "0.1"), ("0.3", "0.1")]
     plan = planned(tmp_path, *(ASKED.format(p_drop=p, lam=lam) for p, lam in pairs))
     assert plan["score_coarse"] == 2 and plan["select_poses"] == plan["update_field"] == 3
-    assert plan["fit_coarse"] == plan["convert_lpips_weights"] == 1
+    assert plan["fit_coarse"] == 1
 
 
 def test_every_policy_has_a_path(planned, tmp_path):
@@ -51,7 +51,7 @@ def test_every_policy_has_a_path(planned, tmp_path):
         targets.append(f"{DRAFT}/active_{branch}_k4/iter1/field.ply")
     plan = planned(tmp_path, *targets)
     assert plan["update_field"] == plan["select_poses"] == len(POLICY_NAMES)
-    assert plan["render_candidates"] == bool(ORACLES) and plan["convert_lpips_weights"] == 1
+    assert plan["render_candidates"] == bool(ORACLES)
 
 
 def test_every_stop_has_a_branch_of_its_own(planned, tmp_path):

@@ -35,7 +35,7 @@ def tabulate_choices(key: dict, participants: list[Participant]) -> list[dict]:
     if not rows:
         raise InputError(
             "perceptual_study: there are neither answers (`answers` names their folder) nor LPIPS for the model "
-            "observer (`snakemake results/weights/lpips_alexnet.safetensors` fetches it; then make the kit again)"
+            "observer (set `lpips: installed` in the config; then make the kit again)"
         )
     return rows
 

@@ -90,7 +90,6 @@ def test_what_is_wrong_is_named(config, keys, value, message):
         pytest.param(["qualities"], {}, "'qualities' is called 'presets' now", id="a table"),
         pytest.param(["scenes", "desert", "quality"], "draft", "'quality' is called 'preset' now", id="a scene's key"),
         pytest.param(["scenes", "copr_dunes", "flight"], {}, "'flight' is called 'drone' now", id="a photo's key"),
-        pytest.param(["sweeps"], {}, "sweeps: is called `study.sweeps` now", id="a table of the study"),
     ],
 )
 def test_a_renamed_key_comes_with_its_new_name(root, keys, value, message):

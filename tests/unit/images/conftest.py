@@ -4,13 +4,12 @@ import pytest
 from fixtures import lpips_arrays
 
 from dav_gswt.images import lpips_weights
-from dav_gswt.images.lpips_package import locate_weights, read_member
 
 
 @pytest.fixture(scope="session")
 def real_weights():
     """The published weights."""
-    return lpips_weights.of_pickle(read_member(locate_weights("installed")))
+    return lpips_weights.read(lpips_weights.locate_weights("installed"))
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.images import figures, image_files
-from dav_gswt.images.jpeg import encode_jpeg
+from dav_gswt.images.figures import encode_jpeg
 
 
 @pytest.mark.parametrize("ending", [".png", ".jpg"])

@@ -26,14 +26,13 @@ def digest_code(script: Path, *packages: Path) -> str:
     found = list(_imported_modules(script, packages))
     while found:
         module = found.pop()
-        if module not in files:
-            file = _file_of(module, packages)
-            assert file is not None, f"{module}: only modules with a file are ever found"
+        if module not in files and (file := _file_of(module, packages)):
             files[module] = file
             found += _imported_modules(file, packages)
     digest = sha256("".join(_read_code(files[module]) for module in sorted(files)).encode())
     if "dav_gswt.raster" in files:
-        digest.update(_core_sources())
+        core = sorted(f for f in (LIBRARY / "raster/core").iterdir() if f.suffix in (".cpp", ".h", ".txt"))
+        digest.update(b"".join(file.read_bytes() for file in core))
     return digest.hexdigest()[:12]
 
 
@@ -66,17 +65,13 @@ def _imported_modules(file: Path, packages: tuple[Path, ...]) -> tuple[str, ...]
     """The library modules that a file imports, and the packages that they lie in."""
     found: set[str] = set()
     for origin, names, plain in _IMPORT.findall(file.read_text(encoding="utf-8")):
-        if (plain or origin).partition(".")[0] not in {package.name for package in packages}:
+        parts = (plain or origin).split(".")
+        if parts[0] not in {package.name for package in packages}:
             continue
-        found.update(_parents_of(plain or origin))
+        found.update(".".join(parts[: n + 1]) for n in range(len(parts)))  # the packages that it lies in, too
         named = re.findall(r"\w+", re.sub(r" as \w+|#.*", "", names))
         found.update(f"{origin}.{name}" for name in named if _file_of(f"{origin}.{name}", packages))
     return tuple(sorted(found))
-
-
-def _parents_of(module: str) -> list[str]:
-    parts = module.split(".")
-    return [".".join(parts[: n + 1]) for n in range(len(parts))]
 
 
 @cache
@@ -86,9 +81,3 @@ def _file_of(module: str, packages: tuple[Path, ...]) -> Path | None:
     place = next(package for package in packages if package.name == top).joinpath(*parts)
     files = (place / "__init__.py", place.with_suffix(".py"))
     return next((file for file in files if file.is_file()), None)
-
-
-@cache
-def _core_sources() -> bytes:
-    files = sorted(f for f in (LIBRARY / "raster/core").iterdir() if f.suffix in (".cpp", ".h", ".txt"))
-    return b"".join(file.read_bytes() for file in files)

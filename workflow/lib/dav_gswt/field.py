@@ -96,26 +96,22 @@ def write_field(field: GaussianField, path: Path | str, plain: bool = False) -> 
     """
     n, k = field.sh.shape[:2]
     names = _columns(k)
-    order = ["means", "normals", "dc", "rest", "opacity_logits", "log_scales", "quats"]
-    values = {
-        "means": field.means,
-        "normals": np.zeros((n, 3), np.float32),
-        "dc": field.sh[:, 0],
-        "rest": field.sh[:, 1:].transpose(0, 2, 1).reshape(n, 3 * (k - 1)),
-        "opacity_logits": field.opacity_logits[:, None],
-        "log_scales": field.log_scales,
-        "quats": field.quats,
+    written = {  # in the order of the original 3DGS
+        (*names["means"],): field.means,
+        ("nx", "ny", "nz"): np.zeros((n, 3), np.float32),
+        (*names["dc"],): field.sh[:, 0],
+        (*names["rest"],): field.sh[:, 1:].transpose(0, 2, 1).reshape(n, 3 * (k - 1)),
+        (*names["opacity_logits"],): field.opacity_logits[:, None],
+        (*names["log_scales"],): field.log_scales,
+        (*names["quats"],): field.quats,
     }
-    names["normals"] = ["nx", "ny", "nz"]
-    columns = [(name, "<f4") for key in order for name in names[key]]
-    own = [("uncertainty", "<f4"), ("ground", "u1")] + [("imagined", "u1")] * bool(field.imagined.any())
-    own = [] if plain else own
-    rows = np.empty(n, dtype=columns + own)
-    for key in order:
-        for j, name in enumerate(names[key]):
-            rows[name] = values[key][:, j]
-    for name, _ in own:
-        rows[name] = getattr(field, name)
+    columns = {name: values[:, j] for keys, values in written.items() for j, name in enumerate(keys)}
+    kinds = [(name, "<f4") for name in columns]
+    if not plain:
+        kinds += [("uncertainty", "<f4"), ("ground", "u1")] + [("imagined", "u1")] * bool(field.imagined.any())
+    rows = np.empty(n, dtype=kinds)
+    for name, _ in kinds:
+        rows[name] = columns[name] if name in columns else getattr(field, name)
     with atomic_file(path) as part:
         PlyData([PlyElement.describe(rows, "vertex")], byte_order="<").write(str(part))
 
@@ -130,7 +126,7 @@ def read_field(path: Path | str) -> GaussianField:
     """
     path = Path(path)
     rows = _vertices(path)
-    rest = sum(name.startswith("f_rest_") for name in _property_names(rows))
+    rest = sum(name.startswith("f_rest_") for name in (rows.dtype.names or ()))
     k = 1 + rest // 3
     if rest % 3 or k not in (1, 4, 9, 16):
         raise InputError(f"{path}: {rest} f_rest properties; 0, 9, 24 or 45 make whole spherical harmonics")
@@ -141,16 +137,20 @@ def read_field(path: Path | str) -> GaussianField:
     n = len(rows)
     shs = np.concatenate([columns["dc"][:, None], columns["rest"].reshape(n, 3, k - 1).transpose(0, 2, 1)], 1)
     ours = ("uncertainty", "ground", "imagined")
-    extra = {name: _column(rows, name, path) if name in _property_names(rows) else np.zeros(n) for name in ours}
+    extra = {name: _column(rows, name, path) if name in (rows.dtype.names or ()) else np.zeros(n) for name in ours}
     if len(bad := np.flatnonzero((extra["imagined"] != 0) & (extra["imagined"] != 1))):
         raise InputError(f"{path}: imagined of Gaussian {bad[0]} is neither 0 nor 1; write the field again")
+    uncertainty = _finite(np.asarray(extra["uncertainty"], np.float32), "uncertainty", path)
+    if len(bad := np.flatnonzero((uncertainty < -ROUNDING) | (uncertainty > 1 + ROUNDING))):
+        value = f"uncertainty of Gaussian {bad[0]} is {uncertainty[bad[0]]:g}"
+        raise InputError(f"{path}: {value}; write numbers from 0 to 1, or none at all")
     return GaussianField(
         columns["means"],
         columns["log_scales"],
         quats,
         columns["opacity_logits"][:, 0],
         np.ascontiguousarray(shs, np.float32),
-        _clip_uncertainty(np.asarray(extra["uncertainty"], np.float32), path),
+        np.clip(uncertainty, 0, 1),
         np.asarray(extra["ground"]).astype(bool),
         np.asarray(extra["imagined"]).astype(bool),
     )
@@ -178,10 +178,8 @@ def _check_counts(path: Path) -> None:
         raise InputError(f"{path}: not a readable PLY (it does not begin with 'ply'); export or copy it again")
     end = re.search(rb"[\r\n]end_header\b", begin)  # at the start of a line: a comment may name it too
     if not end:
-        raise InputError(
-            f"{path}: not a readable PLY (no end_header in the first {HEADER_BYTES} bytes); "
-            "export it again, without long comments"
-        )
+        problem = f"not a readable PLY (no end_header in the first {HEADER_BYTES} bytes)"
+        raise InputError(f"{path}: {problem}; export it again, without long comments")
     header, room = begin[: end.start()], path.stat().st_size - end.end()
     announced = 0
     for count, properties in re.findall(rb"element\s+\S+\s+(\d+)((?:(?!element\s)[\s\S])*)", header):
@@ -190,12 +188,8 @@ def _check_counts(path: Path) -> None:
         raise InputError(f"{path}: the header announces more than the file holds ({room} bytes); is it cut short?")
 
 
-def _property_names(rows: Array) -> tuple[str, ...]:
-    return rows.dtype.names or ()
-
-
 def _stack(rows: Array, names: list[str], path: Path) -> Float32[Array, "n m"]:
-    missing = [name for name in names if name not in _property_names(rows)]
+    missing = [name for name in names if name not in (rows.dtype.names or ())]
     if missing:
         raise InputError(f"{path}: property {missing[0]} is missing; a 3D Gaussian splatting .ply is needed")
     out = np.empty((len(rows), len(names)), np.float32)
@@ -213,18 +207,8 @@ def _column(rows: Array, name: str, path: Path) -> Array:
     return rows[name]
 
 
-def _clip_uncertainty(values: Float32[Array, "n"], path: Path) -> Float32[Array, "n"]:
-    _finite(values, "uncertainty", path)
-    if len(bad := np.flatnonzero((values < -ROUNDING) | (values > 1 + ROUNDING))):
-        raise InputError(
-            f"{path}: uncertainty of Gaussian {bad[0]} is {values[bad[0]]:g}; write numbers from 0 to 1, or none at all"
-        )
-    return np.clip(values, 0, 1)
-
-
 def _finite(values: Array, name: str, path: Path) -> Array:
     if len(bad := np.flatnonzero(~np.isfinite(values))):
-        raise InputError(
-            f"{path}: {name} of Gaussian {bad[0]} is not finite ({len(bad)} such); remove them and try again"
-        )
+        where = f"{name} of Gaussian {bad[0]} is not finite ({len(bad)} such)"
+        raise InputError(f"{path}: {where}; remove them and try again")
     return values

@@ -23,21 +23,9 @@ Record = TypeVar("Record")
 
 REPOSITORY = Path(__file__).parents[3]
 
-UNREADABLE = (  # what reading a damaged archive, or arrays in one, may end in
-    OSError,
-    ValueError,
-    ArithmeticError,
-    TypeError,
-    EOFError,
-    LookupError,
-    RuntimeError,
-    SyntaxError,
-    tokenize.TokenError,
-    lzma.LZMAError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-
+# what reading a damaged archive, or arrays in one, may end in
+UNREADABLE = (OSError, ValueError, ArithmeticError, TypeError, EOFError, LookupError, RuntimeError, SyntaxError)
+UNREADABLE = (*UNREADABLE, tokenize.TokenError, lzma.LZMAError, zipfile.BadZipFile, zlib.error)
 CLOCK_SKEW = 2.0  # seconds by which the clock of a file system may be ahead
 
 
@@ -122,7 +110,7 @@ def read_json(path: Path | str):
 
 
 def _finite_number(text: str) -> float:
-    """A number of JSON. Python's parser takes NaN and Infinity, which JSON does not have, and 1e999 for infinite."""
+    """A number of JSON. Python's parser also reads NaN and Infinity, which JSON lacks, and 1e999 as infinite."""
     if not math.isfinite(value := float(text)):
         raise ValueError(f"{text} is no finite number")
     return value
@@ -170,10 +158,7 @@ def require_file_name(name) -> str:
 
 
 def locate_path(path: Path | str, repository: Path = REPOSITORY) -> Path:
-    """Where a path of the config is: as it stands (~ is the home), or below the repository.
-
-    Where it is in neither, the path as it stands, for the reader to say so.
-    """
+    """Where a path of the config is: as it stands (~ is the home), or below the repository; else as it stands."""
     try:
         given = Path(path).expanduser()
     except RuntimeError:  # no user of that name: a file that begins with ~
@@ -191,6 +176,5 @@ def digest_files(*paths: Path | str) -> str:
     state = hashlib.sha256()
     for path in paths:
         with Path(path).open("rb") as file:
-            while block := file.read(1 << 20):
-                state.update(block)
+            hashlib.file_digest(file, lambda: state)
     return state.hexdigest()

@@ -15,7 +15,6 @@ RESULTS = "results"
 # Directories beside the scenes' own; no scene may have such a name.
 RESERVED = ("logs", "benchmarks", "snapshots", "weights", "sweeps", "tables", "gallery")
 SNAPSHOTS = f"{RESULTS}/snapshots"  # of running fits: outside the outputs, so that a killed fit can go on
-LPIPS_WEIGHTS = f"{RESULTS}/weights/lpips_alexnet.safetensors"
 MOBILESAM = f"{RESULTS}/weights/mobilesam"  # a folder
 
 # One directory level a stage, which names only the settings that the stage adds. <name> stands for another entry.
@@ -36,18 +35,6 @@ TREE = {
     "bundle": "<tiles>/bundle_tau{tau}",
     "terrain": "<bundle>/terrain",
     "seams": "<bundle>/seams",
-}
-CONTENTS = {  # what a reader finds at each stage
-    "photos": "undistorted photos, their COLMAP model, ground.json, report.html",
-    "start": "views.json: photos to start from, the pool, test photos",
-    "coarse": "field.ply, ground.exr, metrics.json of the first fit",
-    "scored": "scores.csv, uncertainty.exr: scores of candidate poses",
-    "round": "poses.json, capture/, field.ply, scores.csv, metrics.json of round t",
-    "materials": "materials.json, a picture and an exemplar of each material, its objects (with `materials: auto`)",
-    "levels": "level{l}.ply: levels of detail",
-    "tiles": "seams.json and tiles/lod{l}_tile_{T}.ply",
-    "bundle": "davgswt.json, chunks/, gswt.zip, exports/",
-    "terrain": "page/, walker.png, oblique.png, above.png",
 }
 
 NAME = rf"(?!(?:{'|'.join(RESERVED)})(?:/|$))[a-z][a-z0-9_-]*"
@@ -74,16 +61,7 @@ WILDCARDS = {
     "tau": FRACTION,
 }
 _STOPS = {"photos": "_upto", "marginal_gain": "_gain"}  # keys of the config's `stop`, and their marks in a path
-_EXTERNAL = {
-    "policy": "external",
-    "prior": "none",
-    "p_drop": "0",
-    "lam": "0",
-    "k": 0,
-    "stop": "",
-    "t": 0,
-    "inpainted": "",
-}
+_EXTERNAL = dict(policy="external", prior="none", p_drop="0", lam="0", k=0, stop="", t=0, inpainted="")
 
 
 def encode_number(value: int | float | str) -> str:
@@ -108,11 +86,6 @@ def decode_stop(text: str) -> dict[str, int | float]:
     return stop
 
 
-def encode_inpainted(inpaint: bool, prior: str) -> str:
-    """The directory level of an inpainted field below its round; empty without inpainting."""
-    return f"/inpainted_{prior}" if inpaint else ""
-
-
 def encode_branch(config: Mapping, scene: str, policy: str | None = None, changes: Mapping | None = None) -> dict:
     """The wildcards of what is made of a scene, by the config or by settings that replace some of the config's.
 
@@ -131,14 +104,10 @@ def encode_branch(config: Mapping, scene: str, policy: str | None = None, change
     policy = resolve_policy(policy or settings["policy"], entry.get("agent"))
     unread = ZERO_SETTINGS.get(policy, ()) if policy in PRIOR_POLICIES else ("p_drop", "lam")
     numbers = {key: "0" if key in unread else encode_number(settings[key]) for key in ("p_drop", "lam")}
-    return (
-        fit
-        | {"policy": policy, "prior": settings["prior"] if policy in PRIOR_POLICIES else "none"}
-        | numbers
-        | {"k": settings["k"], "stop": encode_stop(config["stop"]), "t": settings["rounds"]}
-        | {"inpainted": encode_inpainted(config["inpaint"], config["prior"])}
-        | tiles
-    )
+    rounds = {"k": settings["k"], "stop": encode_stop(config["stop"]), "t": settings["rounds"]}
+    rounds["inpainted"] = f"/inpainted_{config['prior']}" if config["inpaint"] else ""  # a level below the round
+    prior = settings["prior"] if policy in PRIOR_POLICIES else "none"
+    return fit | {"policy": policy, "prior": prior} | numbers | rounds | tiles
 
 
 def stage_template(stage: str) -> str:
@@ -199,9 +168,3 @@ def policy_pattern(policy: str) -> str:
     zeros = ZERO_SETTINGS.get(policy, ())
     p_drop, lam = ("0" if key in zeros else "[^_]+" for key in ("p_drop", "lam"))
     return f"{policy}(?!_none_)(?=_[a-z0-9_-]+_pdrop{p_drop}_lam{lam}_)"
-
-
-def describe_tree() -> str:
-    """The tree as text, for results/README.md."""
-    shown = [(f"{RESULTS}/{stage_template(stage)}/", contents) for stage, contents in CONTENTS.items()]
-    return "\n".join(f"{path}\n    {contents}" for path, contents in shown)

@@ -63,8 +63,8 @@ def map_ahead(function: Callable[[Item], Result], items: Iterable[Item], threads
 def map_in_single_threads(workers: Sequence[Callable[[Item], Result]], items: Iterable[Item]) -> Iterator[Result]:
     """Yield a worker's result of each item, in their order, with as many items at work as there are workers.
 
-    Each item is worked on by one thread of PyTorch, so no result depends on the number of workers. They are copies of
-    one function: what has a state of its own (a network's dropout masks) may not be shared by two threads.
+    Each item is worked on by one thread of PyTorch, so no result depends on the number of workers. The workers are
+    copies of one function, since two threads cannot share a state such as a network's dropout masks.
     """
     free: SimpleQueue[Callable[[Item], Result]] = SimpleQueue()
     for worker in workers:

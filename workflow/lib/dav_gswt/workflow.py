@@ -27,9 +27,7 @@ class NamedEntries(dict):
         self.table = table
 
     def __missing__(self, name: str):
-        from snakemake.exceptions import (
-            WorkflowError,
-        )  # not above: jobs unpickle tables, and this import takes a second
+        from snakemake.exceptions import WorkflowError  # deferred: jobs unpickle tables, and it takes a second
 
         near = get_close_matches(name, self, 1)
         meant = f" (is {near[0]!r} meant?)" if near else ""

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.photos.synthetic import noise
-from dav_gswt.photos.synthetic.land import smoothstep
+from dav_gswt.photos.synthetic.noise import smoothstep
 
 Map = Callable[[Array, Array], Array]  # a value at x, y
 Driver = Callable[[Array, Array, Array, Array], Array]  # a value at x, y, height and slope

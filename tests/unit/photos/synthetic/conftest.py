@@ -20,7 +20,7 @@ RINGS[grass] = {"NEAR": 3.0, "MIDDLE": 4.0, "FAR": 6.0, "REACH": 5.0}
 def small_land():
     """Land of few texels on a coarse grid, with nothing far away: quick to make, and otherwise the same.
 
-    Returns a list to which the height function of every land that is made is added.
+    Returns a list to which the height function of each land is appended.
     """
     heights = []
 
@@ -41,12 +41,12 @@ def small_land():
                 patch.setattr(family, ring, end)
         patch.setattr(flowers, "TURFS", ((0.5, 0.0, 3.0, 30, 2),))
         patch.setattr(flowers, "SWATHES", ((1.4, 3.0, 5.0, 4, 1),))
-        patch.setattr(planet, "SORTS", tuple((*span, 6.0, 3, min(fine, 2)) for *span, _, _, fine in planet.SORTS))
+        patch.setattr(planet, "SORTS", tuple((*sort, 6.0, 3, min(fine, 2)) for *sort, _, _, fine in planet.SORTS))
         patch.setattr(land, "STONE_SQUARE", 4.0)
         patch.setattr(land, "make_ground_mesh", make_coarse_ground)
-        synthetic._load_scene.cache_clear(), synthetic._load_isolated.cache_clear()
+        synthetic.load_scene.cache_clear()
         yield heights
-    synthetic._load_scene.cache_clear(), synthetic._load_isolated.cache_clear()
+    synthetic.load_scene.cache_clear()
 
 
 @pytest.fixture

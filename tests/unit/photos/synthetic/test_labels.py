@@ -8,7 +8,7 @@ import pytest
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import Extent, Square
 from dav_gswt.images import image_files
-from dav_gswt.photos.synthetic import labels, meshes
+from dav_gswt.photos.synthetic import desert, labels, meshes
 from dav_gswt.photos.synthetic.labels import GroundLabels, LandObject
 
 SQUARE = Square(-2.0, -1.0, 4.0)  # x from -2 to 2, y from -1 to 3
@@ -16,7 +16,7 @@ SQUARE = Square(-2.0, -1.0, 4.0)  # x from -2 to 2, y from -1 to 3
 
 def ball(kind, x, y, radius):
     """A sphere of a kind about a place."""
-    mesh = meshes.make_stone(np.random.default_rng(0), 4)
+    mesh = meshes.make_stone(np.random.default_rng(0), 4, desert.STONES)
     unit = mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
     return LandObject(kind, (radius * unit + [x, y, 0.0]).astype(np.float32))
 
@@ -27,7 +27,7 @@ def known():
     material = np.ones((16, 16), int)
     material[:8] = 2
     objects = ball("shrub", 1.0, 2.0, 0.5), ball("boulder", -1.0, 0.0, 0.25), ball("boulder", 9.0, 0.0, 0.5)
-    return GroundLabels({"sand": 1, "meadow": 2}, material, 8.0, objects, frozenset())
+    return GroundLabels({"sand": 1, "meadow": 2}, material, 8.0, objects)
 
 
 def test_rows_of_the_map_run_to_the_north_and_the_material_repeats(known):
@@ -35,8 +35,8 @@ def test_rows_of_the_map_run_to_the_north_and_the_material_repeats(known):
     assert (found.material[:20] == 1).all() and (found.material[20:] == 2).all()
     row, column = np.argwhere(found.object == 1).mean(axis=0)
     assert (column, row) == pytest.approx(((1.0 + 2.0) * 20 - 0.5, (2.0 + 1.0) * 20 - 0.5), abs=0.3)
-    y = np.array([-0.1, 0.1, 3.9, 4.1, 8.1, -7.9])
-    assert known.material_at(np.full(6, 33.0), y).tolist() == [1, 2, 2, 1, 2, 2]
+    far = labels.draw_label_map(known, Square(-2.0, -9.0, 12.0), 120)
+    assert far.material[:, 7].tolist() == 10 * [2 - 1] + 40 * [2] + 40 * [1] + 30 * [2]
 
 
 def test_the_footprint_of_an_object_is_its_outline_from_above_cut_at_the_border(known):
@@ -47,7 +47,7 @@ def test_the_footprint_of_an_object_is_its_outline_from_above_cut_at_the_border(
         area = (found.object == thing.id).sum() * cell**2
         assert area == pytest.approx(np.pi * radius**2, rel=0.12)  # half a cell around
         assert thing.radius == pytest.approx(radius, rel=0.01)
-    known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 8.0, (ball("shrub", 2.0, 0.0, 0.5),), frozenset())
+    known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 8.0, (ball("shrub", 2.0, 0.0, 0.5),))
     found = labels.draw_label_map(known, SQUARE, 200)
     assert (found.object == 1).sum() * 0.02**2 == pytest.approx(np.pi * 0.5**2 / 2, rel=0.12)
 
@@ -57,12 +57,6 @@ def test_twigs_with_gaps_between_them_are_one_footprint():
     far_leaf = [[0.8, 0.8, 0.1]]
     covered = labels.rasterize_footprint(np.vstack([twigs, far_leaf]).astype(np.float32), Square(-1.0, -1.0, 2.0), 200)
     assert covered.sum() * 0.01**2 == pytest.approx(0.6**2, rel=0.1)
-
-
-def test_a_place_belongs_to_the_nearest_object_of_the_kind_that_holds_it(known):
-    x, y = np.array([1.0, 1.3, 1.6, -1.0]), np.array([2.0, 2.3, 2.0, 0.2])
-    assert labels.label_places(known, x, y, "shrub").tolist() == [1, 1, 0, 0]
-    assert labels.label_places(known, x, y, "boulder").tolist() == [0, 0, 0, 2]
 
 
 def test_files_keep_a_map_whose_first_row_is_the_northern_one(known, tmp_path):

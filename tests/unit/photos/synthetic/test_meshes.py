@@ -5,32 +5,33 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dav_gswt.photos.synthetic import flower_plants, grass_plants, meadow_plants, meshes, planet, rocks
+from dav_gswt.photos.synthetic import desert, meshes, planet, plants
 
+BUSHES = plants.POPPY, plants.CORNFLOWER, plants.OXEYE, plants.BUTTERCUP, plants.COSMOS, plants.MARIGOLD, plants.DAISY
 PLANTS = {
-    "shrub": meshes.make_shrub,
-    "dry tuft": meshes.make_tuft,
-    "tuft": meadow_plants.make_tuft,
-    "seed grass": meadow_plants.make_seed_grass,
-    "clover": meadow_plants.make_clover,
-    "spire": partial(flower_plants.make_spire, colour=flower_plants.LARKSPUR),
-    "umbel": flower_plants.make_umbel,
-    "tussock": partial(grass_plants.make_tussock, tint=grass_plants.TINTS[0]),
-    "dock": grass_plants.make_dock,
+    "shrub": plants.make_shrub,
+    "dry tuft": plants.make_dry_tuft,
+    "tuft": plants.make_tuft,
+    "seed grass": plants.make_seed_grass,
+    "clover": plants.make_clover,
+    "spire": partial(plants.make_spire, colour=plants.LARKSPUR),
+    "umbel": plants.make_umbel,
+    "tussock": partial(plants.make_tussock, tint=plants.TINTS[0]),
+    "dock": plants.make_dock,
 }
-PLANTS |= {f"flower {k}": partial(meadow_plants.make_flower, kind=f) for k, f in enumerate(meadow_plants.FLOWERS)}
-PLANTS |= {f"bush {k}": partial(flower_plants.make_bush, kind=kind) for k, kind in enumerate(flower_plants.DISCS)}
-PLANTS |= {ear.__name__: ear for ear in grass_plants.EARS}
+PLANTS |= {f"flower {k}": partial(plants.make_flower, kind=f) for k, f in enumerate(plants.MEADOW_FLOWERS)}
+PLANTS |= {f"bush {k}": partial(plants.make_bush, kind=kind) for k, kind in enumerate(BUSHES)}
+PLANTS |= {ear.__name__: ear for ear in plants.EARS}
 STONES = {
-    "stone": partial(meshes.make_stone, subdivisions=2),
-    "rock": partial(rocks.make_rock, subdivisions=2, palette=planet.ROCKS),
+    "stone": partial(meshes.make_stone, subdivisions=2, palette=desert.STONES),
+    "rock": partial(meshes.make_rock, subdivisions=2, palette=planet.ROCKS),
 }
 MATS = {
-    "mat": partial(meadow_plants.make_mat, count=40, length=0.12, dry=0.2),
-    "stand": partial(grass_plants.make_stand, count=40, length=0.9, width=0.01, tint=grass_plants.TINTS[1]),
-    "flat": partial(grass_plants.make_flat_grass, count=40, length=0.9, width=0.01, tint=grass_plants.TINTS[1]),
-    "swathe": lambda rng: flower_plants.make_swathe(
-        rng, [flower_plants.make_bush(rng, flower_plants.POPPY) for _ in range(2)], 4, (0.3, 0.4)
+    "mat": partial(plants.make_mat, count=40, length=0.12, dry=0.2),
+    "stand": partial(plants.make_stand, count=40, length=0.9, width=0.01, tint=plants.TINTS[1]),
+    "flat": partial(plants.make_flat_grass, count=40, length=0.9, width=0.01, tint=plants.TINTS[1]),
+    "swathe": lambda rng: plants.make_swathe(
+        rng, [plants.make_bush(rng, plants.POPPY) for _ in range(2)], 4, (0.3, 0.4)
     ),
 }
 EVERY = PLANTS | STONES | MATS
@@ -72,7 +73,7 @@ def test_a_mesh_is_scaled_turned_and_moved():
 def test_a_fresh_crater_has_its_depth_its_rim_and_an_end():
     one, round_ = np.array([[0.5, -0.2, 2.0, 1.0]]), np.zeros((1, 6))
     r = np.array([0.0, 0.5, 1.0, 1.2, 2.0, 3.5, 4.0])
-    z = rocks.crater_relief(0.5 + r, np.full(r.shape, -0.2), one, round_)
-    assert z[0] == pytest.approx(-2.0 * rocks.DEPTH, rel=1e-6)
-    assert z[2:4].max() == pytest.approx(2.0 * rocks.RIM, rel=0.5) and z[2] > z[1]
+    z = planet.crater_relief(0.5 + r, np.full(r.shape, -0.2), one, round_)
+    assert z[0] == pytest.approx(-2.0 * planet.DEPTH, rel=1e-6)
+    assert z[2:4].max() == pytest.approx(2.0 * planet.RIM, rel=0.5) and z[2] > z[1]
     assert z[3] > z[4] > 0 and z[5] == z[6] == 0

@@ -7,7 +7,7 @@ from fixtures import photos as synth
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.scene_frame import Extent, read_scene_frame
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
-from dav_gswt.photos.synthetic import photo_set, truth
+from dav_gswt.photos.synthetic import photo_set
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.synthetic.labels import GroundLabels, read_label_map
 
@@ -69,14 +69,13 @@ def dark(monkeypatch):
         none = np.zeros(0, int)
         return ColmapModel(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
 
-    known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 16.0, (), frozenset())
+    known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 16.0, ())
     monkeypatch.setattr(synthetic, "render", lambda scene, camera: np.zeros((64, 64, 3), np.float32))
-    monkeypatch.setattr(truth, "write_truth", lambda path, scene, camera: path.write_text(str(camera.centre.tolist())))
-    monkeypatch.setattr(synthetic, "load_labels", lambda scene: known)
+    monkeypatch.setattr(synthetic, "load_scene", lambda scene: synthetic.LoadedScene(None, known))
     monkeypatch.setattr(photo_set, "triangulate_points", nothing)
 
 
-def test_test_views_are_written_by_group_and_every_picture_with_its_truth(dark, tmp_path):
+def test_test_views_are_written_by_group_and_the_labels_of_the_ground(dark, tmp_path):
     entry = ENTRY | {"layout": "cap", "min_elevation": 60, "oblique": 3}
     groups = {"high": ["test_00.png", "test_01.png"], "oblique": ["test_02.png", "test_03.png", "test_04.png"]}
     photo_set.render_set(entry, tmp_path)
@@ -85,9 +84,9 @@ def test_test_views_are_written_by_group_and_every_picture_with_its_truth(dark, 
     assert frame.test == tuple(name for group in groups.values() for name in group)
     assert frame.images == frame.registered == 3
     stored = read_colmap_model(tmp_path / "sparse")
-    for name, camera in zip(frame.test, synthetic.test_views(entry), strict=True):
+    tests = [camera for cameras in synthetic.test_views(entry).values() for camera in cameras]
+    for name, camera in zip(frame.test, tests, strict=True):
         assert stored.camera(name).centre == pytest.approx(camera.centre)
-        assert (tmp_path / "truth" / name).with_suffix(".exr").read_text() == str(camera.centre.tolist())
     pictures = sorted(p.name for p in (tmp_path / "images").iterdir())
     assert pictures == [*frame.test, "view_00.png", "view_01.png", "view_02.png"]
     found = read_label_map(tmp_path / "truth")

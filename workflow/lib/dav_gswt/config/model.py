@@ -65,8 +65,8 @@ class Config(ConfigModel):
         0.6,
     )
     lpips: Lpips = key(
-        "the weights of LPIPS: `installed`, those that come with the set-up; a path of `alexnet.ckpt` or a converted "
-        "`.safetensors`; `none`: cuts know colours and superpixels only, scores and metrics lack LPIPS",
+        "the weights of LPIPS: `installed`, those that come with the set-up; a path of `alexnet.ckpt`; `none`: cuts "
+        "know colours and superpixels only, scores and metrics lack LPIPS",
         "installed",
     )
     segmenter: Segmenter = key(

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.geometry.cameras import Camera, look_at, pinhole
+from dav_gswt.geometry.cameras import Camera, pinhole
 
 Place = tuple[float, float, float]  # elevation, azimuth, radius
 NEARER = 0.9  # radius of a test view, relative to other views
@@ -30,9 +30,7 @@ def orbit(elevation, azimuth, radius, target, width: int, height: int, fov) -> C
     target = np.asarray(target, float)
     outward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     upward = np.array([-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)])  # of length 1 at every elevation
-    rotation, translation = look_at(target + radius * outward, target, upward)
-    focal = 0.5 * width / np.tan(0.5 * np.radians(fov))
-    return Camera(rotation, translation, focal, focal, width / 2, height / 2, width, height)
+    return pinhole(target + radius * outward, target, width, height, fov, upward)
 
 
 def start_ring(n: int, elevation: float, radius: float) -> list[Place]:
@@ -62,11 +60,10 @@ def hemisphere(n: int, lowest_elevation: float, radius: float, turn: float = 0.0
 def spread_free(
     n: int, lowest_elevation: float, radii: tuple[float, float], reach: float
 ) -> list[tuple[Place, tuple[float, float]]]:
-    """n places, each about an aim point of its own on the ground: (place, (x, y)).
+    """n places as of `hemisphere`, each about an aim point of its own on the ground: (place, (x, y)).
 
-    Directions are those of `hemisphere`; radii (uniform between the two) and aim points (uniform over a square of side
-    `reach` about the target) follow a sequence of low discrepancy.
-    Source: Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018 (R3).
+    Radii (uniform between the two) and aim points (uniform over a square of side `reach` about the target) follow a
+    sequence of low discrepancy: Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018 (R3).
     """
     spread = (0.5 + np.outer(np.arange(1, n + 1), PLASTIC ** -np.arange(1.0, 4.0))) % 1.0
     radius = radii[0] + (radii[1] - radii[0]) * spread[:, 2]

@@ -53,11 +53,8 @@ class Camera:
         y = (np.arange(self.height) + 0.5 - self.cy) / self.fy
         x, y = np.meshgrid(x, y)
         zero, one = np.zeros_like(x), np.ones_like(x)
-        offset, step = (
-            (np.stack([x, y, zero], -1), np.stack([zero, zero, one], -1))
-            if self.orthographic
-            else (np.stack([zero, zero, zero], -1), np.stack([x, y, one], -1))
-        )
+        across, ahead = np.stack([x, y, zero], -1), np.stack([zero, zero, one], -1)
+        offset, step = (across, ahead) if self.orthographic else (0 * across, across + ahead)
         return self.centre + offset @ self.rotation, step @ self.rotation
 
 
@@ -81,9 +78,9 @@ def look_at(eye, target, up=(0.0, 0.0, 1.0)) -> tuple[Float[Array, "3 3"], Float
     return rotation, -rotation @ eye
 
 
-def pinhole(eye, target, width: int, height: int, fov_degrees: float) -> Camera:
-    """A pinhole camera; the field of view is that of the picture's width."""
-    rotation, translation = look_at(eye, target)
+def pinhole(eye, target, width: int, height: int, fov_degrees: float, up=(0.0, 0.0, 1.0)) -> Camera:
+    """A pinhole camera as of `look_at`; the field of view is measured across the picture's width."""
+    rotation, translation = look_at(eye, target, up)
     focal = 0.5 * width / np.tan(0.5 * np.radians(fov_degrees))
     return Camera(rotation, translation, focal, focal, width / 2, height / 2, width, height)
 
@@ -108,9 +105,8 @@ def camera_from_json(values: dict) -> Camera:
     """The camera that `camera_to_json` wrote. Raises: KeyError, TypeError or ValueError: not such values."""
     rotation, translation = np.array(values["rotation"], float), np.array(values["translation"], float)
     lens = [values[key] for key in ("fx", "fy", "cx", "cy", "width", "height")]
-    if any(isinstance(v, bool) or not isinstance(v, int | float) for v in lens):
-        raise TypeError("a camera's lens is none")
-    if not all(isinstance(size, int) and size > 0 for size in lens[4:]):
+    numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in lens)
+    if not numbers or not all(isinstance(size, int) and size > 0 for size in lens[4:]):
         raise TypeError("a camera's lens is none")
     if rotation.shape != (3, 3) or translation.shape != (3,) or not np.allclose(rotation @ rotation.T, np.eye(3)):
         raise ValueError("a camera's rotation is none")

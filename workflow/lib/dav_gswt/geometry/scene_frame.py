@@ -12,18 +12,12 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import read_record, write_json
 from dav_gswt.geometry.georeference import Georeference
 
-_COMMON = ("kind", "unit", "flying_height", "exemplar", "extent")
+_COMMON = "kind unit flying_height exemplar extent "
 _KEYS = {  # of ground.json by kind of scene, in the order in which they are written
-    "photos": (
-        *_COMMON,
-        *("photos_per_cell", "relief", "georeference", "test", "images", "registered", "left_out"),
-        *("focal_ratio", "focal", "reprojection_error", "points", "verdict"),
-    ),
-    "synthetic": (*_COMMON, "test", "test_groups", "images", "registered", "left_out", "focal_ratio", "renderer"),
-    "field": (
-        *_COMMON,
-        *("test", "relief", "gaussians", "removed", "images", "registered", "left_out", "focal_ratio"),
-    ),
+    "photos": _COMMON + "photos_per_cell relief georeference test images registered left_out focal_ratio focal "
+    "reprojection_error points verdict",
+    "synthetic": _COMMON + "test test_groups images registered left_out focal_ratio renderer",
+    "field": _COMMON + "test relief gaussians removed images registered left_out focal_ratio",
 }
 
 
@@ -152,7 +146,7 @@ def write_scene_frame(path: Path | str, frame: SceneFrame) -> None:
     values = asdict(frame)
     if frame.georeference is None:
         del values["georeference"]
-    write_json(path, {key: values[key] for key in _KEYS[frame.kind] if key in values})
+    write_json(path, {key: values[key] for key in _KEYS[frame.kind].split() if key in values})
 
 
 def read_scene_frame(path: Path | str) -> SceneFrame:
@@ -164,9 +158,8 @@ def read_scene_frame(path: Path | str) -> SceneFrame:
     frame = read_record(path, SceneFrame, "make the photos stage again")
     values = [*asdict(frame.exemplar).values(), *asdict(frame.extent).values(), frame.flying_height]
     if not np.isfinite(values).all() or not frame.exemplar.side > 0:
-        raise InputError(
-            f"{path}: not as the workflow writes it (the exemplar is no square); make the photos stage again"
-        )
+        problem = "not as the workflow writes it (the exemplar is no square)"
+        raise InputError(f"{path}: {problem}; make the photos stage again")
     if frame.georeference and not frame.georeference.is_on_earth:
         raise InputError(f"{path}: its georeference is no place on earth; check the GPS positions of the photos")
     return frame

@@ -1,34 +1,27 @@
-"""Matplotlib figures: create, save, arrange pictures."""
+"""Matplotlib figures: create, save, arrange pictures; JPEGs for pages."""
 
+import io
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
 
 from dav_gswt.files import atomic_file, copy_file
 from dav_gswt.images import image_files
 
 QUALITY = 88  # of JPEGs
 OKABE_ITO = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # for any colour vision
-KINDS = (
-    (0.90, 0.62, 0.0),
-    (0.0, 0.62, 0.45),
-    (0.0, 0.45, 0.70),
-    (0.80, 0.47, 0.65),
-)  # some of them, of kinds of ground
+KINDS = ((0.90, 0.62, 0.0), (0.0, 0.62, 0.45), (0.0, 0.45, 0.70), (0.80, 0.47, 0.65))  # of kinds of ground
 
 
-def make_figure(
-    width: float,
-    height: float,
-    w_pad: float | None = None,
-    h_pad: float | None = None,
-    wspace: float | None = None,
-    hspace: float | None = None,
-):
-    """An empty figure, inches wide and high, 120 dots an inch. Padding: as of matplotlib's ConstrainedLayoutEngine."""
+def make_figure(width: float, height: float, **padding: Any):
+    """An empty figure, inches wide and high, 120 dots an inch. padding: of matplotlib's ConstrainedLayoutEngine."""
     from matplotlib.figure import Figure  # here, not above: it takes a second to load, and most jobs draw nothing
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    engine = ConstrainedLayoutEngine(w_pad=w_pad, h_pad=h_pad, wspace=wspace, hspace=hspace)
-    return Figure(figsize=(width, height), dpi=120, layout=engine)
+    return Figure(figsize=(width, height), dpi=120, layout=ConstrainedLayoutEngine(**padding))
 
 
 def save_figure(figure, path: Path | str) -> None:
@@ -36,18 +29,15 @@ def save_figure(figure, path: Path | str) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     FigureCanvasAgg(figure)
-    as_photo = Path(path).suffix == ".jpg"
     with atomic_file(path) as part:
-        if as_photo:
+        if Path(path).suffix == ".jpg":
             figure.savefig(part, format="jpg", pil_kwargs={"quality": QUALITY})
         else:
             figure.savefig(part, format="png", metadata={"Software": None})
 
 
 def copy_figure(source: Path | str, target: Path | str) -> None:
-    """A picture for docs/: the same file, or as a JPEG, a fifth of the bytes where it shows photos, by the target's
-    ending.
-    """
+    """Copy a picture: the same file, or a JPEG by the target's ending, a fifth of the bytes where it shows photos."""
     if Path(target).suffix != ".jpg":
         copy_file(source, target)
     else:
@@ -72,3 +62,13 @@ def draw_sheet(pictures: dict[str, list[Path | str]], heads: list[str], tall: fl
             axes.set_title(f"{name}: {head}" if axes is line[0] else head, fontsize=7, loc="left", pad=2)
             axes.axis("off")
     return figure
+
+
+def encode_jpeg(image: Float[Array, "h w 3"], quality: int) -> bytes:
+    """A progressive JPEG of sRGB-encoded colours in [0, 1], the same bytes each time; quality: 1 to 95."""
+    from matplotlib.image import imsave
+
+    pixels, buffer = np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8), io.BytesIO()
+    options = {"quality": quality, "optimize": True, "progressive": True}
+    imsave(buffer, np.ascontiguousarray(pixels), format="jpeg", pil_kwargs=options)
+    return buffer.getvalue()

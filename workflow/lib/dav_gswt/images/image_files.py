@@ -50,9 +50,8 @@ def list_photos(folder: Path | str) -> list[Path]:
         hint = f" ({unsupported[0].name} is of a kind that is not read: convert it to JPEG)" if unsupported else ""
         raise InputError(f"{folder}: no photos in this folder{hint}; put .jpg, .png or .tif files directly into it")
     if unsupported:
-        _log.warning(
-            "%s: %d files like %s are not read; convert them to JPEG", folder, len(unsupported), unsupported[0].name
-        )
+        example = unsupported[0].name
+        _log.warning("%s: %d files like %s are not read; convert them to JPEG", folder, len(unsupported), example)
     return photos
 
 
@@ -70,10 +69,9 @@ def read_stored_size(path: Path | str) -> tuple[int, int, int]:
 
 
 def read_photo(path: Path | str) -> Float32[Array, "h w 3"]:
-    """A photo as sRGB-encoded colours in [0, 1], upright by its EXIF orientation.
+    """A photo of any bit depth as sRGB-encoded colours in [0, 1], upright by its EXIF orientation, without alpha.
 
-    Any bit depth. Grey becomes three equal channels; alpha is dropped, and the colours stay as they are stored.
-    Raises: InputError: missing, not an image, cut short (a decoder's warning counts), or too large.
+    Grey becomes three equal channels. Raises: InputError: missing, not an image, cut short, or too large.
     """
     return _read_colours(path)[0]
 
@@ -149,7 +147,7 @@ def _write_pixels(path: Path | str, spec: oiio.ImageSpec, pixels: Array) -> None
     oiio.attribute("threads", 1)
     spec["png:compressionLevel"] = 2  # a third of the time of the default, 6; files are 3 % smaller to 4 % larger
     with atomic_file(path) as part:
-        file = oiio.ImageOutput.create(str(part))
+        file = oiio.ImageOutput.create(str(part))  # by the ending, which need not be .png
         if file is None:
             raise ValueError(f"{path}: {_first_line(oiio.geterror())}")
         done = file.open(str(part), spec) and file.write_image(pixels)
@@ -275,14 +273,10 @@ def read_exr_parts(path: Path | str) -> dict[str, tuple[dict[str, Array], dict[s
 
 
 def _read_part(part) -> tuple[dict[str, Array], dict[str, str]]:
-    texts = _texts(part)
+    texts = {k: v for k, v in part.header.items() if isinstance(v, str) and k != "name"}
     shown = ("R", "G", "B") if texts.pop(PREVIEW, None) is not None else ()
     channels = {name: np.array(channel.pixels) for name, channel in part.channels.items() if name not in shown}
     return channels, texts
-
-
-def _texts(part) -> dict[str, str]:
-    return {k: v for k, v in part.header.items() if isinstance(v, str) and k != "name"}
 
 
 def _open_image(path: Path | str):

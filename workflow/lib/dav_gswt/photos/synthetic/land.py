@@ -1,24 +1,28 @@
-"""The land of a synthetic scene, and what its families share: options, relief and scattered stones.
+"""The land of a synthetic scene, and what its families share: relief, scattered stones and plants.
 
-Metres, z up; the mean ground over the exemplar square about the origin is at z = 0.
+Metres, z up; the mean ground over the exemplar square about the origin is at z = 0. Rasters over a repeating square of
+side PERIOD say what grows where, from 0 (nowhere) to 1 (everywhere). Until `place_plants` puts them on the ground,
+plants are rows of x, y, size, and whether they follow the slope of the ground (1) or stand upright (0).
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError
 from dav_gswt.photos.synthetic import meshes, noise
 from dav_gswt.photos.synthetic.labels import GroundLabels
 from dav_gswt.photos.synthetic.meshes import Mesh
+from dav_gswt.photos.synthetic.noise import smoothstep
 
+PERIOD = 16.0  # metres
+CELLS = 512  # per side of a raster: 3.1 cm a cell
 STONE_SQUARE = 16.0  # metres: side of the square about the origin that has stones
+RGB = tuple[float, float, float]
 Height = Callable[[Array, Array], Array]  # a value at x, y, such as the height of the ground
-Wave = tuple[float, float, float, float]  # of far hills: wave numbers along x and y, phase, weight
 
 
 @dataclass(frozen=True)
@@ -27,9 +31,9 @@ class Light:
 
     elevation: float  # of the sun
     azimuth: float  # of the sun, from +x towards +y
-    sun: Float[Array, "3"]
-    zenith: Float[Array, "3"]
-    horizon: Float[Array, "3"]
+    sun: RGB
+    zenith: RGB
+    horizon: RGB
     below: Float[Array, "3"]  # below the horizon: light reflected by far ground
 
 
@@ -38,8 +42,8 @@ class Land:
     """A piece of land ready to be rendered.
 
     ground: coloured by `albedo`, which repeats after `period` metres. plants: kinds, each about 1 high. places: one row
-    per plant: its kind, x, y, z, size in metres, yaw in radians, and the ground's slope along x and along y that it
-    follows (0 0: it is upright). labels: true materials and objects, where a family knows them.
+    per plant: its kind, x, y, z, size in metres, yaw in radians, and the slope along x and along y that it follows.
+    labels: true materials and objects, where a family knows them.
     """
 
     ground: Mesh
@@ -52,49 +56,36 @@ class Land:
     labels: GroundLabels | None = None
 
 
-@dataclass(frozen=True)
-class FamilyOptions:
-    """Base of the options of a family: numbers, each with bounds (see `option`)."""
+class Hills(NamedTuple):
+    """Far hills: sine waves whose height is the product of two amplitudes.
 
-
-Options = TypeVar("Options", bound=FamilyOptions)
-
-
-def option(default: float, least: float, most: float) -> Any:
-    """A field of FamilyOptions."""
-    return field(default=default, metadata={"bounds": (least, most)})
-
-
-def option_bounds(options: type[FamilyOptions]) -> dict[str, tuple[float, float]]:
-    """The least and the greatest value of every option."""
-    return {f.name: f.metadata["bounds"] for f in fields(options)}
-
-
-def make_options(family: str, kind: type[Options], given: dict[str, Any]) -> Options:
-    """The options of a family with some values given.
-
-    Raises: InputError: an unknown name or a value out of bounds, by name.
+    rise: distances from the origin between which they rise. waves: wave numbers along x and y, phase, weight.
     """
-    bounds = option_bounds(kind)
-    for name, value in given.items():
-        if name not in bounds:
-            raise InputError(f"{family}: there is no option {name!r}; it has {', '.join(bounds)}")
-        low, high = bounds[name]
-        if not isinstance(value, int | float) or isinstance(value, bool) or not low <= value <= high:
-            raise InputError(f"{family}: {name} is {value!r}; it must be a number from {low} to {high}")
-    return kind(**{f.name: float(given.get(f.name, f.default)) for f in fields(kind)})
+
+    rise: tuple[float, float]
+    amplitudes: tuple[float, float]
+    waves: tuple[tuple[float, float, float, float], ...]
+
+    def height(self, x: Array, y: Array) -> Array:
+        one, other = self.amplitudes
+        far = smoothstep(*self.rise, np.hypot(x, y)) * one * other
+        return far * sum(weight * np.sin(kx * x + ky * y + phase) for kx, ky, phase, weight in self.waves)
 
 
-def fade_raster(raster: Float[Array, "n n"], period: float, x: Array, y: Array, start: float, end: float) -> Array:
+class FadingRaster(NamedTuple):
     """A repeating raster that fades to 0 from `start` to `end` metres from the origin."""
-    return noise.sample_raster(raster, period, x, y) * (1 - smoothstep(start, end, np.hypot(x, y)))
+
+    raster: Float[Array, "n n"]
+    start: float
+    end: float
+
+    def height(self, x: Array, y: Array, period: float = PERIOD) -> Array:
+        return noise.sample_raster(self.raster, period, x, y) * (1 - smoothstep(self.start, self.end, np.hypot(x, y)))
 
 
-def sum_hills(x: Array, y: Array, rise: tuple[float, float], amplitudes: tuple[float, float], waves: Sequence[Wave]):
-    """Far hills: sine waves times the product of `amplitudes`, rising between two distances from the origin."""
-    one, other = amplitudes
-    far = smoothstep(*rise, np.hypot(x, y)) * one * other
-    return far * sum(weight * np.sin(kx * x + ky * y + phase) for kx, ky, phase, weight in waves)
+def make_relief(large: FadingRaster, small: FadingRaster, hills: Hills) -> Height:
+    """The height of the ground before levelling: two rasters near the origin, and far hills."""
+    return lambda x, y: large.height(x, y) + small.height(x, y) + hills.height(x, y)
 
 
 def add_mounds(
@@ -104,14 +95,12 @@ def add_mounds(
 
     height, width, end: in sizes of the plant; end: distance, summed along x and y, from which there is none.
     """
-    order = np.argsort(x, axis=None)
-    sorted_x, at_x, at_y, out = x.ravel()[order], x.ravel(), y.ravel(), z.ravel().copy()
+    out = z.copy()
     for px, py, size in plants:
-        some = order[slice(*np.searchsorted(sorted_x, [px - end * size, px + end * size]))]
-        near = some[np.abs(at_x[some] - px) + np.abs(at_y[some] - py) < end * size]
-        square = (at_x[near] - px) ** 2 + (at_y[near] - py) ** 2
+        near = np.abs(x - px) + np.abs(y - py) < end * size
+        square = (x[near] - px) ** 2 + (y[near] - py) ** 2
         out[near] += height * size * np.exp(-square / (width * size) ** 2)
-    return out.reshape(z.shape)
+    return out
 
 
 def level_ground(height: Height, exemplar: float) -> Height:
@@ -124,8 +113,7 @@ def level_ground(height: Height, exemplar: float) -> Height:
 def make_ground_mesh(height: Height) -> Mesh:
     """The mesh of the ground: a grid that is fine about the origin and grows coarser towards the horizon."""
     fine, reach, growth = 0.022, 7.0, 1.06
-    steps = fine * growth ** np.arange(1, 125)
-    outer = reach + np.cumsum(steps)
+    outer = reach + np.cumsum(fine * growth ** np.arange(1, 125))
     axis = np.concatenate([-outer[::-1], np.linspace(-reach, reach, round(2 * reach / fine) + 1), outer])
     x, y = np.meshgrid(axis, axis)
     index = np.arange(x.size).reshape(x.shape)
@@ -137,7 +125,7 @@ def make_ground_mesh(height: Height) -> Mesh:
 
 def scatter_stones(
     rng: np.random.Generator, large: float, small: float, height: Height, colours: meshes.Colours
-) -> Mesh | None:
+) -> Mesh:
     """Stones of 3 to 25 cm and pebbles as one mesh, sunk a little into the ground.
 
     large, small: how many of either per 100 square metres.
@@ -148,13 +136,16 @@ def scatter_stones(
     pebbles = [meshes.make_stone(rng, 1, colours) for _ in range(24)]
     found = []
     for places, kinds in ((big, stones), (little, pebbles)):
-        if not len(places):
-            continue
-        z = height(places[:, 0], places[:, 1]) + 0.10 * places[:, 2]
-        for (x, y, size), up in zip(places, z, strict=True):
-            shape = kinds[rng.integers(len(kinds))]
-            found.append(meshes.transform_mesh(shape, (x, y, up), size, rng.uniform(0, 2 * np.pi)))
-    return meshes.merge_meshes(found) if found else None
+        found += lay_stones(rng, places, kinds, height(places[:, 0], places[:, 1]) + 0.10 * places[:, 2])
+    return meshes.merge_meshes(found)
+
+
+def lay_stones(rng: np.random.Generator, places: Float[Array, "n 3"], kinds: list[Mesh], z) -> list[Mesh]:
+    """A stone of a random kind at each row of x, y and size, with its centre at the height z."""
+    return [
+        meshes.transform_mesh(kinds[rng.integers(len(kinds))], (x, y, up), size, rng.uniform(0, 2 * np.pi))
+        for (x, y, size), up in zip(places, z, strict=True)
+    ]
 
 
 def scatter_disjoint(
@@ -162,13 +153,11 @@ def scatter_disjoint(
 ) -> Float[Array, "n 3"]:
     """x, y and size of objects on a square of `side` about the origin, in loose groups and without overlap.
 
-    density: per 100 square metres. Sizes lie between least and most; their density falls as size^-steep. An object for
-    which 12 tries find no free place is left out.
+    density: per 100 square metres. Sizes: as of `meshes.draw_sizes`. An object without a free place in 12 tries is left
+    out.
     """
     count = round(density * side * side / 100)
-    u = rng.uniform(size=count)
-    power = 1 - steep
-    sizes = np.sort((least**power + u * (most**power - least**power)) ** (1 / power))[::-1]
+    sizes = np.sort(meshes.draw_sizes(rng, count, least, most, steep))[::-1]
     groups = rng.uniform(-side / 2, side / 2, (max(1, count // 9), 2))
     taken = np.zeros((0, 3))
     for size in sizes:
@@ -194,7 +183,93 @@ def scatter_points(rng: np.random.Generator, density: Height, most: float, reach
     return candidates[kept & (np.hypot(*candidates.T) < reach)]
 
 
-def smoothstep(low: float, high: float, x: Array) -> Array:
-    """0 below low, 1 above high, smooth between."""
-    t = np.clip((x - low) / (high - low), 0, 1)
-    return t * t * (3 - 2 * t)
+def make_patches(rng: np.random.Generator, share: float, longest: float, shortest: float = 0.35) -> Float[Array, "n n"]:
+    """1 in patches that hold about `share` of the ground, 0 elsewhere, smooth between.
+
+    longest, shortest: wavelengths in metres of the patches and of their outlines.
+    """
+    raster = noise.make_noise(rng, CELLS, PERIOD, longest, shortest, 1.1)
+    low, high = np.quantile(raster, [max(0.0, 1 - 1.6 * share), min(1.0, 1 - 0.4 * share)])
+    return smoothstep(low, high, raster)
+
+
+def interpolate(raster: Float[Array, "n n"]) -> Height:
+    """A raster as a function of places."""
+    return lambda x, y: noise.sample_raster(raster, PERIOD, x, y)
+
+
+def fade_out(density: Height, start: float, end: float) -> Height:
+    """A density that falls to 0 from `start` to `end` metres from the origin."""
+    return lambda x, y: density(x, y) * (1 - smoothstep(start, end, np.hypot(x, y)))
+
+
+def lay_mats(
+    rng: np.random.Generator,
+    density: Height,
+    ring: tuple[float, float],
+    size: float,
+    overlap: float = 0.26,
+    jitter: float = 0.3,
+) -> Float[Array, "n 4"]:
+    """Mats of `size` on a jittered grid in a ring about the origin; a mat is kept with probability `density`.
+
+    overlap: share of a mat that its neighbour covers. jitter: in grid spacings. Mats follow the slope.
+    """
+    inner, outer = ring
+    spacing = (1 - overlap) * size
+    axis = np.arange(-outer, outer, spacing)
+    x, y = (v.ravel() + rng.uniform(-jitter, jitter, v.size) * spacing for v in np.meshgrid(axis, axis))
+    r = np.hypot(x, y)
+    kept = (rng.uniform(size=x.size) < density(x, y)) & (r >= inner) & (r < outer)
+    x, y = x[kept], y[kept]
+    return np.column_stack([x, y, size * rng.uniform(0.85, 1.2, x.size), np.ones(x.size)])
+
+
+def scatter_plants(
+    rng: np.random.Generator,
+    where: Float[Array, "c c"],
+    count: float,
+    sizes: tuple[float, float],
+    fade: tuple[float, float],
+    lies: float = 0.0,
+) -> Float[Array, "n 4"]:
+    """Single plants in proportion to the raster `where`, on average `count` per 100 square metres near the origin.
+
+    fade: distances in metres from the origin between which they thin out. lies: 1: they follow the slope.
+    """
+    share = where * (count / 100 / max(where.mean(), 1e-9))
+    places = scatter_points(rng, fade_out(interpolate(share), *fade), share.max(), fade[1])
+    return np.column_stack([places, rng.uniform(*sizes, len(places)), np.full(len(places), lies)])
+
+
+class PlantGroup(NamedTuple):
+    """Plants that share a choice of kinds. rows: see the module. yaw: radians; None: at random."""
+
+    kinds: list[Mesh]
+    rows: Float[Array, "n 4"]
+    yaw: Float[Array, "n"] | None = None
+
+
+def place_plants(
+    rng: np.random.Generator, groups: Iterable[PlantGroup], height: Height
+) -> tuple[list[Mesh], Float[Array, "n 8"]]:
+    """All kinds of plants, and the rows of Land.places.
+
+    Each plant is of a random kind of its group. A plant that follows the slope follows the slope over half its size.
+    """
+    plants, places = [], []
+    for kinds, rows, yaw in groups:
+        which = len(plants) + rng.integers(0, len(kinds), len(rows))
+        plants += kinds
+        x, y, size, lies = rows.T
+        reach = 0.5 * size + 0.01
+        along_x = lies * (height(x + reach, y) - height(x - reach, y)) / (2 * reach)
+        along_y = lies * (height(x, y + reach) - height(x, y - reach)) / (2 * reach)
+        turn = rng.uniform(0, 2 * np.pi, len(x)) if yaw is None else yaw
+        places.append(np.column_stack([which, x, y, height(x, y), size, turn, along_x, along_y]))
+    return plants, np.concatenate(places)
+
+
+def stand_upright(rng: np.random.Generator, which, x, y, z, size) -> Float[Array, "n 8"]:
+    """Rows of Land.places of things with a random yaw that do not follow the slope."""
+    return np.column_stack([which, x, y, z, size, rng.uniform(0, 2 * np.pi, len(x)), np.zeros((len(x), 2))])

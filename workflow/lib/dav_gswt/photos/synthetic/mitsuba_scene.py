@@ -1,103 +1,102 @@
-"""The mitsuba scene of a piece of land: meshes, instances, sun and sky. The caller sets the variant (`renderer`).
+"""The mitsuba scene of a piece of land (meshes, instances, sun and sky), and pictures of it.
 
-Compiled variants trace their kernel through every instance, again for each picture (1600 instances: 100 s), so there
-all plants of a kind are one mesh. They also sum the rays of a pixel in no fixed order.
+The variant is `scalar_rgb`: it runs wherever mitsuba does, instances cost no memory, and with a box filter no pixel is
+summed from two blocks, so the bytes do not depend on the number of threads.
 """
 
-from dataclasses import replace
+from importlib import metadata
 
 import mitsuba as mi
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 from numpy import ndarray as Array
 
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.photos.synthetic.land import Land, Light
 from dav_gswt.photos.synthetic.meshes import Mesh
 
+VARIANT = "scalar_rgb"
 BLOCK = 16  # pixels; fixed, since mitsuba's own choice follows the number of threads and the noise follows the blocks
+NEAR = 0.01  # metres: near plane
+
+mi.set_variant(VARIANT)
+
+
+def describe_renderer() -> dict[str, str | None]:
+    """The versions of the renderer, for ground.json."""
+    return {"mitsuba": metadata.version("mitsuba"), "variant": VARIANT, "llvm": None}
+
+
+def render_light(world, camera: Camera, samples: int, seed) -> Float32[Array, "h w 3"]:
+    """Linear light of a view. samples: rays a pixel, at least."""
+    view = mi.load_dict(make_sensor(camera, {"type": "multijitter", "sample_count": samples}))
+    light = mi.render(world, sensor=view, spp=view.sampler().sample_count(), seed=seed)
+    return np.array(light, np.float32)[..., :3]
+
+
+def make_sensor(camera: Camera, sampler: dict) -> dict:
+    """The description of a camera for mitsuba.
+
+    mitsuba looks along +z with +x to the *left* of the picture and +y up: COLMAP's axes with x and y turned over. Its
+    principal point offset is in widths (heights) of the picture, and grows as the principal point moves left (up).
+    Raises: ValueError: an orthographic camera, or pixels that are not square.
+    """
+    if camera.orthographic or not np.isclose(camera.fx, camera.fy, rtol=1e-9):
+        raise ValueError("synthetic scenes are photographed by pinhole cameras with square pixels")
+    pose = np.eye(4)
+    pose[:3, :3] = camera.rotation.T * [-1.0, -1.0, 1.0]
+    pose[:3, 3] = camera.centre
+    return {
+        "type": "perspective",
+        "fov_axis": "x",
+        "fov": float(np.degrees(2 * np.arctan(0.5 * camera.width / camera.fx))),
+        "near_clip": NEAR,
+        "far_clip": 1e4,
+        "principal_point_offset_x": 0.5 - camera.cx / camera.width,
+        "principal_point_offset_y": 0.5 - camera.cy / camera.height,
+        "to_world": mi.ScalarTransform4f(pose),  # pyright: ignore[reportCallIssue, reportArgumentType]: it takes arrays
+        "sampler": sampler,
+        "film": {
+            "type": "hdrfilm",
+            "width": camera.width,
+            "height": camera.height,
+            "rfilter": {"type": "box"},
+            "pixel_format": "rgb",
+            "component_format": "float32",
+        },
+    }
 
 
 def build_scene(land: Land):
-    """The mitsuba scene."""
+    """The mitsuba scene: every kind of plant is a group of shapes, and every plant an instance of it."""
+    light, period = land.light, land.period
+    e, a = np.radians([light.elevation, light.azimuth])
+    sun = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     bare = mi.load_dict({"type": "diffuse", "reflectance": _bitmap(land.albedo, "bilinear")})
-    coloured = mi.load_dict({"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}})
     parts = {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 3, "rr_depth": 10, "block_size": BLOCK},
-        "ground": _mesh("ground", land.ground, bare, land.ground.vertices[:, :2] / land.period),
+        "ground": _mesh("ground", land.ground, bare, land.ground.vertices[:, :2] / period),
         "sun": {
             "type": "directional",
-            "direction": [-float(v) for v in _unit_vector(land.light.elevation, land.light.azimuth)],
-            "irradiance": {"type": "rgb", "value": land.light.sun.tolist()},
+            "direction": [-float(v) for v in sun],
+            "irradiance": {"type": "rgb", "value": list(light.sun)},
             "sampling_weight": 0.6,
         },
-        "sky": _sky(land.light),
+        "sky": _sky(light),
     }
     if land.stones is not None:
-        parts["stones"] = _mesh("stones", land.stones, coloured)
-    return mi.load_dict(parts | (_merge_plants(land) if _is_compiled() else _instance_plants(land)))
-
-
-def isolate_shapes(world) -> dict:
-    """The ground and the stones of a scene, if there are any, each as a scene without light."""
-    found = {shape.id(): shape for shape in world.shapes() if shape.id() in ("ground", "stones")}
-    return {name: mi.load_dict({"type": "scene", name: shape}) for name, shape in found.items()}
-
-
-def build_objects(land: Land):
-    """The plants that are single objects (`labels`), as a scene without light; None: there are none."""
-    if land.labels is None:
-        return None
-    alone = replace(land, places=land.places[np.isin(land.places[:, 0], list(land.labels.plants))])
-    if not len(alone.places):
-        return None
-    return mi.load_dict({"type": "scene"} | (_merge_plants(alone) if _is_compiled() else _instance_plants(alone)))
-
-
-def _is_compiled() -> bool:
-    return not str(mi.variant()).startswith("scalar")
-
-
-def _instance_plants(land: Land) -> dict:
-    """Every kind of plant as a group of shapes, and an instance of it per plant."""
-    kinds = {
-        f"kind{k}": {"type": "shapegroup", "plant": _textured_mesh(f"plant{k}", mesh)}
-        for k, mesh in enumerate(land.plants)
-    }
-    found = {}
+        coloured = {"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}}
+        parts["stones"] = _mesh("stones", land.stones, mi.load_dict(coloured))
+    for k, mesh in enumerate(land.plants):
+        parts[f"kind{k}"] = {"type": "shapegroup", "plant": _textured_mesh(f"plant{k}", mesh)}
     for i, (kind, *place) in enumerate(land.places):
         group = {"type": "ref", "id": f"kind{int(kind)}"}
-        found[f"plant{i}"] = {"type": "instance", "group": group, "to_world": instance_transform(*place)}
-    return kinds | found
+        parts[f"plant{i}"] = {"type": "instance", "group": group, "to_world": _instance_transform(*place)}
+    return mi.load_dict(parts)
 
 
-def _merge_plants(land: Land) -> dict:
-    """All plants of a kind as one mesh."""
-    found = {}
-    for k, mesh in enumerate(land.plants):
-        places = land.places[land.places[:, 0] == k][:, 1:]
-        if len(places):
-            first = len(mesh.vertices) * np.arange(len(places))[:, None, None]
-            faces = (np.asarray(mesh.faces) + first).reshape(-1, 3)
-            colours = np.tile(_require_colours(mesh), (len(places), 1))
-            merged = Mesh(transform_copies(mesh, places), faces, colours, mesh.smooth)
-            found[f"plants{k}"] = _textured_mesh(f"plants{k}", merged)
-    return found
-
-
-def transform_copies(mesh: Mesh, places: Float[Array, "n 7"]) -> Float32[Array, "nv 3"]:
-    """The vertices of the copies of a plant, one copy after the other, transformed as by `instance_transform`."""
-    x, y, z, size, yaw, along_x, along_y = (column[:, None] for column in np.asarray(places, float).T)
-    vx, vy, vz = np.asarray(mesh.vertices, float).T
-    right, up = size * np.cos(yaw), size * np.sin(yaw)
-    turned_x, turned_y = right * vx - up * vy, up * vx + right * vy
-    out = np.empty((len(places), len(vx), 3), np.float32)
-    out[..., 0], out[..., 1] = turned_x + x, turned_y + y
-    out[..., 2] = size * vz + along_x * turned_x + along_y * turned_y + z
-    return out.reshape(-1, 3)
-
-
-def instance_transform(x, y, z, size, yaw, along_x, along_y):
+def _instance_transform(x, y, z, size, yaw, along_x, along_y):
     """The transform of an instance: scale, turn, shear upwards by the slope of the ground, translate."""
     transform = mi.ScalarTransform4f().rotate([0, 0, 1], float(np.degrees(yaw))).scale(float(size))
     if along_x or along_y:
@@ -111,17 +110,12 @@ def _sky(light: Light) -> dict:
     rows = 33
     elevation = np.radians(90.0 - (np.arange(rows) + 0.5) / rows * 180.0)
     share = np.clip(1.0 - np.sin(np.maximum(elevation, 0)), 0, 1)[:, None] ** 2.5
-    radiance = light.zenith + (light.horizon - light.zenith) * share
+    zenith, horizon = np.array(light.zenith), np.array(light.horizon)
+    radiance = zenith + (horizon - zenith) * share
     radiance[elevation < 0] = light.below
     image = np.repeat(radiance[:, None], 16, axis=1).astype(np.float32)
     upright = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
     return {"type": "envmap", "bitmap": mi.Bitmap(image), "to_world": upright, "sampling_weight": 0.4}
-
-
-def _require_colours(mesh: Mesh) -> Float32[Array, "v 3"]:
-    if mesh.colours is None:
-        raise ValueError("a mesh without colours needs a texture")
-    return mesh.colours
 
 
 def _textured_mesh(name: str, mesh: Mesh):
@@ -130,7 +124,8 @@ def _textured_mesh(name: str, mesh: Mesh):
     Instances need a texture: mitsuba looks up a vertex attribute by the point in the world, which for an instance is
     not where its mesh is.
     """
-    colours, which = np.unique(_require_colours(mesh), axis=0, return_inverse=True)
+    assert mesh.colours is not None, "a plant has colours"
+    colours, which = np.unique(mesh.colours, axis=0, return_inverse=True)
     side = int(np.ceil(np.sqrt(len(colours))))
     texels = np.zeros((side * side, 3), np.float32)
     texels[: len(colours)] = colours
@@ -142,13 +137,8 @@ def _textured_mesh(name: str, mesh: Mesh):
 
 
 def _bitmap(texels, filter_type: str) -> dict:
-    return {
-        "type": "bitmap",
-        "bitmap": mi.Bitmap(texels),
-        "raw": True,
-        "wrap_mode": "repeat",
-        "filter_type": filter_type,
-    }
+    bitmap = mi.Bitmap(texels)
+    return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "repeat", "filter_type": filter_type}
 
 
 def _mesh(name: str, mesh: Mesh, bsdf, coordinates=None):
@@ -158,8 +148,8 @@ def _mesh(name: str, mesh: Mesh, bsdf, coordinates=None):
     props["face_normals"] = not mesh.smooth
     textured = coordinates is not None
     shape = mi.Mesh(name, len(mesh.vertices), len(mesh.faces), props, mesh.smooth, textured)
-    if not textured:
-        colours = np.ascontiguousarray(_require_colours(mesh), np.float32).ravel()
+    if mesh.colours is not None and not textured:
+        colours = np.ascontiguousarray(mesh.colours, np.float32).ravel()
         shape.add_attribute("vertex_color", 3, colours)  # pyright: ignore[reportArgumentType]: it takes arrays
     values = mi.traverse(shape)
     values["vertex_positions"] = np.ascontiguousarray(mesh.vertices, np.float32).ravel()
@@ -168,8 +158,3 @@ def _mesh(name: str, mesh: Mesh, bsdf, coordinates=None):
         values["vertex_texcoords"] = np.ascontiguousarray(coordinates, np.float32).ravel()
     values.update()
     return shape
-
-
-def _unit_vector(elevation: float, azimuth: float):
-    e, a = np.radians(elevation), np.radians(azimuth)
-    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])

@@ -3,6 +3,7 @@
 import logging
 import tempfile
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import ColmapModel, model_from_reconstruction, silence_pycolmap, write_colmap_model
-from dav_gswt.photos.synthetic import labels, renderer, truth
+from dav_gswt.photos.synthetic import labels, mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 
 _log = logging.getLogger(__name__)
@@ -28,31 +29,28 @@ LEAST_OVERLAP = 0.1  # share of the exemplar that both views of a pair must see
 def render_set(entry: dict, folder: Path) -> None:
     """Fill a photos/ folder: images/, truth/, sparse/ (exact cameras, triangulated points), ground.json.
 
-    truth/ has a file of each view (see `truth`), and a map of the ground where a family has labels (`labels`).
-    entry: a synthetic scene of the config. Points come from the start views alone; test views are in the model, but
-    observe nothing. ground.json names them by group, and says what rendered.
+    truth/ has a map of the ground where a family has labels (`labels`). entry: a synthetic scene of the config. Points
+    come from the start views alone; test views are in the model, but observe nothing.
     """
-    scene = synthetic.scene_from_config(entry)
-    start, test = synthetic.start_views(entry), synthetic.test_views(entry)
-    shots, tests = _name_views("view", start), _name_views("test", test)
+    scene, groups = synthetic.scene_from_config(entry), synthetic.test_views(entry)
+    shots = _name_views("view", synthetic.start_views(entry))
+    tests = _name_views("test", [camera for cameras in groups.values() for camera in cameras])
     for part in ("images", "truth", "sparse"):
         (folder / part).mkdir(parents=True, exist_ok=True)
     for name, camera in progress(shots + tests, "render photos"):
         image_files.write_png(folder / "images" / name, synthetic.render(scene, camera))
-        truth.write_truth(folder / "truth" / Path(name).with_suffix(".exr"), scene, camera)
-    if (known := synthetic.load_labels(scene)) is not None:
+    if (known := synthetic.load_scene(scene).labels) is not None:
         labels.write_label_map(folder / "truth", labels.draw_label_map(known, scene.frame.exemplar))
     points = triangulate_points(folder / "images", shots, entry["seed"])
     write_colmap_model(add_cameras(points, tests), folder / "sparse")
-    named = [name for name, _ in tests]
-    groups = {group: tuple(named[i] for i in part) for group, part in synthetic.test_groups(entry).items()}
+    named = iter(name for name, _ in tests)
     frame = replace(
         scene.frame,
-        test=tuple(named),
-        test_groups=groups,
+        test=tuple(name for name, _ in tests),
+        test_groups={group: tuple(islice(named, len(cameras))) for group, cameras in groups.items()},
         images=len(shots),
         registered=len(shots),
-        renderer=renderer.describe_renderer(),
+        renderer=mitsuba_scene.describe_renderer(),
     )
     write_scene_frame(folder / "ground.json", frame)
 
