@@ -92,9 +92,10 @@ bench: .venv/installed-test
 docs: .venv/installed-docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
-# docs/reference/config.md, policies.md and reruns.md, and the schema: made from the config models;
+# docs/reference/config.md, policies.md and reruns.md, docs/research/config.md and the schema: made from the config models;
 # docs/research/results/claims.md: made from the tables of docs/research/data
 reference: .venv/installed
+	@$(BIN)/python -m dav_gswt.config.reference
 	@$(BIN)/python -m dav_gswt.study.config_reference
 	@$(BIN)/python -m dav_gswt.study.claims
 

@@ -23,7 +23,7 @@ rule render_candidates:
         mem_mb=per_attempt(2500),
         runtime=per_attempt("60m"),
     params:
-        scene=scene_keys("render_candidates"),
+        scene=scene_keys("capture_views"),
         poses=lambda wildcards: STUDY["calibration"]["poses"],
         source=code_of("study/render_candidates"),
     script:
@@ -55,7 +55,7 @@ rule calibrate_coarse:
         mem_mb=per_attempt(3000),
         runtime=per_attempt("60m"),
     params:
-        scene=scene_keys("calibrate_coarse"),
+        scene=scene_keys("select_poses"),
         size=lambda wildcards: config["presets"][wildcards.preset]["size"],
         prior=lambda wildcards: config["priors"].get(wildcards.prior),
         p_drop=real("p_drop"),

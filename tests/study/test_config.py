@@ -41,6 +41,6 @@ def test_what_cannot_be_studied_is_refused(config, table, change, message):
         expand_study(config | {"study": study | {table: study[table] | change}})
 
 
-def test_the_reference_and_the_schema_are_those_of_the_models(root):
+def test_the_reference_is_that_of_the_models(root):
     stale = [name for name, text in make_reference().items() if (root / name).read_text() != text]
     assert not stale, "run `make reference`"

@@ -1,27 +1,19 @@
-"""Write the key reference and the schema of the config: `python -m dav_gswt.study.config_reference`."""
+"""Write the reference of the study's keys: `python -m dav_gswt.study.config_reference`."""
 
-from pathlib import Path
-
-from dav_gswt.config.model import Config
+from dav_gswt.config.reference import describe_tables, write_files
 from dav_gswt.study.config import StudyConfig
-from dav_gswt.study.config_tables import HEAD, describe_policies, describe_tables, make_schema
 from dav_gswt.study.reruns import describe_reruns
 
-STUDY_HEAD = "## Study\n\nKeys of `study:`, in `config/study.yaml`."
+HEAD = "# The study's keys\n\nKeys of `study:`, in `config/study.yaml`. Made by `make reference`."
 
 
 def make_reference() -> dict[str, str]:
-    """The text of each file that is made from the config models, by its path in the repository."""
-    keys = [HEAD, "## Product", describe_tables(Config), STUDY_HEAD, describe_tables(StudyConfig, ("study",))]
+    """The text of each file that is made from the study's models, by its path in the repository."""
     return {
-        "docs/reference/config.md": "\n\n".join(part.strip() for part in keys) + "\n",
-        "docs/reference/policies.md": describe_policies(),
+        "docs/research/config.md": f"{HEAD}\n\n{describe_tables(StudyConfig, ('study',))}\n",
         "docs/reference/reruns.md": describe_reruns(),
-        "workflow/schemas/config.schema.json": make_schema(),
     }
 
 
 if __name__ == "__main__":
-    for name, text in make_reference().items():
-        Path(name).parent.mkdir(parents=True, exist_ok=True)
-        Path(name).write_text(text, encoding="utf-8")
+    write_files(make_reference())

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 
 from pydantic import BaseModel
 
+from dav_gswt.config.base import get_extra, is_read
 from dav_gswt.config.model import Config
-from dav_gswt.config.rule_keys import PRESET_KEYS, SCENE_KEYS
-from dav_gswt.config.scenes import FieldScene, PhotoScene, SerialRig, SyntheticScene
+from dav_gswt.config.scenes import SCENES, SerialRig
 from dav_gswt.config.settings import Preset, Tiling
 
 _SPLIT_READERS = ["fit_coarse", "evaluate_coarse", "score_coarse", "select_poses", "capture_views", "request_views"]
@@ -60,7 +60,6 @@ _AGENTS: dict[str, tuple[str, ...]] = {
     "photos": ("replay", *_DEVICES),
     "field": ("",),  # none
 }
-_SCENES: dict[str, type[BaseModel]] = {"synthetic": SyntheticScene, "photos": PhotoScene, "field": FieldScene}
 _SOURCES = {"synthetic": "render_photos", "photos": "register_photos", "field": "import_field"}
 
 # keys that stand in paths, choose inputs or are parameters by themselves: the rules that they reach first
@@ -88,9 +87,9 @@ _TABLES = ("scene", "scenes", "priors", "presets", "tilings", "study")  # whose 
 
 HEAD = """# What a changed key makes again
 
-Made from `workflow/lib/dav_gswt/study/reruns.py` and `workflow/lib/dav_gswt/config/rule_keys.py` by `make reference`;
-a test plans a finished run again with each key changed. A rule is given the keys that it reads and no others, so a
-change makes again what reads it, and what follows from that. Everything else stays.
+Made from `workflow/lib/dav_gswt/study/reruns.py` and `read_by` of the keys in `workflow/lib/dav_gswt/config/` by
+`make reference`; a test plans a finished run again with each key changed. A rule is given the keys that it reads and no
+others, so a change makes again what reads it, and what follows from that. Everything else stays.
 
 The tables are of a policy that reads no prior, as the default. With a policy that reads one, `prior`, `p_drop` and the
 keys of `priors.<name>` also make the scores again (`score_coarse`, `score_round`) and what follows from them, `lam` and
@@ -156,7 +155,7 @@ def list_scene_reruns(kind: str, agent: str, key: str) -> list[str]:
         return follow_rules(["find_materials"], [*scope, "find_materials"])
     if key in ("kind", "field"):
         return follow_rules([_SOURCES[kind]], scope)
-    return follow_rules([rule for rule in scope if _reads(rule, agent, key)], scope)
+    return follow_rules([rule for rule in scope if is_read(SCENES[kind], rule, key, agent)], scope)
 
 
 def list_preset_reruns(kind: str, key: str) -> list[str]:
@@ -164,7 +163,7 @@ def list_preset_reruns(kind: str, key: str) -> list[str]:
     scope = list_rules(kind, _AGENTS[kind][0])
     if key == "choose_with" and kind != "field":  # another preset's rounds
         return follow_rules(["fit_coarse"], [*scope, *_CHOSEN])
-    return follow_rules([rule for rule, keys in PRESET_KEYS.items() if key in keys], scope)
+    return follow_rules(get_extra(Preset.model_fields[key], "read_by"), scope)
 
 
 def list_tiling_reruns(kind: str, key: str) -> list[str]:
@@ -197,7 +196,7 @@ def describe_reruns() -> str:
     """The page docs/reference/reruns.md."""
     top = {key: list_top_level_reruns("synthetic", key) for key in Config.model_fields if key not in _TABLES}
     parts = [HEAD, "## Top level", _describe_rows(top)]
-    for kind, model in _SCENES.items():
+    for kind, model in SCENES.items():
         for agents, keys in _group_agents(kind, model):
             asked = f", agent {' or '.join(f'`{agent}`' for agent in agents)}" if agents != ("",) else ""
             parts += [f"## A scene of kind `{kind}`{asked}", _describe_rows(keys)]
@@ -205,13 +204,6 @@ def describe_reruns() -> str:
     tiling = {key: list_tiling_reruns("synthetic", key) for key in Tiling.model_fields}
     parts += ["## The scene's preset", _describe_rows(preset), "## The scene's tiling", _describe_rows(tiling)]
     return "\n\n".join(part.strip() for part in parts) + "\n"
-
-
-def _reads(rule: str, agent: str, key: str) -> bool:
-    keys = SCENE_KEYS.get(rule, ())
-    if isinstance(keys, dict):
-        keys = ("agent", *keys.get(agent, ()))
-    return key in keys or key.partition(".")[0] in keys
 
 
 def _group_agents(kind: str, model: type[BaseModel]) -> list[tuple[tuple[str, ...], dict[str, list[str]]]]:

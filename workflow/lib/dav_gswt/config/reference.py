@@ -1,25 +1,25 @@
-"""The key reference and the JSON schema, made from config models. `make reference` writes them with the study's."""
+"""The key reference, the page of policies and the JSON schema: `make reference` writes them from the config models."""
 
 import json
 import types
+from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from dav_gswt.config.base import get_extra, iterate_tables
 from dav_gswt.config.model import Config
-from dav_gswt.config.tables import iterate_tables
 from dav_gswt.views.policy_names import POLICY_SPECS
 
 HEAD = """# Config reference
 
-Made from the models in `workflow/lib/dav_gswt/config/` by `make reference`. The config is closed: a misspelt,
-renamed or out-of-range key stops before the first job with one message. `config/config.yaml` is the experiment,
-`config/scenes/<name>.yaml` one scene each, `config/study.yaml` what the study compares. Lay single keys over them
-on the command line (`snakemake --cores 2 --config rounds=3`), or a file (`--configfile mine.yaml`). A key whose default
-is *required* must be given; one without any may be left out.
-"""
+Made from the models in `workflow/lib/dav_gswt/config/` by `make reference`. The config is closed: a misspelt or
+out-of-range key stops the program before the first job with one message. `config/config.yaml` is the experiment, and
+each `config/scenes/<name>.yaml` is one scene. Lay single keys over them on the command line (`snakemake --cores 2
+--config rounds=3`), or a file (`--configfile mine.yaml`). A key whose default is *required* must be given. A key
+without a default may be left out."""
 POLICIES_HEAD = """# Policies
 
 How the next views are chosen: the config's `policy`. `auto`, the default, takes `farthest` where a scene chooses from
@@ -46,8 +46,27 @@ def describe_policies() -> str:
 
 
 def make_schema() -> str:
-    """The JSON schema of the product's config, for editors."""
-    return json.dumps(Config.model_json_schema(), indent=1) + "\n"
+    """The JSON schema of the config, for editors."""
+    text = json.dumps(Config.model_json_schema())
+    ours = ("read_by", "agents")  # of `config.base.key`, of no use to an editor
+    schema = json.loads(text, object_hook=lambda table: {key: v for key, v in table.items() if key not in ours})
+    return json.dumps(schema, indent=1) + "\n"
+
+
+def make_reference() -> dict[str, str]:
+    """The text of each file that is made from the config models, by its path in the repository."""
+    return {
+        "docs/reference/config.md": f"{HEAD}\n\n{describe_tables(Config)}\n",
+        "docs/reference/policies.md": describe_policies(),
+        "workflow/schemas/config.schema.json": make_schema(),
+    }
+
+
+def write_files(texts: dict[str, str]) -> None:
+    """Write texts to their paths below the working directory."""
+    for name, text in texts.items():
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text(text, encoding="utf-8")
 
 
 def _describe_table(place: tuple[str, ...], table: type[BaseModel]) -> str:
@@ -58,9 +77,8 @@ def _describe_table(place: tuple[str, ...], table: type[BaseModel]) -> str:
 
 
 def _describe_key(key: str, field: FieldInfo) -> str:
-    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     values = _describe_type(field.annotation, [*field.metadata])
-    unit = f", {extra['unit']}" if "unit" in extra else ""
+    unit = f", {unit}" if (unit := get_extra(field, "unit")) else ""
     default = "" if field.default in (PydanticUndefined, None) else f"`{_plain(field.default)}`"
     default = "*required*" if field.is_required() else default
     return f"| `{key}` | {field.description or ''} | {values}{unit} | {default} |"
@@ -102,3 +120,7 @@ def _plain(value: Any) -> str:
     if isinstance(value, list):
         return f"[{', '.join(map(_plain, value))}]"
     return json.dumps(value)
+
+
+if __name__ == "__main__":
+    write_files(make_reference())
