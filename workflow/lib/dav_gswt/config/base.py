@@ -5,8 +5,7 @@ The workflow reads this module before the first job, so it imports nothing heavy
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 from pydantic.fields import FieldInfo
@@ -135,38 +134,38 @@ def find_table(field: FieldInfo) -> type[BaseModel] | None:
 
 ANY = "*"  # in a place: any name of an entry, or any position in a list
 Place = tuple[str, ...]
+Schema = dict[str, Any]
 
 
-def iterate_tables(model: type[BaseModel], place: Place = ()) -> Iterator[tuple[Place, type[BaseModel]]]:
-    """Every table below a model with its place, the model's own first.
+def iterate_tables(model: type[BaseModel]) -> Iterator[tuple[Place, Schema]]:
+    """Every table below a model with its place and its JSON schema, the model's own first.
 
     A place is a tuple of keys. `*` stands for a name or position that the user chooses. A table that is one of several
     kinds is followed by its kind, as in ("scenes", "*", "synthetic").
     """
-    yield place, model
-    for name, field in model.model_fields.items():
-        yield from _iterate_type(field.annotation, (*place, name))
+    schema = model.model_json_schema()
+    yield from _iterate_table(schema, schema.get("$defs", {}), ())
 
 
-def _iterate_type(annotation: Any, place: Place) -> Iterator[tuple[Place, type[BaseModel]]]:
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield from iterate_tables(annotation, place)
-    elif origin is Annotated:
-        yield from _iterate_type(arguments[0], place)
-    elif origin in (Union, UnionType):
-        models = [a for a in arguments if isinstance(a, type) and issubclass(a, BaseModel)]
-        for argument in arguments:
-            kind = _kind_of(argument) if argument in models and len(models) > 1 else ""
-            yield from _iterate_type(argument, (*place, kind) if kind else place)
-    elif origin in (dict, list):
-        yield from _iterate_type(arguments[-1], (*place, ANY))
+def _iterate_table(table: Schema, defs: Schema, place: Place) -> Iterator[tuple[Place, Schema]]:
+    yield place, table
+    for name, value in table["properties"].items():
+        yield from _iterate_value(value, defs, (*place, name))
 
 
-def _kind_of(model: type[BaseModel]) -> str:
-    """The value of `kind` or `model`, which tells a model from the others of a union; empty where it has neither."""
-    for name in ("kind", "model"):
-        field = model.model_fields.get(name)
-        if field and get_origin(field.annotation) is Literal:
-            return get_args(field.annotation)[0]
-    return ""
+def _iterate_value(value: Schema, defs: Schema, place: Place) -> Iterator[tuple[Place, Schema]]:
+    if "$ref" in value:
+        yield from _iterate_table(_resolve(value, defs), defs, place)
+    choices = value.get("anyOf", value.get("oneOf", []))
+    several = sum("$ref" in choice for choice in choices) > 1
+    for choice in choices:
+        own = _resolve(choice, defs).get("properties", {}) if several else {}
+        kind = own.get("kind", own.get("model", {})).get("const")
+        yield from _iterate_value(choice, defs, (*place, kind) if kind else place)
+    for inner in ("items", "additionalProperties"):
+        if isinstance(value.get(inner), dict):
+            yield from _iterate_value(value[inner], defs, (*place, ANY))
+
+
+def _resolve(value: Schema, defs: Schema) -> Schema:
+    return defs[value["$ref"].rpartition("/")[2]] if "$ref" in value else value

@@ -146,7 +146,7 @@ def _describe_unknown_key(model: type[BaseModel], location: tuple) -> str:
         for place, table in iterate_tables(model)
         if len(place) == len(where) and all(p in (ANY, part) for p, part in zip(place, where, strict=True))
     )
-    known = list(next(tables, model).model_fields)
+    known = list(next(tables)["properties"])
     near = get_close_matches(unknown, known, 1)
     return f"there is no key {unknown!r}" + (f"; is {near[0]!r} meant?" if near else f", only {', '.join(known)}")
 

@@ -1,15 +1,12 @@
 """The key reference, the page of policies and the JSON schema: `make reference` writes them from the config models."""
 
 import json
-import types
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Any
 
 from pydantic import BaseModel
-from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 
-from dav_gswt.config.base import get_extra, iterate_tables
+from dav_gswt.config.base import ANY, Place, Schema, iterate_tables
 from dav_gswt.config.model import Config
 from dav_gswt.views.policy_names import POLICY_SPECS
 
@@ -34,7 +31,7 @@ after "not" have no effect. k is the config's `k`.
 """
 
 
-def describe_tables(model: type[BaseModel], place: tuple[str, ...] = ()) -> str:
+def describe_tables(model: type[BaseModel], place: Place = ()) -> str:
     """Every table of a model, with its keys. place: where the model lies in the config."""
     return "\n\n".join(_describe_table((*place, *where), table) for where, table in iterate_tables(model))
 
@@ -69,56 +66,45 @@ def write_files(texts: dict[str, str]) -> None:
         Path(name).write_text(text, encoding="utf-8")
 
 
-def _describe_table(place: tuple[str, ...], table: type[BaseModel]) -> str:
-    name = ".".join("<name>" if part == "*" else part for part in place) or "Top level"
-    rows = [_describe_key(field.alias or key, field) for key, field in table.model_fields.items()]
+def _describe_table(place: Place, table: Schema) -> str:
+    name = ".".join("<name>" if part == ANY else part for part in place) or "Top level"
+    rows = [_describe_key(key, value, key in table.get("required", ())) for key, value in table["properties"].items()]
     head = ["| key | meaning | values | default |", "|---|---|---|---|"]
-    return "\n".join([f"### {name}", "", (table.__doc__ or "").strip(), "", *head, *rows])
+    return "\n".join([f"### {name}", "", table.get("description", ""), "", *head, *rows])
 
 
-def _describe_key(key: str, field: FieldInfo) -> str:
-    values = _describe_type(field.annotation, [*field.metadata])
-    unit = f", {unit}" if (unit := get_extra(field, "unit")) else ""
-    default = "" if field.default in (PydanticUndefined, None) else f"`{_plain(field.default)}`"
-    default = "*required*" if field.is_required() else default
-    return f"| `{key}` | {field.description or ''} | {values}{unit} | {default} |"
+def _describe_key(key: str, value: Schema, required: bool) -> str:
+    unit = f", {value['unit']}" if "unit" in value else ""
+    default = "" if value.get("default") is None else f"`{_format_value(value['default'])}`"
+    meaning, default = value.get("description", ""), "*required*" if required else default
+    return f"| `{key}` | {meaning} | {_describe_values(value)}{unit} | {default} |"
 
 
-def _describe_type(annotation: Any, bounds: list) -> str:
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin is Annotated:
-        inner = [m for argument in arguments[1:] for m in getattr(argument, "metadata", [argument])]
-        return _describe_type(arguments[0], [*inner, *bounds])
-    if origin is Literal:
-        return ", ".join(f"`{value}`" for value in arguments)
-    if origin in (Union, types.UnionType):
-        kinds = [_describe_type(argument, bounds) for argument in arguments if argument is not type(None)]
-        return " or ".join(dict.fromkeys(kind for kind in kinds if kind))
-    if origin is list:
-        return f"list of {_describe_type(arguments[0], [])}"
-    if origin is tuple:
-        return f"{len(arguments)} numbers"
-    if origin is dict:
-        return "table by name"
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return "table"
-    name = {int: "whole number", float: "number", str: "text", bool: "`true`, `false`"}.get(annotation, "")
-    return name + _describe_bounds(bounds)
+def _describe_values(value: Schema) -> str:
+    if named := value.get("enum", [value["const"]] if "const" in value else []):
+        return ", ".join(f"`{name}`" for name in named)
+    if choices := value.get("anyOf", value.get("oneOf")):
+        kinds = [_describe_values(choice) for choice in choices if choice.get("type") != "null"]
+        return " or ".join(dict.fromkeys(kinds))
+    kind = value.get("type", "object")
+    if kind == "array" and "prefixItems" in value:
+        return f"{len(value['prefixItems'])} numbers"
+    if kind == "array":
+        return f"list of {_describe_values(value['items'])}"
+    if kind == "object":
+        return "table by name" if "additionalProperties" in value else "table"
+    words = {"minimum": "from", "exclusiveMinimum": "above", "maximum": "to", "exclusiveMaximum": "below"}
+    bounds = [f"{word} {value[bound]:g}" for bound, word in words.items() if bound in value]
+    names = {"integer": "whole number", "number": "number", "string": "text", "boolean": "`true`, `false`"}
+    return " ".join([names[kind], *bounds])
 
 
-def _describe_bounds(bounds: list) -> str:
-    found = {
-        key: getattr(m, key) for m in bounds for key in ("ge", "gt", "le", "lt") if getattr(m, key, None) is not None
-    }
-    words = {"ge": "from", "gt": "above", "le": "to", "lt": "below"}
-    return "".join(f" {words[key]} {found[key]:g}" for key in words if key in found)
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, BaseModel):
-        value = value.model_dump(exclude_none=True)
+def _format_value(value: Any) -> str:
+    """A default as YAML and JSON have it, without the keys that have no value."""
+    if isinstance(value, dict):
+        value = {key: each for key, each in value.items() if each is not None}
     if isinstance(value, list):
-        return f"[{', '.join(map(_plain, value))}]"
+        return f"[{', '.join(map(_format_value, value))}]"
     return json.dumps(value)
 
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from dav_gswt.config.base import ConfigModel, Degrees, Name, PhotoSize, Seed, Share, Text, key
+from dav_gswt.config.base import ConfigModel, Degrees, Name, PhotoSize, Seed, Text, key
 
 Range = Annotated[tuple[float, float], Field(description="lowest and highest", strict=False)]
 Radius = Annotated[float, Field(ge=0.05, le=20)]
@@ -78,7 +78,6 @@ class Feasibility(ConfigModel):
 
     min_height: float | None = key("above the ground", None, unit="world units", ge=0)
     max_height: float | None = key("above the ground", None, unit="world units", gt=0)
-    max_distance: float | None = key("from the exemplar's middle", None, unit="world units", gt=0)
 
 
 class OrbitPoses(ConfigModel):
@@ -88,7 +87,7 @@ class OrbitPoses(ConfigModel):
 
 
 class FreePoses(ConfigModel):
-    """Any direction, distance and aim point."""
+    """Any direction, distance and aim point on the exemplar."""
 
     kind: Literal["free"]
     radii: Annotated[tuple[Radius, Radius], Field(strict=False)] | None = key(
@@ -97,7 +96,6 @@ class FreePoses(ConfigModel):
         None,
         unit="flying heights",
     )
-    aims: Share = key("of the exemplar's side: the square about its middle that aim points lie in; 0: the middle", 1)
 
     @model_validator(mode="after")
     def _order_radii(self) -> "FreePoses":

@@ -41,10 +41,12 @@ class HeightMap(ConfigModel):
         "grey image of unsigned integers (16 bits: PNG, TIFF) or of floats (EXR, TIFF), at most 4096 pixels a side"
     )
     width: float = key(
-        "of the whole image; its middle lies at the world's origin", unit="world units", ge=0.001, le=1e7
+        "of the whole image; its middle lies at the world's origin, and it is mirrored beyond its edge",
+        unit="world units",
+        ge=0.001,
+        le=1e7,
     )
     height: float = key("height of white; black is 0, floats are multiplied by it", unit="world units", ge=-1e6, le=1e6)
-    beyond: Literal["mirror", "clamp"] = key("what comes after the image's edge", "mirror")
 
 
 class Sphere(ConfigModel):
@@ -97,7 +99,6 @@ class PictureClasses(ConfigModel):
         "of the whole picture; its middle lies at the world's origin", unit="world units", ge=0.001, le=1e7
     )
     colours: dict[Text, Colour] = key("name of a material: its colour in the picture, as `#rrggbb`", min_length=1)
-    beyond: Literal["mirror", "clamp"] = key("what comes after the picture's edge", "mirror")
     weight: Weight = key("of the picture; noise lies between -1 and 1", 1)
 
 
@@ -228,6 +229,5 @@ class Tiling(ConfigModel):
         "the surer a patch the more its colours count (the paper's gamma); `semantic-nogamma`, both alike everywhere",
         "semantic",
     )
-    slope: float = key("how fast the weight of colour falls with uncertainty", 2, gt=0, le=100)
     replicate: int = key("another number, another draw of places", 0, ge=0, le=1000)
     sam2: Text | None = key("a folder with a checkpoint of SAM 2, whose masks separate objects", None)
