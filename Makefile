@@ -26,7 +26,7 @@ view: .venv/installed
 
 # results/gallery: a static page over the newest terrain of every scene, for any web server
 gallery: .venv/installed
-	@$(BIN)/python -m dav_gswt.cli.gallery
+	@$(BIN)/dav-gswt gallery
 
 # A worker takes a whole module, since its tests share what they look at.
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadscope --no-loadscope-reorder --durations 20 $(PYTEST_OPTIONS)

@@ -16,7 +16,7 @@ from fixtures.page_visit import Visit
 from record import report_figures
 
 from dav_gswt.bundle import store
-from dav_gswt.cli.gallery import find_pages
+from dav_gswt.cli.main import find_pages
 from dav_gswt.images.metrics import psnr
 from dav_gswt.paths import RESULTS
 from dav_gswt.terrain import endless, stills

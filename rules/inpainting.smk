@@ -31,7 +31,9 @@ rule inpaint_field:
         mem_mb=per_attempt(3000),
         runtime=per_attempt("30m"),
     params:
-        prior=lambda wildcards: EntryKeys(config["priors"][wildcards.inpainter], PRIOR_KEYS["inpaint_field"]),
+        prior=lambda wildcards: select_keys(
+            TerrainPriorSettings, "inpaint_field", config["priors"][wildcards.inpainter]
+        ),
         seed=integer("seed"),
         source=code_of("inpaint_field"),
     script:

@@ -18,17 +18,22 @@ def entry(table, wildcard):
 
 def scene_keys(rule):
     """A params function: what a rule reads of the scene's entry."""
-    return lambda wildcards: select_scene_keys(rule, config["scenes"][wildcards.scene])
+
+    def select(wildcards):
+        scene = config["scenes"][wildcards.scene]
+        return select_keys(SCENES[scene["kind"]], rule, scene)
+
+    return select
 
 
 def preset_keys(rule):
     """A params function: what a rule reads of the preset."""
-    return lambda wildcards: select_preset_keys(rule, config["presets"][wildcards.preset])
+    return lambda wildcards: select_keys(Preset, rule, config["presets"][wildcards.preset])
 
 
 def export_keys(rule):
     """A params function: what a rule reads of `export`."""
-    return lambda wildcards: select_export_keys(rule, config["export"])
+    return lambda wildcards: select_keys(Export, rule, config["export"])
 
 
 def per_attempt(need):
@@ -204,7 +209,7 @@ def prior_weights(wildcards):
     if wildcards.prior == "none":
         return {}
     prior, where = config["priors"][wildcards.prior], f"priors.{wildcards.prior}"
-    files = lpips_weights(wildcards) if prior["lpips"] else {}
+    files = lpips_weights(wildcards)
     if prior["model"] == "terrain":
         return files | {"weights": terrain_weights(wildcards.prior)}
     return files | {"folder": existing(prior["folder"], f"{where}.folder", "; see docs/prior.md")}

@@ -23,7 +23,7 @@ rule make_levels:
         mem_mb=per_attempt(2000),
         runtime=per_attempt("30m"),
     params:
-        levels=lambda wildcards: config["presets"][wildcards.preset].get("levels", config["levels"]),
+        levels=lambda wildcards: config["levels"],
         preset=preset_keys("make_levels"),
         seed=integer("seed"),
         keep=SNAPSHOTS,

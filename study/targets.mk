@@ -19,9 +19,10 @@ lint-study: lint-viewer # which installs biome and TypeScript
 compare: .venv/installed
 	@$(BIN)/snakemake -s study/Snakefile --cores $(CORES) --config 'study={compare: {opensplat: "$(OPENSPLAT)"}}' -- compare
 
-# study/docs/results/claims.md, from the tables of study/docs/data
+# study/docs/results/claims.md, from the tables of study/docs/data, and study/docs/config.md, from the config models
 claims: .venv/installed
 	@$(STUDY) -m dav_gswt_study.claims
+	@$(STUDY) -m dav_gswt_study.config_reference
 
 # hours: the weights that come with the project were made so
 prior: .venv/installed

@@ -6,7 +6,8 @@ software, where ratios carry over and milliseconds do not, or with `--gpu` on a 
 table, asserts nothing.
 
 `python study/benchmarks/page_peers.py BUNDLE [--gpu] [RENDERER ...]`: by default all; they come by `npm ci` in
-study/benchmarks/peers. In software Spark takes seconds for a frame, so a quarter of an hour for all; without it two minutes.
+study/benchmarks/peers. In software Spark takes seconds for a frame, so a quarter of
+an hour for all; without it two minutes.
 """
 
 import functools
@@ -94,9 +95,7 @@ READ_PEER = """async ({ ahead }) => {
 def main() -> int:
     given = [word for word in sys.argv[1:] if word != "--gpu"]
     if not given or not (PEERS / "node_modules").is_dir() or chromium_path() is None:
-        print(
-            "page_peers: needs the folder of a bundle, Chromium, and `npm ci` in study/benchmarks/peers; nothing measured"
-        )
+        print("page_peers: needs the folder of a bundle, Chromium, and `npm ci` in its peers/; nothing measured")
         return 0
     folder, others = Path(given[0]), tuple(given[1:]) or OTHERS
     if unknown := set(others) - set(OTHERS):

@@ -44,8 +44,8 @@ class FixedSettings(ConfigModel):
     rounds: int | None = key("rounds", None, ge=0, le=100)
     photos: int | None = key("photos that an experiment ends with, instead of `rounds`", None, ge=3, le=100_000)
     tau: Share | None = key("mean uncertainty from which a tile keeps all orders", None)
-    tiling: Name | None = key("an entry of `tilings`", None, renamed="seam")
-    preset: Name | None = key("an entry of `presets`", None, renamed="quality")
+    tiling: Name | None = key("an entry of `tilings`", None)
+    preset: Name | None = key("an entry of `presets`", None)
 
 
 class BaseSettings(ConfigModel):
@@ -58,8 +58,8 @@ class BaseSettings(ConfigModel):
     k: int | None = key("instead of the config's", None, ge=1, le=1000)
     rounds: int = key("rounds", ge=1, le=100)
     tau: Share = key("mean uncertainty from which a tile keeps all orders")
-    tiling: Name = key("an entry of `tilings`", renamed="seam")
-    preset: Name = key("an entry of `presets`", renamed="quality")
+    tiling: Name = key("an entry of `tilings`")
+    preset: Name = key("an entry of `presets`")
 
 
 class Refinement(ConfigModel):
@@ -68,7 +68,7 @@ class Refinement(ConfigModel):
     prior: Name = key("an entry of `priors` of model `terrain`")
     strength: float = key("noise added before denoising, as a share of the schedule; 0 changes nothing", ge=0, le=1)
     steps: int | None = key("of denoising; 4 if left out", None, ge=1, le=100)
-    condition: bool | None = key("whether the prior takes the render beside the cut as known", None, renamed="believed")
+    condition: bool | None = key("whether the prior takes the render beside the cut as known", None)
     views: int | None = key("pictures of each place of a cut; 4 if left out", None, ge=4, le=64)
     width: int | None = key("of the ground in a picture; 64 if left out", None, unit="cells", ge=16, le=1024)
     reach: float | None = key(
@@ -161,10 +161,10 @@ class Seams(ConfigModel):
     """`snakemake seams`: can anybody find the seams, and does the terrain repeat?"""
 
     scenes: Names = key("whose tiles are measured: by their own `tiling`, and by those below")
-    tilings: Names = key("entries of `tilings` that are compared", renamed="seams")
+    tilings: Names = key("entries of `tilings` that are compared")
     baseline: Name = key("the one of these that the others are compared with")
-    replicates: int = key("tile sets of each scene's own tiling", 1, renamed="draws", ge=1, le=100)
-    compared_replicates: int = key("tile sets of each compared tiling", 1, renamed="compared_draws", ge=1, le=100)
+    replicates: int = key("tile sets of each scene's own tiling", 1, ge=1, le=100)
+    compared_replicates: int = key("tile sets of each compared tiling", 1, ge=1, le=100)
 
 
 class ForcedChoice(ConfigModel):
@@ -192,7 +192,7 @@ class Vary(ConfigModel):
     k: list[Annotated[int, Field(ge=1, le=1000)]] | None = key("views a round", None, min_length=1)
     rounds: list[Annotated[int, Field(ge=0, le=100)]] | None = key("rounds", None, min_length=1)
     tau: list[Share] | None = key("thresholds", None, min_length=1)
-    tiling: Names | None = key("entries of `tilings`", None, renamed="seam")
+    tiling: Names | None = key("entries of `tilings`", None)
 
     @model_validator(mode="after")
     def _require_one_or_two(self) -> "Vary":
@@ -290,10 +290,10 @@ class StudyConfig(ConfigModel):
     gallery: GalleryPage | None = key("terrains and a walk, as pictures", None)
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
-    view_benchmark: ViewBenchmark | None = key("policies", None, renamed="benchmark")
+    view_benchmark: ViewBenchmark | None = key("policies", None)
     compare: Comparison | None = key("another program's fit beside ours", None)
-    seams: Seams | None = key("seams and repetition", None, renamed="seam_study")
-    forced_choice: ForcedChoice | None = key("the study with people", None, renamed="perceptual_study")
+    seams: Seams | None = key("seams and repetition", None)
+    forced_choice: ForcedChoice | None = key("the study with people", None)
     sweeps: dict[Name, Sweep] = key("by name", {})
     tradeoff: Tradeoff | None = key("speed against accuracy", None)
     preset_costs: PresetCosts | None = key("what presets cost and are worth", None)

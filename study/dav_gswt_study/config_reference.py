@@ -1,27 +1,15 @@
-"""Write the key reference and the schema of the config: `python -m dav_gswt_study.config_reference`."""
+"""Write the reference of the study's keys: `python -m dav_gswt_study.config_reference`."""
 
-from pathlib import Path
-
-from dav_gswt.config.model import Config
+from dav_gswt.config.reference import describe_tables, write_files
 from dav_gswt_study.config import StudyConfig
-from dav_gswt_study.config_tables import HEAD, describe_policies, describe_tables, make_schema
-from dav_gswt_study.reruns import describe_reruns
 
-STUDY_HEAD = "## Study\n\nKeys of `study:`, in `study/config.yaml`."
+HEAD = "# The study's keys\n\nKeys of `study:`, in `study/config.yaml`. Made by `make claims`."
 
 
 def make_reference() -> dict[str, str]:
-    """The text of each file that is made from the config models, by its path in the repository."""
-    keys = [HEAD, "## Product", describe_tables(Config), STUDY_HEAD, describe_tables(StudyConfig, ("study",))]
-    return {
-        "docs/reference/config.md": "\n\n".join(part.strip() for part in keys) + "\n",
-        "docs/reference/policies.md": describe_policies(),
-        "docs/reference/reruns.md": describe_reruns(),
-        "workflow/schemas/config.schema.json": make_schema(),
-    }
+    """The text of each file that is made from the study's models, by its path in the repository."""
+    return {"study/docs/config.md": f"{HEAD}\n\n{describe_tables(StudyConfig, ('study',))}\n"}
 
 
 if __name__ == "__main__":
-    for name, text in make_reference().items():
-        Path(name).parent.mkdir(parents=True, exist_ok=True)
-        Path(name).write_text(text, encoding="utf-8")
+    write_files(make_reference())

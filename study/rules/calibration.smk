@@ -31,7 +31,7 @@ rule calibrate_coarse:
         mem_mb=per_attempt(3000),
         runtime=per_attempt("60m"),
     params:
-        scene=scene_keys("calibrate_coarse"),
+        scene=scene_keys("select_poses"),
         size=lambda wildcards: config["presets"][wildcards.preset]["size"],
         prior=lambda wildcards: config["priors"].get(wildcards.prior),
         p_drop=real("p_drop"),

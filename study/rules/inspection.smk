@@ -7,7 +7,7 @@ In: artifacts of the scene's last round. Out: docs/figures/inspect_{shown}.png. 
 INSPECTED = {  # by the name of the picture: what is opened, and how
     "field": (rules.update_field.output.field, {}),
     "uncertainty": (rules.score_round.output.maps, {}),
-    "levels": (rules.make_levels.output.levels, {"colour": "level"}),
+    "levels": (rules.make_levels.output.levels, {}),
     "poses": (rules.select_poses.output.poses, {}),
     "photos": (rules.split_views.output.views, {}),
     "tiles": (rules.cut_tiles.output.seams, {}),

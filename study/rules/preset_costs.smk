@@ -9,7 +9,7 @@ rule gather_preset_costs:
     """A row for each scene and preset, and the page."""
     input:
         measured=lambda wildcards: [
-            cell[key] for cell in preset_experiments() for key in ("metrics", "manifest", "images")
+            cell[key] for cell in preset_experiments() for key in ("metrics", "manifest")
         ],
     output:
         table="study/docs/data/preset_costs.csv",

@@ -1,11 +1,5 @@
 """Experiments of presets: what `preset_costs` gathers, each with its files and its jobs' benchmarks."""
 
-from dav_gswt.cli import estimate
-
-# jobs of a run before the start photos are there, beside its products, and after the bundle
-UNCOUNTED = ("render_photos", "register_photos", "report_photos", "split_views", "capture_views")
-UNCOUNTED += ("copy_chosen_photos", "evaluate_coarse", "evaluate_round", "render_terrain", "make_page")
-
 
 def preset_experiments():
     """Of each scene of `preset_costs` a cell for each preset: its files, and the benchmarks of the jobs that count."""
@@ -29,9 +23,6 @@ def preset_experiment(scene, preset):
         "scene": scene,
         "preset": preset,
         "corrected": entry["kind"] == "photos",
-        "fitted": config["presets"][preset]["size"],
-        "cost": estimate_tiles(scene, preset),
-        "images": of(rules.register_photos.output.images)[0],
         "metrics": of(rules.evaluate_at.output.metrics, size=asked["size"])[0],
         "manifest": of(rules.bundle_tiles.output.manifest)[0],
         "times": {
@@ -42,13 +33,3 @@ def preset_experiment(scene, preset):
             "tiles": told + [path for job in tiles for path in job],
         },
     }
-
-
-def estimate_tiles(scene, preset):
-    """Seconds that `make run` expects of the jobs whose times count on the reference machine: general, rasterizer."""
-    jobs = estimate.count_jobs(config | {"scene": scene}, preset)
-    counted = {rule: count for rule, count in jobs.items() if rule not in UNCOUNTED}
-    counted |= {"score_round": config["rounds"] - 1}  # that after the last round chooses no photo
-    work = estimate.describe_work(config | {"scene": scene}, preset)
-    cost = estimate.add_costs(counted, work)
-    return [round(cost.general, 1), round(cost.raster, 1)]

@@ -124,12 +124,6 @@ def test_the_lock_of_a_killed_run_does_not_stop_the_next_one(story):
     assert "] capture_views" in story.last.stdout and "fit_coarse" not in story.last.stdout
 
 
-def test_how_long_it_will_take_is_said_before_the_first_job(story):
-    for out in (story.stopped.out, story.last.stdout):
-        assert re.search(r"^\d+ jobs to do\nIt will take about .+ on this machine\n\[1 of", out, re.M), out
-    assert "It will take" not in story.again.stdout and "plan:" not in story.again.stdout
-
-
 def test_what_is_said_at_the_end_is_there(story):
     said = dict(
         line.split(maxsplit=1) for line in story.last.stdout.splitlines() if "results/" in line and line[:3] == "  s"

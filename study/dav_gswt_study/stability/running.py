@@ -34,8 +34,7 @@ def run_extreme(extreme: Extreme, root: Path, out: Path | str, cores: int, lpips
         folder = Path(place)
         if extreme.prepare:
             extreme.prepare(folder)
-        with_lpips = {"lpips": lpips, "priors": {"terrain": {"lpips": lpips != "none"}}}
-        (folder / "extreme.yaml").write_text(yaml.safe_dump(with_lpips | extreme.overrides), encoding="utf-8")
+        (folder / "extreme.yaml").write_text(yaml.safe_dump({"lpips": lpips} | extreme.overrides), encoding="utf-8")
         files = [str(root / DEFAULT_CONFIG), str(root / TEST_CONFIG), "extreme.yaml"]
         command = [sys.executable, "-m", "snakemake", "--snakefile", str(root / "Snakefile"), "--directory", place]
         command += ["--cores", str(cores), "--scheduler", "greedy", "--logger", "davgswt", "--configfile", *files]

@@ -7,33 +7,28 @@ from itertools import chain
 
 import numpy as np
 
-from dav_gswt.cli.forecast import leave_one_out, measure_shrinking, read_row
-from dav_gswt.cli.machine_speed import MachineSpeed
 from dav_gswt.files import read_json
-from dav_gswt.images.image_files import list_photos
 from dav_gswt.provenance import describe_machine
 from dav_gswt.sweeps import MEGA, describe_origin, read_benchmark, select_metrics, sum_or_none
 from dav_gswt_study.markdown import format_number, format_table
 
 PARTS = {"fits": "fits", "views": "scores and choice of views", "tiles": "materials, levels, tiles, bundle"}
 NUMBERS = ("photos", "gaussians", "psnr", "ssim", "lpips", *(f"{part}_s" for part in PARTS), "seconds", "peak_mb")
-NUMBERS += ("bundle_mb", "cores", "size", "shrinking", "estimated")
+NUMBERS += ("bundle_mb", "cores", "size")
 
 
-def tabulate_presets(cells: list[dict], size: int, speed: MachineSpeed) -> list[dict]:
+def tabulate_presets(cells: list[dict], size: int) -> list[dict]:
     """A row for each scene and preset.
 
     psnr: of test photos, after their exposure is fitted where they are real. fits_s, views_s, tiles_s: seconds of whole
     jobs, from the start photos to the bundle; seconds: their sum. peak_mb: the largest memory of any of these jobs.
-    bundle_mb: of all chunks, in megabytes. size: of the test photos, at most. shrinking: what photos lose by the
-    preset's size (`cli.forecast`). estimated: seconds that `make run` expects of these jobs on this machine.
-    cells: `scene`, `preset`, `corrected`, `fitted` (the preset's size), `cost` (seconds on the reference machine: in
-    general and in the rasterizer), the paths `metrics`, `manifest` and `images`, and `times`, benchmarks by PARTS.
+    bundle_mb: of all chunks, in megabytes. size: of the test photos, at most.
+    cells: `scene`, `preset`, `corrected`, the paths `metrics` and `manifest`, and `times`, benchmarks by PARTS.
     """
-    return [_tabulate_cell(cell, size, speed) for cell in cells]
+    return [_tabulate_cell(cell, size) for cell in cells]
 
 
-def _tabulate_cell(cell: dict, size: int, speed: MachineSpeed) -> dict:
+def _tabulate_cell(cell: dict, size: int) -> dict:
     metrics, manifest = read_json(cell["metrics"]), read_json(cell["manifest"])
     found = select_metrics(metrics, "psnr_colour_corrected" if cell["corrected"] else "psnr")
     row = {"scene": cell["scene"], "preset": cell["preset"], "photos": metrics["photos"]}
@@ -44,11 +39,7 @@ def _tabulate_cell(cell: dict, size: int, speed: MachineSpeed) -> dict:
     chunks = [chunk for piece in manifest["tiles"] + manifest.get("objects", []) for chunk in piece["chunks"]]
     row |= {f"{part}_s": value for part, value in seconds.items()} | {"seconds": sum_or_none(seconds.values())}
     row |= {"peak_mb": max(memory, default=None), "bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA}
-    lost = measure_shrinking(list_photos(cell["images"]), [cell["fitted"]], size)[cell["fitted"]]
-    general, raster = cell["cost"]
-    estimated = general * speed.general + raster * speed.raster
-    row |= {"size": size, "shrinking": lost, "estimated": estimated}
-    return row | describe_origin(metrics["provenance"]) | describe_machine()
+    return row | {"size": size} | describe_origin(metrics["provenance"]) | describe_machine()
 
 
 def format_presets(rows: list[dict], size: int) -> str:
@@ -69,16 +60,6 @@ def format_presets(rows: list[dict], size: int) -> str:
         "and the largest.",
         format_table(*_tabulate_means(rows, presets)),
     ]
-    if len(scenes) > 1:
-        parts += [
-            "## Forecasts, each scene left out",
-            "What `dav-gswt advise` says of a scene from the others, before a run of it and after one with `draft`: dB "
-            "under its best preset, LPIPS over it, and seconds of these jobs, with what was measured in brackets. "
-            "Seconds: what `make run` expects on this machine, times how much longer the other scenes' jobs took; "
-            "after a run, also how much longer that took.",
-            _describe_misses(rows),
-            format_table(*_tabulate_forecasts(rows)),
-        ]
     for scene in scenes:
         parts += [f"## {scene}", format_table(*_tabulate_scene([row for row in rows if row["scene"] == scene]))]
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
@@ -109,38 +90,6 @@ def _tabulate_means(rows: list[dict], presets: list[str]) -> tuple[list[str], li
         losses = [(mean[key], 2) for key in ("db", "most_db")] + [(mean[key], 3) for key in ("lpips", "most_lpips")]
         found.append([f"`{preset}`", f"{mean['share']:.2f}", *(format_number(*loss) for loss in losses)])
     return head, found
-
-
-def _tabulate_forecasts(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
-    head = ["scene", "preset", "dB before a run", "after one with `draft`", "LPIPS", "seconds before a run"]
-    head += ["after one with `draft`"]
-    front = [read_row(row) for row in rows]
-    before, after = (
-        {(each.scene, each.preset): each for each in leave_one_out(front, known)} for known in (None, "draft")
-    )
-    found = []
-    for row in rows:
-        place = row["scene"], row["preset"]
-        if place in before:
-            one, other = before[place], after[place]
-            losses = [f"{one.loss:.2f} ({one.measured_loss:.2f})", f"{other.loss:.2f}"]
-            sharpness = f"{one.lpips:.3f} ({one.measured_lpips:.3f})"
-            seconds = f"{one.seconds:.0f} ({format_number(row['seconds'], 0)})"
-            found.append([place[0], f"`{place[1]}`", *losses, sharpness, seconds, f"{other.seconds:.0f}"])
-    return head, found
-
-
-def _describe_misses(rows: list[dict]) -> str:
-    """How far off forecasts are before a run and after one, by absolute values; the run's own preset is none."""
-    front, parts = [read_row(row) for row in rows], []
-    for when, known in (("Before a run", None), ("after one with `draft`", "draft")):
-        left_out = [each for each in leave_one_out(front, known) if each.preset != known]
-        off, late = [abs(each.off) for each in left_out], [abs(each.late or 0.0) for each in left_out]
-        parts.append(
-            f"{when} losses are off by {np.mean(off):.2f} dB in the mean, {max(off):.2f} at most, and seconds by "
-            f"{np.mean(late):.0%}, {max(late):.0%} at most"
-        )
-    return "; ".join(parts) + "."
 
 
 def _tabulate_scene(rows: list[dict]) -> tuple[list[str], list[list[str]]]:

@@ -46,7 +46,7 @@ def test_it_writes_what_the_rule_writes(result, tmp_path):
     bundle, size = result / "tiles_auto/bundle_tau0.6", ("--columns", 2, "--rows", 3)
     assert run(bundle, *size, "--format", "glb", "--format", "ply", "--format", "ground", "-o", tmp_path / "out") == 0
     assert (tmp_path / "out/ground/ground.xml").is_file()
-    read = store.read_bundle(bundle, export._find_schema())
+    read = store.read_bundle(bundle, export.SCHEMA)
     terrain = endless.terrain_from_fields(
         read.fields(), read.manifest, HILLS, [[read.object_chunk(0, level)[0] for level in range(2)]]
     )

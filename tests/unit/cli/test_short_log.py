@@ -28,14 +28,11 @@ PLAN = record(LogEvent.RUN_INFO, stats={"fit_coarse": 1, "all": 1, "total": 2})
 JOB = record(LogEvent.JOB_INFO, rule_name="fit_coarse", log=["results/logs/a.log"])
 
 
-def test_the_plan_and_each_job_are_a_line(handler, monkeypatch):
+def test_the_plan_and_each_job_are_a_line(handler):
     assert [handler.describe(each) for each in (PLAN, JOB)] == ["1 jobs to do", "[1 of 1] fit_coarse"]
     assert handler.describe(record(LogEvent.JOB_INFO, rule_name="all", log=[])) is None
     failed = record(LogEvent.JOB_ERROR, rule_name="fit_coarse", log=["results/logs/a.log"])
     assert handler.describe(failed) == "fit_coarse is not finished; its log: results/logs/a.log"
-    monkeypatch.setenv("DAV_GSWT_PLAN", "1")
-    plan = record(LogEvent.RUN_INFO, stats={"fit_coarse": 1, "all": 1, "total": 2})
-    assert handler.describe(plan) == '1 jobs to do\nplan: {"fit_coarse": 1, "all": 1}'
 
 
 NO_SPACE = "[Errno 28] No space left on device"

@@ -4,16 +4,18 @@ import pytest
 from fixtures import result_tree
 
 from dav_gswt.errors import InputError
-from dav_gswt.inspect import saving
+
+pytest.importorskip("pyvista", reason="the extra inspect is not installed")
+pytest.importorskip("trame_vtk", reason="the extra inspect is not installed")
 
 
 @pytest.fixture(scope="session")
 def drawable():
-    """Skips where nothing can be drawn: without PyVista, or without a way to draw off screen."""
-    pytest.importorskip("pyvista", reason="the extra inspect is not installed")
-    pytest.importorskip("trame_vtk", reason="the extra inspect is not installed")
+    """Skips where nothing can be drawn off screen."""
+    from dav_gswt.inspect import plot
+
     try:
-        saving.prepare_rendering()
+        plot.require_rendering()
     except InputError as error:
         pytest.skip(str(error))
 

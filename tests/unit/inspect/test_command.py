@@ -6,8 +6,7 @@ import pytest
 from dav_gswt.cli.main import main
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.inspect import artifacts, saving
-from dav_gswt.inspect.options import ViewOptions
+from dav_gswt.inspect import plot, readers
 
 
 @pytest.mark.parametrize(
@@ -15,7 +14,7 @@ from dav_gswt.inspect.options import ViewOptions
     [
         ("{round}", "Gaussians"),
         ("{round}/levels", "level 1"),
-        ("{scored}", "12 candidates"),
+        ("{scored}", "12 candidates; 0 chosen"),
         ("{photos}", "3 cameras"),
         ("{start}/views.json", "3 cameras"),
         ("{round}/capture", "5 cameras"),
@@ -26,38 +25,37 @@ from dav_gswt.inspect.options import ViewOptions
 )
 def test_every_artefact_is_known_by_its_name(tree, where, shown):
     path = where.format(**vars(tree), tiles=tree.tiles)
-    found = artifacts.build_scene(type(tree.photos)(path), ViewOptions())
+    found = readers.read_scene(type(tree.photos)(path), 300_000)
     assert any(shown in note for note in found.notes), found.notes
-    assert found.layers and (found.high >= found.low).all()
+    assert found.meshes and all(np.isfinite(mesh.points).all() for mesh, _ in found.meshes)
 
 
 def test_what_is_not_understood_is_answered_with_what_is(tree, tmp_path):
     (tmp_path / "notes.txt").write_text("x")
     for path, options, said in (
-        (tmp_path, {}, "understood are fields"),
-        (tmp_path / "notes.txt", {}, "understood are fields"),
+        (tmp_path, {}, "files that are understood: levels.json"),
+        (tmp_path / "notes.txt", {}, "files that are understood"),
         (tmp_path / "nothing.ply", {}, "no such file or folder"),
         (tree.round / "field.ply", {"channel": "Z"}, "--channel: means nothing .* knows --colour"),
         (tree.round / "levels", {"level": 2}, "levels 0 to 1"),
     ):
         with pytest.raises(InputError, match=said):
-            artifacts.build_scene(path, ViewOptions(**options))
+            readers.read_scene(path, 100, **options)
 
 
 def test_pictures_of_other_formats_or_sizes_are_refused(tree, tmp_path, capsys):
     assert main(["inspect", str(tree.photos), "--save", str(tmp_path / "a.jpg")]) == 1
     assert "pictures end in .png and pages in .html" in capsys.readouterr().err
-    for bad in ("12", "0x5", "9000x10"):
-        with pytest.raises(SystemExit):
-            main(["inspect", str(tree.photos), "--size", bad])
-        assert "--size" in capsys.readouterr().err
+    for bad in (["--size", "15", "99"], ["--size", "8193", "99"], ["--most", "0"]):
+        assert main(["inspect", str(tree.photos), "--save", str(tmp_path / "a.png"), *bad]) == 1
+        assert "--size goes from 16 to 8192" in capsys.readouterr().err
 
 
 def test_a_picture_shows_colours_where_they_belong(drawable, tmp_path):
     values = np.repeat(np.repeat(np.array([[0.0, 1.0], [1.0, 1.0]]), 8, 0), 8, 1)
     image_files.write_exr(tmp_path / "uncertainty.exr", {"uncertainty": values})
     out = tmp_path / "a.png"
-    assert main(["inspect", str(tmp_path / "uncertainty.exr"), "--save", str(out), "--size", "400x300"]) == 0
+    assert main(["inspect", str(tmp_path / "uncertainty.exr"), "--save", str(out), "--size", "400", "300"]) == 0
     picture = image_files.read_photo(out)
     assert picture.shape == (300, 400, 3)
     warm = (picture[..., 0] > 0.6) & (picture[..., 2] < 0.3)
@@ -78,7 +76,8 @@ def pages(drawable, tree, tmp_path):
 
 def test_a_page_is_the_same_each_time_says_what_it_shows_and_forbids_all_requests(pages):
     text, again = (page.read_text() for page in pages)
-    assert "12 candidates; 2 chosen" in text and saving.POLICY in text and saving.ICON not in text and text == again
+    assert "12 candidates; 2 chosen" in text and plot.POLICY in text and plot.ICON not in text and text == again
+    assert "exemplar" in text and "uncertainty u = W2: 0" in text
 
 
 @pytest.mark.slow

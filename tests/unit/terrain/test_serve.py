@@ -8,6 +8,7 @@ import threading
 
 import pytest
 
+from dav_gswt.cli.main import main
 from dav_gswt.errors import InputError
 from dav_gswt.terrain import serve
 
@@ -130,7 +131,7 @@ def test_writes_are_refused(ask):
 def test_it_listens_on_loopback_alone_and_names_a_taken_port(folder, running, capsys):
     host, port = running.server_address
     assert host == "127.0.0.1"
-    assert serve.main([str(folder), "--port", str(port)]) == 1
-    assert f"port {port} is taken" in capsys.readouterr().err
+    assert main(["serve", str(folder), "--port", str(port)]) == 1
+    assert f"--port {port}: [Errno 98] Address already in use" in capsys.readouterr().err
     with pytest.raises(InputError, match="--port 70000"):
         serve.create_server(folder, 70000)

@@ -4,9 +4,7 @@ Snakemake's own events are printed in a line each; warnings and errors go throug
 """
 
 import errno
-import json
 import logging
-import os
 import re
 import resource
 import signal
@@ -62,10 +60,8 @@ class LogHandler(LogHandlerBase):
         return record.getMessage() if event is None and record.levelno >= logging.WARNING else None
 
     def _describe_plan(self, jobs: dict[str, int]) -> str:
-        """The number of jobs; for the program that asks for it, also of each rule, as JSON."""
-        self.jobs = jobs.pop("total") - 1
-        text = f"{self.jobs} jobs to do"
-        return f"{text}\nplan: {json.dumps(jobs)}" if os.environ.get("DAV_GSWT_PLAN") else text
+        self.jobs = jobs["total"] - 1
+        return f"{self.jobs} jobs to do"
 
     def _describe_job(self, job: dict) -> str | None:
         if not job["log"]:  # a rule that only names targets

@@ -1,10 +1,14 @@
-"""What all config models share: closed, frozen models and the types of their values."""
+"""What all config models share: closed, frozen tables, the types of their values, and which rules read each key.
+
+The workflow reads this module before the first job, so it imports nothing heavy.
+"""
 
 import re
-from typing import Annotated, Any, Literal
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
-from pydantic.config import JsonDict
+from pydantic.fields import FieldInfo
 
 from dav_gswt.paths import NAME, RESERVED
 
@@ -43,7 +47,125 @@ PhotoSize = Annotated[
 ]
 
 
-def key(description: str, default: Any = ..., *, unit: str = "", renamed: str = "", **bounds) -> Any:
-    """A key of a table: meaning, default, unit and bounds; `renamed`: its name in old config files."""
-    extra: JsonDict = {name: value for name, value in (("unit", unit), ("renamed", renamed)) if value}
-    return Field(default, description=description, json_schema_extra=extra or None, **bounds)
+def key(
+    description: str,
+    default: Any = ...,
+    *,
+    unit: str = "",
+    read_by: Iterable[str] = (),
+    agents: Iterable[str] = (),
+    **bounds,
+) -> Any:
+    """Declare a key of a table.
+
+    Args:
+        read_by: The rules that get this key of a scene, preset, prior or `export`. A change of the key runs them
+            again. A rule that is not named cannot read the key. A table may leave this to its own keys.
+        agents: Rules that also read the scene's `agent` get this key for these agents only. Empty: for all.
+    """
+    extra = {"unit": unit, "read_by": list(read_by), "agents": list(agents)}
+    return Field(
+        default, description=description, json_schema_extra={name: v for name, v in extra.items() if v}, **bounds
+    )
+
+
+def get_extra(field: FieldInfo, name: str) -> Any:
+    """What `key` was given as `unit`, `read_by` or `agents`; None where it was given nothing."""
+    extra = field.json_schema_extra
+    return extra.get(name) if isinstance(extra, dict) else None
+
+
+class EntryKeys(dict):
+    """The keys of an entry of the config that a rule reads.
+
+    To read one of the entry's other keys, `withheld`, is an error: the rule would take its default unnoticed.
+    """
+
+    def __init__(self, values: Mapping[str, Any], withheld: Iterable[str]):
+        super().__init__(values)
+        self.withheld = frozenset(withheld)
+
+    def __missing__(self, key: str) -> Any:
+        self._require_given(key)
+        raise KeyError(key)
+
+    def __contains__(self, key: object) -> bool:
+        self._require_given(key)
+        return super().__contains__(key)
+
+    def get(self, key: str, default: Any = None) -> Any:
+        self._require_given(key)
+        return super().get(key, default)
+
+    def _require_given(self, key: object) -> None:
+        if key in self.withheld:
+            raise LookupError(f"the rule is not given the key {key!r}: name the rule in the `read_by` of that key")
+
+
+def select_keys(model: type[BaseModel], rule: str, entry: Mapping[str, Any]) -> EntryKeys:
+    """The keys of an entry that a rule reads, as `read_by` of the model's keys says."""
+    read = [name for name in model.model_fields if is_read(model, rule, name, entry.get("agent", ""))]
+    values = {name: entry[name] for name in read if name in entry}
+    for name, value in values.items():
+        field = model.model_fields[name]
+        if (table := find_table(field)) and rule not in (get_extra(field, "read_by") or ()):
+            values[name] = select_keys(table, rule, value)
+    return EntryKeys(values, model.model_fields.keys() - read)
+
+
+def is_read(model: type[BaseModel], rule: str, name: str, agent: str = "") -> bool:
+    """Whether a rule reads a key, or some key of the table that it is. name: may be dotted, as `rig.limits`."""
+    name, _, inner = name.partition(".")
+    field, own = model.model_fields[name], model.model_fields.get("agent")
+    agents = get_extra(field, "agents")
+    if agents and agent not in agents and own and rule in (get_extra(own, "read_by") or ()):
+        return False
+    if rule in (get_extra(field, "read_by") or ()):
+        return True
+    table = find_table(field)
+    return bool(table) and any(is_read(table, rule, each) for each in ([inner] if inner else table.model_fields))
+
+
+def find_table(field: FieldInfo) -> type[BaseModel] | None:
+    """The model of a key that is one table; None for any other key."""
+    kinds = [field.annotation, *get_args(field.annotation)]
+    return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
+
+
+ANY = "*"  # in a place: any name of an entry, or any position in a list
+Place = tuple[str, ...]
+Schema = dict[str, Any]
+
+
+def iterate_tables(model: type[BaseModel]) -> Iterator[tuple[Place, Schema]]:
+    """Every table below a model with its place and its JSON schema, the model's own first.
+
+    A place is a tuple of keys. `*` stands for a name or position that the user chooses. A table that is one of several
+    kinds is followed by its kind, as in ("scenes", "*", "synthetic").
+    """
+    schema = model.model_json_schema()
+    yield from _iterate_table(schema, schema.get("$defs", {}), ())
+
+
+def _iterate_table(table: Schema, defs: Schema, place: Place) -> Iterator[tuple[Place, Schema]]:
+    yield place, table
+    for name, value in table["properties"].items():
+        yield from _iterate_value(value, defs, (*place, name))
+
+
+def _iterate_value(value: Schema, defs: Schema, place: Place) -> Iterator[tuple[Place, Schema]]:
+    if "$ref" in value:
+        yield from _iterate_table(_resolve(value, defs), defs, place)
+    choices = value.get("anyOf", value.get("oneOf", []))
+    several = sum("$ref" in choice for choice in choices) > 1
+    for choice in choices:
+        own = _resolve(choice, defs).get("properties", {}) if several else {}
+        kind = own.get("kind", own.get("model", {})).get("const")
+        yield from _iterate_value(choice, defs, (*place, kind) if kind else place)
+    for inner in ("items", "additionalProperties"):
+        if isinstance(value.get(inner), dict):
+            yield from _iterate_value(value[inner], defs, (*place, ANY))
+
+
+def _resolve(value: Schema, defs: Schema) -> Schema:
+    return defs[value["$ref"].rpartition("/")[2]] if "$ref" in value else value

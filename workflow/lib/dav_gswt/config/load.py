@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from dav_gswt.config.base import ANY, iterate_tables
 from dav_gswt.config.model import Config
-from dav_gswt.config.tables import matching_table, renamed_keys
 from dav_gswt.errors import InputError, summarize_error
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -74,7 +74,7 @@ def check_config(config: Mapping) -> dict:
 
     An alias counts before the key that it stands for.
 
-    Raises: InputError: the first key that is unknown, renamed or out of range, and what it may be.
+    Raises: InputError: the first key that is unknown or out of range, and what it may be.
     """
     config = {key: value for key, value in config.items() if key not in ALIASES} | {
         key: config[alias] for alias, key in ALIASES.items() if alias in config
@@ -140,10 +140,13 @@ def _keys_of(values: Any, location: tuple) -> list:
 
 
 def _describe_unknown_key(model: type[BaseModel], location: tuple) -> str:
-    unknown, table = str(location[-1]), matching_table(model, location[:-1])
-    if unknown in (renamed := renamed_keys(table)):
-        return f"{unknown!r} is called {renamed[unknown]!r} now"
-    known = list(table.model_fields)
+    unknown, where = str(location[-1]), location[:-1]
+    tables = (
+        table
+        for place, table in iterate_tables(model)
+        if len(place) == len(where) and all(p in (ANY, part) for p, part in zip(place, where, strict=True))
+    )
+    known = list(next(tables)["properties"])
     near = get_close_matches(unknown, known, 1)
     return f"there is no key {unknown!r}" + (f"; is {near[0]!r} meant?" if near else f", only {', '.join(known)}")
 

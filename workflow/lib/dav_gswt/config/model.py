@@ -55,7 +55,7 @@ class Config(ConfigModel):
         le=1000,
     )
     stop: Stop = key("when rounds end before the last one", Stop())
-    inpaint: bool = key("`true`: ground that no photo saw is painted by `prior`, and marked", False, renamed="complete")
+    inpaint: bool = key("`true`: ground that no photo saw is painted by `prior`, and marked", False)
     levels: Annotated[int, Field(ge=1, le=8)] | Auto = key(
         "levels of detail; `auto`: as many as are ever drawn, at most six", "auto"
     )
@@ -87,9 +87,9 @@ class Config(ConfigModel):
     export: Export = key("a finite terrain for other programs, asked for by its path: docs/exports.md", Export())
     scenes: dict[Name, Scene] = key("what there is to make a terrain of", {})
     priors: dict[Name, PriorSettings] = key("diffusion priors", {})
-    presets: dict[Name, Preset] = key("speed against accuracy", renamed="qualities", min_length=1)
+    presets: dict[Name, Preset] = key("speed against accuracy", min_length=1)
     sweeps: dict[Swept, list[int | float]] = key("`snakemake sweeps`: values of settings, each varied by itself", {})
-    tilings: dict[Name, Tiling] = key("how tiles are cut", renamed="seams", min_length=1)
+    tilings: dict[Name, Tiling] = key("how tiles are cut", min_length=1)
 
     @model_validator(mode="after")
     def _require_known_names(self) -> "Config":

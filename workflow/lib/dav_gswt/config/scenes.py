@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 
 from dav_gswt.capture.agents import list_agents
-from dav_gswt.config.base import ConfigModel, Degrees, Name, PhotoSize, Seed, Share, Text, key
+from dav_gswt.config.base import ConfigModel, Degrees, Name, PhotoSize, Seed, Text, key
 
 if TYPE_CHECKING:
     SyntheticAgent = PhotoAgent = str
@@ -15,6 +15,15 @@ Range = Annotated[tuple[float, float], Field(description="lowest and highest", s
 Radius = Annotated[float, Field(ge=0.05, le=20)]
 Coordinate = Annotated[float, Field(ge=-100, le=100)]
 GroundPlace = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
+
+# What the keys' `read_by` and `agents` share. Rules that read `agent` get some keys for some agents only.
+SCORING = ("score_coarse", "score_round")
+CAPTURING = ("capture_views", "request_views")
+ASKING = ("select_poses", *CAPTURING)
+POSE_READERS = (*SCORING, *ASKING)
+POSED = ("render", "serial", "plan", "handheld")  # agents that take photos anywhere, and do not only choose from a pool
+FITTING = ("fit_coarse", "update_field", "fit_chosen_photos")
+REGISTERED, RENDERED = ("register_photos",), ("render_photos",)
 
 
 class Axes(ConfigModel):
@@ -31,16 +40,18 @@ class SerialRig(ConfigModel):
     port: Text = key("the serial port: `/dev/ttyUSB0`, or a URL that pyserial knows (`socket://rig:4000`)")
     baud: int = key("speed of the port", 115200, unit="bit/s", ge=300, le=4_000_000)
     inbox: Text = key("the folder into which the tethered camera's software saves photos")
-    millimetres: float = key("in one unit of the scene's world (`ground.json`)", unit="mm", ge=0.001, le=1e6)
-    pan_zero: Degrees = key("pan at the world's azimuth 0 (its +x)", 0, unit="degrees")
-    tilt_zero: Degrees = key("tilt at elevation 0 (the horizon)", 0, unit="degrees")
-    limits: Axes = key("`pan`, `tilt` and `radius`: lowest and highest that the rig may be sent to")
-    no_go: list[Axes] = key(
-        "boxes that it neither enters nor crosses; an axis left out is barred in full", [], max_length=20
+    millimetres: float = key(
+        "in one unit of the scene's world (`ground.json`)", unit="mm", read_by=SCORING, ge=0.001, le=1e6
     )
-    settle: float = key("pause before a photo", 1, unit="s", ge=0, le=60)
-    timeout: float = key("longest wait for an answer", 2, unit="s", ge=0.01, le=60)
-    retries: int = key("how often a question is repeated", 3, ge=0, le=100)
+    pan_zero: Degrees = key("pan at the world's azimuth 0 (its +x)", 0, unit="degrees", read_by=SCORING)
+    tilt_zero: Degrees = key("tilt at elevation 0 (the horizon)", 0, unit="degrees", read_by=SCORING)
+    limits: Axes = key("`pan`, `tilt` and `radius`: lowest and highest that the rig may be sent to", read_by=SCORING)
+    no_go: list[Axes] = key(
+        "boxes that it neither enters nor crosses; an axis left out is barred in full",
+        [],
+        read_by=SCORING,
+        max_length=20,
+    )
     move_timeout: float = key("longest time of one move, or of homing", 120, unit="s", ge=0.1, le=3600)
     photo_timeout: float = key("longest time until a photo is complete in `inbox`", 30, unit="s", ge=0.1, le=3600)
     dry_run: bool = key("`true`: print each move, move nothing, take nothing", True)
@@ -63,19 +74,15 @@ class SerialRig(ConfigModel):
 class Drone(ConfigModel):
     """How a drone flies, for `agent: plan`."""
 
-    min_altitude: float = key(
-        "no photo is taken below", 2, unit="m above ground", renamed="least_altitude", ge=0, le=100
-    )
+    min_altitude: float = key("no photo is taken below", 2, unit="m above ground", read_by=SCORING, ge=0, le=100)
     clearance: float = key("below it the drone only climbs and sinks", 5, unit="m above ground", ge=1, le=100)
-    speed: float = key("between photos", 3, unit="m/s", ge=0.1, le=20)
 
 
 class Feasibility(ConfigModel):
     """Bounds of candidate poses. Poses inside the ground or hidden behind it are never asked for."""
 
-    min_height: float | None = key("above the ground", None, unit="world units", renamed="lowest_height", ge=0)
-    max_height: float | None = key("above the ground", None, unit="world units", renamed="highest_height", gt=0)
-    max_distance: float | None = key("from the exemplar's middle", None, unit="world units", renamed="farthest", gt=0)
+    min_height: float | None = key("above the ground", None, unit="world units", ge=0)
+    max_height: float | None = key("above the ground", None, unit="world units", gt=0)
 
 
 class OrbitPoses(ConfigModel):
@@ -85,7 +92,7 @@ class OrbitPoses(ConfigModel):
 
 
 class FreePoses(ConfigModel):
-    """Any direction, distance and aim point."""
+    """Any direction, distance and aim point on the exemplar."""
 
     kind: Literal["free"]
     radii: Annotated[tuple[Radius, Radius], Field(strict=False)] | None = key(
@@ -94,7 +101,6 @@ class FreePoses(ConfigModel):
         None,
         unit="flying heights",
     )
-    aims: Share = key("of the exemplar's side: the square about its middle that aim points lie in; 0: the middle", 1)
 
     @model_validator(mode="after")
     def _order_radii(self) -> "FreePoses":
@@ -121,17 +127,25 @@ CandidatePoses = Annotated[OrbitPoses | FreePoses | RoutePoses, Field(discrimina
 
 
 class _Scene(ConfigModel):
-    preset: Name = key("an entry of `presets`", renamed="quality")
-    tiling: Name = key("an entry of `tilings`", renamed="seam")
+    preset: Name = key("an entry of `presets`")
+    tiling: Name = key("an entry of `tilings`")
 
 
 class _PhotographedScene(_Scene):
-    candidates: int = key("poses that may be asked for", 250, ge=0, le=10_000)
-    poses: CandidatePoses | None = key("which poses these are; if left out `{kind: orbit}`", None)
-    min_elevation: float = key(
-        "lowest elevation of candidates and of test views", 30, unit="degrees", renamed="lowest", ge=5, le=85
+    candidates: int = key("poses that may be asked for", 250, read_by=POSE_READERS, agents=POSED, ge=0, le=10_000)
+    poses: CandidatePoses | None = key(
+        "which poses these are; if left out `{kind: orbit}`", None, read_by=POSE_READERS, agents=POSED
     )
-    feasibility: Feasibility | None = key("bounds of candidate poses", None, renamed="reach")
+    min_elevation: float = key(
+        "lowest elevation of candidates and of test views",
+        30,
+        unit="degrees",
+        read_by=(*RENDERED, *POSE_READERS),
+        agents=POSED,
+        ge=5,
+        le=85,
+    )
+    feasibility: Feasibility | None = key("bounds of candidate poses", None, read_by=SCORING, agents=POSED)
 
 
 def _materials(default: str):
@@ -151,23 +165,41 @@ class SyntheticScene(_PhotographedScene):
     """A scene that is rendered, with exact poses."""
 
     kind: Literal["synthetic"]
-    family: Literal["desert", "meadow", "flowers", "grass", "planet", "oasis"] = key("which generator")
-    seed: Seed = key("which scene of the family")
-    photos: int = key("photos that are rendered beforehand", ge=3, le=200)
-    start: int | None = key("photos to start from, with `agent: replay`; all if left out", None, ge=2, le=200)
-    test: int = key("views that only test", ge=0, le=200)
+    family: Literal["desert", "meadow", "flowers", "grass", "planet", "oasis"] = key(
+        "which generator", read_by=(*RENDERED, *CAPTURING), agents=("render",)
+    )
+    seed: Seed = key("which scene of the family", read_by=(*RENDERED, *CAPTURING), agents=("render",))
+    photos: int = key("photos that are rendered beforehand", read_by=(*RENDERED, "split_views"), ge=3, le=200)
+    start: int | None = key(
+        "photos to start from, with `agent: replay`; all if left out", None, read_by=("split_views",), ge=2, le=200
+    )
+    test: int = key("views that only test", read_by=RENDERED, ge=0, le=200)
     layout: Literal["ring", "cap", "paper"] = key(
         "how photos are placed: `ring`, one from above and the others around it at 65 degrees; `cap`, evenly over the "
         "hemisphere above `min_elevation`; `paper`, 36 on a circle at 45 degrees and the others as `cap`",
         "ring",
-        renamed="rig",
+        read_by=RENDERED,
     )
-    oblique: int = key("further test views around the exemplar at 45 degrees", 0, ge=0, le=200)
-    walkers: int = key("further test views at eye level, 0.8, 1.6 and 3.2 m above the ground in turn", 0, ge=0, le=200)
-    size: int = key("width and height of the photos", unit="pixels", ge=64, le=4096)
+    oblique: int = key("further test views around the exemplar at 45 degrees", 0, read_by=RENDERED, ge=0, le=200)
+    walkers: int = key(
+        "further test views at eye level, 0.8, 1.6 and 3.2 m above the ground in turn",
+        0,
+        read_by=RENDERED,
+        ge=0,
+        le=200,
+    )
+    size: int = key(
+        "width and height of the photos",
+        unit="pixels",
+        read_by=(*RENDERED, *POSE_READERS),
+        agents=("render",),
+        ge=64,
+        le=4096,
+    )
     materials: Materials = _materials("one")
     agent: SyntheticAgent = key(
-        "`render`: photos are rendered at the chosen poses; `replay`: chosen from those rendered beforehand"
+        "`render`: photos are rendered at the chosen poses; `replay`: chosen from those rendered beforehand",
+        read_by=POSE_READERS,
     )
 
 
@@ -175,43 +207,67 @@ class PhotoScene(_PhotographedScene):
     """A folder of photos."""
 
     kind: Literal["photos"]
-    folder: Text = key("a folder of photos and nothing else, relative to the working directory or to the repository")
+    folder: Text = key(
+        "a folder of photos and nothing else, relative to the working directory or to the repository",
+        read_by=REGISTERED,
+    )
     model: Text | None = key(
         "known cameras: a COLMAP folder, `transforms.json` (nerfstudio) or `reconstruction.json` (OpenSfM)",
         None,
+        read_by=REGISTERED,
     )
-    size: PhotoSize = key("longer side of undistorted photos, or `native`: their own; none is enlarged", unit="pixels")
+    size: PhotoSize = key(
+        "longer side of undistorted photos, or `native`: their own; none is enlarged", unit="pixels", read_by=REGISTERED
+    )
     start: int = key(
         "photos to start from, or all that are left: test photos are set aside first, one in ten of all and at least "
         "two (none of fewer than six). With `agent: replay` the remaining photos are the pool that rounds choose from",
+        read_by=("split_views",),
         ge=2,
         le=1000,
     )
     whole: bool = key(
-        "`true`: all ground in the photos is fitted and scored, not only the exemplar and a margin", False
+        "`true`: all ground in the photos is fitted and scored, not only the exemplar and a margin",
+        False,
+        read_by=("split_views", *FITTING),
     )
     sfm: Literal["quick", "careful"] = key(
-        "`quick`: 4096 features a photo, 12 partners; `careful`: 8192 and 40", "quick"
+        "`quick`: 4096 features a photo, 12 partners; `careful`: 8192 and 40", "quick", read_by=REGISTERED
     )
-    mapper: Literal["incremental", "global"] = key("`global`: all photos at once, faster for hundreds", "incremental")
+    mapper: Literal["incremental", "global"] = key(
+        "`global`: all photos at once, faster for hundreds", "incremental", read_by=REGISTERED
+    )
     verdict: Literal["stop", "warn"] = key(
         "what follows where structure from motion gives a model that several signs refuse: `stop` ends the run, `warn` "
         "goes on with it",
         "stop",
+        read_by=REGISTERED,
     )
     cameras: Literal["auto", "one", "each"] = key(
-        "`auto`: one camera for all photos of equal size and EXIF focal length; `one`: for all of equal size", "auto"
+        "`auto`: one camera for all photos of equal size and EXIF focal length; `one`: for all of equal size",
+        "auto",
+        read_by=REGISTERED,
     )
-    focal: float | None = key("where EXIF has none or is wrong", None, unit="mm (35 mm equivalent)", ge=4, le=2000)
+    focal: float | None = key(
+        "where EXIF has none or is wrong", None, unit="mm (35 mm equivalent)", read_by=REGISTERED, ge=4, le=2000
+    )
     materials: Materials = _materials("auto")
-    masks: Text | None = key("a folder of masks named as the photos: black pixels are not ground", None)
+    masks: Text | None = key(
+        "a folder of masks named as the photos: black pixels are not ground", None, read_by=REGISTERED
+    )
+    masks: Text | None = key(
+        "a folder of masks named as the photos: black pixels are not ground", None, read_by=REGISTERED
+    )
     agent: PhotoAgent = key(
         "who takes further photos: `replay` takes them from the photos of the folder that are left; `serial` is a "
-        "camera rig, `plan` a drone, `handheld` a person"
+        "camera rig, `plan` a drone, `handheld` a person",
+        read_by=POSE_READERS,
     )
-    candidates: int = key("poses that a device may be asked for", 250, ge=1, le=10_000)
-    rig: SerialRig | None = key("the camera rig of `agent: serial`", None)
-    drone: Drone = key("how a drone flies, for `agent: plan`", Drone(), renamed="flight")
+    candidates: int = key(
+        "poses that a device may be asked for", 250, read_by=POSE_READERS, agents=POSED, ge=1, le=10_000
+    )
+    rig: SerialRig | None = key("the camera rig of `agent: serial`", None, read_by=CAPTURING, agents=("serial",))
+    drone: Drone = key("how a drone flies, for `agent: plan`", Drone(), read_by=CAPTURING, agents=("plan",))
 
     @model_validator(mode="after")
     def _require_rig(self) -> "PhotoScene":
@@ -226,8 +282,9 @@ class FieldScene(_Scene):
     kind: Literal["field"]
     field: Annotated[str, Field(pattern=r"\.[pP][lL][yY]$")] = key("a finished 3D Gaussian splatting `.ply`")
     up: tuple[float, float, float] = key(
-        "a direction that points roughly up in the file", (0.0, -1.0, 0.0), strict=False
+        "a direction that points roughly up in the file", (0.0, -1.0, 0.0), read_by=("import_field",), strict=False
     )
 
 
+SCENES: dict[str, type[_Scene]] = {"synthetic": SyntheticScene, "photos": PhotoScene, "field": FieldScene}
 Scene = Annotated[SyntheticScene | PhotoScene | FieldScene, Field(discriminator="kind")]

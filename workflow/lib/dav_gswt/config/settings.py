@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints, model_validator
 
-from dav_gswt.config.base import Auto, ConfigModel, Name, PhotoSize, Seed, Share, Text, key
+from dav_gswt.config.base import Auto, ConfigModel, Name, PhotoSize, Seed, Text, key
 
 Colour = Annotated[str, StringConstraints(pattern="^#[0-9a-fA-F]{6}$")]
 
@@ -14,7 +14,7 @@ class Stop(ConfigModel):
 
     photos: int | None = key("most photos in all", None, ge=3, le=100_000)
     marginal_gain: float | None = key(
-        "least expected gain of a further photo", None, unit="dB a photo", renamed="worth", ge=0.0001, le=100
+        "least expected gain of a further photo", None, unit="dB a photo", ge=0.0001, le=100
     )
 
 
@@ -30,7 +30,6 @@ class Hills(ConfigModel):
     kind: Literal["hills"]
     height: float = key("nothing is higher above the plain or deeper below it", unit="tile sides", ge=0, le=100)
     wavelength: float = key("from one large hill to the next, about", unit="tile sides", ge=1, le=100_000)
-    octaves: int = key("of hills on hills, each half as wide and 0.4 times as high", 4, ge=1, le=8)
     seed: Seed = key("which hills", 0)
 
 
@@ -42,10 +41,12 @@ class HeightMap(ConfigModel):
         "grey image of unsigned integers (16 bits: PNG, TIFF) or of floats (EXR, TIFF), at most 4096 pixels a side"
     )
     width: float = key(
-        "of the whole image; its middle lies at the world's origin", unit="world units", ge=0.001, le=1e7
+        "of the whole image; its middle lies at the world's origin, and it is mirrored beyond its edge",
+        unit="world units",
+        ge=0.001,
+        le=1e7,
     )
     height: float = key("height of white; black is 0, floats are multiplied by it", unit="world units", ge=-1e6, le=1e6)
-    beyond: Literal["mirror", "clamp"] = key("what comes after the image's edge", "mirror")
 
 
 class Sphere(ConfigModel):
@@ -98,7 +99,6 @@ class PictureClasses(ConfigModel):
         "of the whole picture; its middle lies at the world's origin", unit="world units", ge=0.001, le=1e7
     )
     colours: dict[Text, Colour] = key("name of a material: its colour in the picture, as `#rrggbb`", min_length=1)
-    beyond: Literal["mirror", "clamp"] = key("what comes after the picture's edge", "mirror")
     weight: Weight = key("of the picture; noise lies between -1 and 1", 1)
 
 
@@ -136,50 +136,68 @@ class Flight(ConfigModel):
         return self
 
 
+EVALUATING = ("evaluate_round", "evaluate_inpainted")  # metrics.json records what its field was fitted with
+FITTING = ("fit_coarse", "evaluate_coarse", "update_field", "fit_chosen_photos", *EVALUATING)
+
+
 class Preset(ConfigModel):
     """How much a fit may spend. `auto` asks the scene; fit.json says what was chosen and why."""
 
-    size: PhotoSize = key("longer side of the photos that the fit sees, or `native`: the scene's", unit="pixels")
-    spacing: float = key("of the ground's discs, in sizes of a photo's pixel on the ground", ge=0.5, le=16)
+    size: PhotoSize = key(
+        "longer side of the photos that the fit sees, or `native`: the scene's", unit="pixels", read_by=FITTING
+    )
+    spacing: float = key(
+        "of the ground's discs, in sizes of a photo's pixel on the ground", read_by=FITTING, ge=0.5, le=16
+    )
     max_gaussians: Annotated[int, Field(ge=1000, le=8_000_000)] | Auto = key(
-        "most Gaussians in the field", renamed="cap"
+        "most Gaussians in the field", read_by=(*FITTING, "prepare_external_field")
     )
     steps: Annotated[int, Field(ge=1, le=100_000)] | Auto = key(
-        "optimiser steps of the coarse fit, to 8 photos or fewer"
+        "optimiser steps of the coarse fit, to 8 photos or fewer", read_by=FITTING
     )
     steps_per_photo: Annotated[int, Field(ge=1, le=100_000)] | Auto = key(
-        "optimiser steps for each photo more: beyond 8 of the coarse fit, and each new one of a round"
+        "optimiser steps for each photo more: beyond 8 of the coarse fit, and each new one of a round",
+        read_by=FITTING,
     )
     refit: Literal["continue", "scratch"] = key(
         "how a round takes new photos: `continue`: the field is fitted on; `scratch`: all photos are fitted anew. "
         "Not read with `choose_with`",
         "continue",
+        read_by=("update_field", *EVALUATING),
     )
     choose_with: Name | None = key(
-        "preset whose rounds choose the photos; this one then fits all of them at once. Left out: its own", None
+        "preset whose rounds choose the photos; this one then fits all of them at once. Left out: its own",
+        None,
+        read_by=EVALUATING,
     )
     sh_degree: Annotated[int, Field(ge=0, le=3)] | Auto = key(
-        "of the spherical harmonics of colour; tiles show their constant part", 0, renamed="degree"
+        "of the spherical harmonics of colour; tiles show their constant part", 0, read_by=FITTING
     )
     pose_rate: float = key(
-        "first learning rate of the cameras' rotations; 0: they are held", 0, unit="radians", ge=0, le=0.01
+        "first learning rate of the cameras' rotations; 0: they are held",
+        0,
+        unit="radians",
+        read_by=FITTING,
+        ge=0,
+        le=0.01,
     )
-    level_steps: int = key("optimiser steps for a coarser level", ge=1, le=100_000)
-    levels: Annotated[int, Field(ge=1, le=8)] | Auto | None = key("instead of the config's `levels`", None)
+    level_steps: int = key("optimiser steps for a coarser level", read_by=("make_levels",), ge=1, le=100_000)
+
+
+INPAINTING = ("inpaint_field",)  # scoring reads all keys of a prior
 
 
 class _Prior(ConfigModel):
-    samples: int = key("drawn for each pose", ge=2, le=100)
-    steps: int = key("denoising steps of a sample", ge=1, le=1000)
+    samples: int = key("drawn for each pose", read_by=INPAINTING, ge=2, le=100)
+    steps: int = key("denoising steps of a sample", read_by=INPAINTING, ge=1, le=1000)
     staged: bool = key("`true`: all poses with 2 steps, then in full those that may be among the best", True)
-    lpips: bool = key("`false`: without the term LPIPS", True)
 
 
 class TerrainPriorSettings(_Prior):
     """The project's own latent diffusion model of terrain."""
 
-    model: Literal["terrain"]
-    weights: Text | None = key("other weights of the same network", None)
+    model: Literal["terrain"] = key("`terrain`", read_by=INPAINTING)
+    weights: Text | None = key("other weights of the same network", None, read_by=INPAINTING)
 
 
 class Zero123Settings(_Prior):
@@ -187,7 +205,6 @@ class Zero123Settings(_Prior):
 
     model: Literal["zero123"]
     folder: Text = key("its weights: docs/prior.md")
-    guidance: float = key("strength of classifier-free guidance", 3, ge=1, le=100)
 
 
 PriorSettings = Annotated[TerrainPriorSettings | Zero123Settings, Field(discriminator="model")]
@@ -207,9 +224,5 @@ class Tiling(ConfigModel):
         "the surer a patch the more its colours count (the paper's gamma); `semantic-nogamma`, both alike everywhere",
         "semantic",
     )
-    slope: float = key("how fast the weight of colour falls with uncertainty", 2, gt=0, le=100)
-    replicate: int = key("another number, another draw of places", 0, renamed="draw", ge=0, le=1000)
+    replicate: int = key("another number, another draw of places", 0, ge=0, le=1000)
     sam2: Text | None = key("a folder with a checkpoint of SAM 2, whose masks separate objects", None)
-
-
-__all__ = ["ClassTerm", "Flight", "Heights", "Preset", "PriorSettings", "Share", "Stills", "Stop", "Surface", "Tiling"]

@@ -173,7 +173,7 @@ def surface_from_config(entry: dict, side: float) -> HeightField:
     if entry["kind"] == "sphere":
         return make_sphere(entry["radius"], side)
     if entry["kind"] == "hills":
-        return Hills(entry["height"] * side, entry["wavelength"] * side, entry.get("octaves", 4), entry.get("seed", 0))
+        return Hills(entry["height"] * side, entry["wavelength"] * side, salt=entry.get("seed", 0))
     with np.errstate(over="ignore"):  # what becomes infinite is refused
         pixels = read_height_map(path := locate_path(entry["file"])) * np.float32(entry["height"])
     bad = ~(np.abs(pixels) <= FARTHEST)

@@ -77,7 +77,7 @@ def _stand_around(scene: dict, poses: dict, frame: SceneFrame, lens: Camera) -> 
     radii, aims = (1.0, 1.0), 0.0
     if poses["kind"] == "free":
         usual = FREE_RADII if scene["agent"] == "render" else REACHED_RADII
-        radii, aims = poses.get("radii", usual), poses["aims"]
+        radii, aims = poses.get("radii", usual), poses.get("aims", 1.0)
     low, high = (frame.flying_height * radius for radius in radii)
     placed = camera_layouts.spread_free(count, lowest, (low, high), aims * frame.exemplar.side)
     return [

@@ -74,9 +74,9 @@ def load_prior(entry: dict) -> Prior:
         from dav_gswt.prior.weights import TERRAIN_WEIGHTS
 
         return TerrainPrior.open(locate_path(entry.get("weights", TERRAIN_WEIGHTS)))
-    from dav_gswt.prior.zero123 import GUIDANCE, Zero123
+    from dav_gswt.prior.zero123 import Zero123
 
-    return Zero123.open(locate_path(entry["folder"]), entry.get("guidance", GUIDANCE))
+    return Zero123.open(locate_path(entry["folder"]))
 
 
 def sample_terms(

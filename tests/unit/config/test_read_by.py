@@ -5,14 +5,13 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from fixtures.configs import checked_config
 
 from dav_gswt.capture import serial_rig
-from dav_gswt.config import rule_keys
+from dav_gswt.config.base import EntryKeys, is_read, select_keys
 from dav_gswt.config.load import check_model
-from dav_gswt.config.rule_keys import EntryKeys, select_preset_keys, select_scene_keys
-from dav_gswt.config.scenes import PhotoScene, SyntheticScene
+from dav_gswt.config.scenes import SCENES, PhotoScene, SyntheticScene
 from dav_gswt.config.settings import Preset
-from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings, select_settings
@@ -34,41 +33,43 @@ def synthetic_scene() -> dict:
     return check_model(SyntheticScene, SYNTHETIC).model_dump(mode="json", exclude_none=True)
 
 
-def test_a_rule_has_the_keys_that_it_is_given():
-    keys = EntryKeys({"a": 1, "b": 2, "rig": {"limits": 3, "port": 4}}, ("a", "missing", "rig.limits"))
-    assert keys == {"a": 1, "rig": {"limits": 3}} and repr(keys) == "{'a': 1, 'rig': {'limits': 3}}"
-    assert keys.get("missing", 5) == 5 and "missing" not in keys
-
-
 @pytest.mark.parametrize("read", [lambda keys: keys["b"], lambda keys: keys.get("b", 0), lambda keys: "b" in keys])
 def test_a_key_that_a_rule_is_not_given_has_no_default(read):
-    with pytest.raises(LookupError, match="not given the key 'b'"):
-        read(EntryKeys({"a": 1, "b": 2}, ["a"]))
+    keys = EntryKeys({"a": 1}, ["b"])
+    for each in (keys, pickle.loads(pickle.dumps(keys))):  # as a job receives it
+        assert each == {"a": 1} and each.get("missing", 5) == 5 and "missing" not in each
+        with pytest.raises(LookupError, match="not given the key 'b'"):
+            read(each)
 
 
-def test_jobs_receive_keys_with_their_guard():
-    sent = pickle.loads(pickle.dumps(EntryKeys({"a": 1, "rig": {"limits": 3}}, ["a", "rig.limits"])))
-    assert sent == {"a": 1, "rig": {"limits": 3}}
-    with pytest.raises(LookupError):
-        sent["rig"].get("port")
+def test_keys_follow_from_the_rule_and_the_agent():
+    read = {agent: set(select_keys(PhotoScene, "score_coarse", photo_scene(agent))) for agent in ("replay", "plan")}
+    assert read == {"replay": {"agent"}, "plan": {"agent", "candidates", "min_elevation", "drone"}}
+    assert select_keys(PhotoScene, "score_coarse", photo_scene("plan"))["drone"] == {"min_altitude": 2.0}
+    assert "clearance" in select_keys(PhotoScene, "request_views", photo_scene("plan"))["drone"]
+    assert is_read(PhotoScene, "score_coarse", "rig.limits", "serial")
+    assert not is_read(PhotoScene, "score_coarse", "rig.port", "serial")
+    assert set(select_keys(PhotoScene, "register_photos", photo_scene("replay"))) == {
+        *("folder", "size", "sfm", "mapper", "verdict", "cameras")
+    }
 
 
 @pytest.mark.parametrize("rule, settings", [("fit_coarse", CoarseSettings), ("update_field", UpdateSettings)])
 def test_a_fit_is_given_all_keys_of_its_settings(rule, settings):
+    preset = checked_config()["presets"]["draft"]
     read = {field.name for field in fields(settings) if field.metadata.get("of_preset", True)}
-    assert read <= set(rule_keys.PRESET_KEYS[rule])
-    preset = {key: 1.0 if key in ("spacing", "pose_rate") else 1 for key in Preset.model_fields}
-    assert select_settings(settings, select_preset_keys(rule, preset)) == select_settings(settings, preset)
+    given = select_keys(Preset, rule, preset)
+    assert not read & given.withheld and select_settings(settings, given) == select_settings(settings, preset)
 
 
 def test_scores_are_given_all_keys_of_a_rig_s_reach():
-    given = select_scene_keys("score_coarse", photo_scene("serial"))["rig"]
-    assert given.allowed == {"millimetres", "pan_zero", "tilt_zero", "limits", "no_go"}
+    given = select_keys(PhotoScene, "score_coarse", photo_scene("serial"))["rig"]
+    assert not {field.name for field in fields(serial_rig.RigReach)} & given.withheld and "port" in given.withheld
     assert serial_rig.filter_reachable({"rig": given}, synthetic.make_scene("desert", 0).frame, []) == []
 
 
 def test_what_renders_photos_reads_only_its_keys(synthetic_scene):
-    given = select_scene_keys("render_photos", synthetic_scene)
+    given = select_keys(SyntheticScene, "render_photos", synthetic_scene)
     assert synthetic.scene_from_config(given) == synthetic.scene_from_config(synthetic_scene)
     tests, expected = synthetic.test_views(given), synthetic.test_views(synthetic_scene)
     assert len(synthetic.start_views(given)) == 5 and sum(map(len, tests.values())) == 6
@@ -77,9 +78,8 @@ def test_what_renders_photos_reads_only_its_keys(synthetic_scene):
 
 def test_what_lists_candidates_reads_only_its_keys(synthetic_scene):
     frame = synthetic.make_scene("desert", 0).frame
-    assert len(candidates.list_rendered(select_scene_keys("select_poses", synthetic_scene), frame)) == 250
+    given = select_keys(SCENES["synthetic"], "select_poses", synthetic_scene)
+    assert len(candidates.list_rendered(given, frame)) == 250
     camera = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, 64.0, 64.0, 128, 128)
-    given = select_scene_keys("score_round", photo_scene("plan"))
+    given = select_keys(PhotoScene, "score_round", photo_scene("plan"))
     assert given["agent"] == "plan" and len(candidates.list_poses(given, frame, camera)) == 250
-    with pytest.raises(InputError, match="render_candidates serves no scene with agent replay"):
-        select_scene_keys("render_candidates", {"agent": "replay"})

@@ -1,0 +1,250 @@
+"""What readers make of artefacts: places, sizes and colours."""
+
+import shutil
+
+import numpy as np
+import pytest
+from fixtures import result_tree
+from matplotlib import colormaps
+from scipy.spatial.transform import Rotation
+
+from dav_gswt import field as fields
+from dav_gswt.errors import InputError
+from dav_gswt.field import GaussianField, rgb_to_sh
+from dav_gswt.files import read_json, write_json
+from dav_gswt.geometry.cameras import camera_to_json
+from dav_gswt.geometry.poses import pose_offset
+from dav_gswt.images import image_files
+from dav_gswt.inspect import camera_readers, map_readers, plot, readers
+from dav_gswt.inspect.plot import Bar, Scene
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.tiles import store
+from dav_gswt.tiles.layout import edge_colours
+
+POSES = result_tree.poses()
+MOST = 300_000
+
+
+def one(sigma=(0.1, 0.1, 0.1), ground=False, turn=None, opacity=4.0, uncertainty=0.0):
+    return GaussianField(
+        np.float32([[1.0, 2.0, 3.0]]),
+        np.log(np.float32([sigma])),
+        np.roll((turn or Rotation.identity()).as_quat(), 1)[None].astype(np.float32),
+        np.float32([opacity]),
+        rgb_to_sh(np.array([[0.2, 0.4, 0.6]])),
+        np.float32([uncertainty]),
+        np.array([ground]),
+    )
+
+
+def draw(field):
+    scene = Scene("", [])
+    readers.add_solids(scene, field, np.uint8([[9, 8, 7]]))
+    ((mesh, _),) = scene.meshes
+    return mesh
+
+
+def test_a_round_gaussian_is_a_solid_of_its_ellipsoids_volume():
+    turn = Rotation.from_euler("xyz", [20, 50, 80], degrees=True)
+    mesh = draw(one([0.3, 0.1, 0.2], turn=turn))
+    assert mesh.volume == pytest.approx(4 / 3 * np.pi * 0.3 * 0.1 * 0.2, rel=1e-4)
+    arms = mesh.points - mesh.points.mean(0)
+    along = arms[np.linalg.norm(arms, axis=1).argmax()]
+    assert abs(along @ turn.as_matrix()[:, 0]) == pytest.approx(np.linalg.norm(along), rel=1e-5)
+    np.testing.assert_allclose(mesh.points.mean(0), [1, 2, 3], atol=1e-6)
+    np.testing.assert_array_equal(mesh.cell_data["rgb"], [[9, 8, 7]] * 8)
+
+
+def test_a_disc_is_a_hexagon_of_its_ellipses_area_across_its_least_axis():
+    turn = Rotation.from_euler("y", 30, degrees=True)
+    mesh = draw(one([0.2, 0.001, 0.1], ground=True, turn=turn))
+    np.testing.assert_allclose((mesh.points - [1, 2, 3]) @ turn.as_matrix()[:, 1], 0, atol=1e-6)
+    assert mesh.area == pytest.approx(np.pi * 0.2 * 0.1, rel=1e-4) and mesh.n_cells == 1
+
+
+def test_faint_gaussians_are_left_out_and_large_fields_are_thinned_evenly():
+    many = fields.concatenate_fields([one(opacity=-9.0)] + [one(uncertainty=i / 100) for i in range(100)])
+    assert len(readers.thin_field(many, 1000)) == 100
+    thin = readers.thin_field(many, 4)
+    np.testing.assert_allclose(thin.uncertainty, [0, 0.33, 0.66, 0.99], atol=1e-6)
+    np.testing.assert_allclose(np.exp(thin.log_scales), 0.1 * 5, rtol=1e-5)  # each for 25: five times as wide
+
+
+def test_a_field_is_coloured_by_what_is_asked_or_says_why_it_cannot_be(tmp_path):
+    fields.write_field(one(uncertainty=1.0), tmp_path / "a.ply")
+    for by, colour in (("colour", [51, 102, 153]), ("uncertainty", Bar("").map(np.ones(1))[0])):
+        ((mesh, _),) = readers.read_scene(tmp_path / "a.ply", MOST, colour=by).meshes
+        np.testing.assert_array_equal(mesh.cell_data["rgb"][0], colour)
+    with pytest.raises(InputError, match="--colour hue: .* has colour, uncertainty"):
+        readers.read_scene(tmp_path / "a.ply", MOST, colour="hue")
+    fields.write_field(one(opacity=-9.0), tmp_path / "field.ply")
+    with pytest.raises(InputError, match="there is nothing to draw"):
+        readers.read_scene(tmp_path / "field.ply", MOST)
+
+
+def test_levels_stand_side_by_side_from_the_west(tree):
+    first, second = (mesh.points for mesh, _ in readers.read_scene(tree.round / "levels", MOST).meshes[::2])
+    assert np.quantile(first[:, 0], 0.99) < np.quantile(second[:, 0], 0.01)
+    alone = readers.read_scene(tree.round / "levels", MOST, level=1)
+    assert len(alone.notes) == 1 and "level 1" in alone.notes[0]
+
+
+def test_colours_run_from_one_end_of_a_bar_to_the_other_and_what_is_no_number_is_grey():
+    found = Bar("", 2.0, 4.0).map(np.array([2.0, -9.0, 4.0, 99.0, 3.0, np.nan, np.inf]))
+    cool, warm = (plot.to_bytes(np.array(colormaps["coolwarm"](x)[:3])) for x in (0, 255))
+    np.testing.assert_array_equal(found[:4], [cool, cool, warm, warm])
+    assert np.ptp(found[4].astype(int)) < 10  # grey in the middle
+    np.testing.assert_array_equal(found[5:], [plot.UNKNOWN] * 2)
+    assert Bar.of_values("a", np.full(3, 7.0)) == Bar("a", 7.0, 8.0)
+    assert Bar.of_values("a", np.array([np.nan])) == Bar("a", 0.0, 1.0)
+
+
+def test_a_ground_is_a_surface_through_its_cells():
+    heights = np.array([[0.0, 0, 0], [1.0, 1, 1]])
+    grid = Ground(10.0, 20.0, 0.5, 0, 0, 2, heights, np.ones((2, 3), bool))
+    mesh = readers.make_surface(grid, 1)
+    assert mesh.n_points == 12 and mesh.n_cells == 6
+    np.testing.assert_allclose(mesh.cell_centers().points[5][:2], [11.25, 20.75])  # the north-eastern one
+    np.testing.assert_allclose(np.unique(mesh.points[:, 2]), [0, 0.5, 1])
+    thin = readers.make_surface(grid, 2)  # a cell of two by two, and the rest
+    assert thin.n_cells == 2
+    np.testing.assert_array_equal(thin.points.max(0)[:2], [12, 21])
+
+
+def test_the_part_above_lies_over_the_ground_with_its_first_row_in_the_north_and_all_are_pictures_upright(tree):
+    ((mesh, _),) = readers.read_scene(tree.round / "uncertainty.exr", MOST, part="above").meshes
+    warm = mesh.cell_data["rgb"][:, 0] > mesh.cell_data["rgb"][:, 2]
+    y = mesh.cell_centers().points[:, 1]
+    assert warm.sum() == 96 and y[warm].min() > y[~warm].max()
+    shown = readers.read_scene(tree.round / "uncertainty.exr", MOST)
+    (corners, how), _, (other, _), _ = shown.meshes  # each with its letters
+    rows = how["texture"].to_array()
+    assert rows[0, 0, 0] > rows[-1, 0, 0]  # the northern row is warm, and on top
+    np.testing.assert_allclose(corners.points, [[0, 0, 0], [1, 0, 0], [1, -1, 0], [0, -1, 0]])
+    np.testing.assert_allclose(corners.active_texture_coordinates, [[0, 1], [1, 1], [1, 0], [0, 0]])
+    assert other.points[0, 0] > 1 and [bar.title for bar in shown.bars] == ["uncertainty", "opacity"]
+
+
+def test_parts_channels_grounds_and_headers_that_do_not_fit_are_refused(tree, tmp_path):
+    image_files.write_exr(tmp_path / "ground.exr", {"Z": np.zeros((4, 4))}, {"ground_west": "far"})
+    above, other = ({"uncertainty": np.zeros((4, 4))}, {}), ({"a": np.zeros((2, 2))}, {})
+    image_files.write_exr_parts(tmp_path / "uncertainty.exr", {"above": above, "b": other})
+    for path, options, said in (
+        (tree.round / "uncertainty.exr", {"part": "below"}, "--part below: .* has above, pose_0003"),
+        (tree.round / "uncertainty.exr", {"channel": "Q"}, "--channel Q: .* has opacity, uncertainty"),
+        (tree.round / "ground.exr", {"channel": "Q"}, "--channel Q: .* has Z, seen"),
+        (tmp_path / "ground.exr", {}, "ground.exr: not the grid of a ground"),
+        (tmp_path / "uncertainty.exr", {"part": "above"}, "ground.exr"),
+    ):
+        with pytest.raises(InputError, match=said):
+            readers.read_scene(path, MOST, **options)
+
+
+def test_a_folder_of_materials_shows_its_map_whose_holes_are_grey(tmp_path):
+    layers = {"material": np.array([[np.inf, 1], [2, 3]], np.float32), "object": np.eye(2, dtype=np.float32)}
+    image_files.write_exr(tmp_path / "materials.exr", layers, {"west": "0.0"})
+    shown = map_readers.read_materials(tmp_path / "materials.json", most=MOST)
+    assert shown.notes == ["parts: 1; pictures: 2 of 2; grey: not a number"]
+    np.testing.assert_array_equal(shown.meshes[0][1]["texture"].to_array()[0, 0], [150, 150, 150])
+
+
+def test_candidates_stand_where_they_are_in_the_policy_s_colours_and_the_chosen_are_marked_in_order(tree):
+    shown, by_scores = (readers.read_scene(p, MOST) for p in (tree.round / "poses.json", tree.scored / "scores.csv"))
+    at = result_tree.MIDDLE + np.array([pose_offset(pose) for pose in POSES])
+    rest = [i for i in range(result_tree.CANDIDATES) if i not in result_tree.CHOSEN]
+    (small, _), (large, _), *marks = shown.meshes
+    corners = small.n_points // len(rest)
+    np.testing.assert_allclose(small.points.reshape(-1, corners, 3).mean(1), at[rest], atol=1e-4)
+    middles = large.points.reshape(-1, corners, 3).mean(1)
+    np.testing.assert_allclose(middles, at[list(result_tree.CHOSEN)], atol=1e-4)
+    stems = [mesh.points for mesh, _ in marks[:4:2]]
+    np.testing.assert_allclose(stems, [[result_tree.MIDDLE, at[i]] for i in result_tree.CHOSEN], atol=1e-5)
+    assert "W2" in by_scores.bars[0].title
+    opacity = readers.read_scene(tree.scored / "scores.csv", MOST, colour="opacity")
+    (warm, _, cold), (cool, _, hot) = (s.meshes[0][0].point_data["rgb"][0] for s in (by_scores, opacity))
+    assert warm > cold and hot > cool  # the first candidate has the most of the one and the least of the other
+
+
+def test_poses_of_other_scores_or_outside_the_result_tree_are_refused(tree, tmp_path):
+    scores, mine = tree.scored / "scores.csv", tmp_path / "poses.json"
+    with pytest.raises(InputError, match="--colour hue: .* has opacity, w2_sq"):
+        readers.read_scene(scores, MOST, colour="hue")
+    shutil.copy(tree.round / "poses.json", tmp_path)
+    with pytest.raises(InputError, match="lies in no round"):
+        readers.read_scene(mine, MOST)
+    shutil.copy(scores, tmp_path)
+    with pytest.raises(InputError, match="leave it in its result tree"):
+        readers.read_scene(tmp_path / "scores.csv", MOST)
+    for content, said in ((mine.read_text().replace("pose_0", "pose_9"), "is not among"), ('{"poses": 3}', "not as")):
+        mine.write_text(content)
+        with pytest.raises(InputError, match=f"poses.json: .*{said}"):
+            camera_readers._arrange_poses(scores, mine, None, MOST)
+
+
+def test_a_camera_is_a_pyramid_whose_base_fills_its_picture():
+    camera, scene = result_tree.camera(POSES[3]), Scene("", [])
+    camera_readers.add_frustum(scene, camera, 0.5, (1, 2, 3))
+    ((mesh, _),) = scene.meshes
+    assert mesh.n_cells == 8
+    points = mesh.points.astype(float)
+    base = points[np.linalg.norm(points - camera.centre, axis=1) > 1e-4]
+    pixels, depth = camera.project(base)
+    assert {tuple(map(int, pixel)) for pixel in np.rint(pixels)} == {(0, 0), (24, 0), (24, 16), (0, 16)}
+    np.testing.assert_allclose(depth, 0.5, atol=1e-5)
+
+
+def test_photos_hang_in_their_pyramids_upright(tree):
+    shown = readers.read_scene(tree.photos, MOST)
+    hung = [(mesh, how["texture"].to_array()) for mesh, how in shown.meshes if "texture" in how]
+    assert [int(rows[0, 0, 0]) for _, rows in hung] == [204, 51, 128]  # test_00, view_00, view_01
+    assert set(shown.names) == {"start", "test", "exemplar", "seen by a photo"}
+
+
+def test_names_that_lead_out_of_the_folder_are_refused(tmp_path):
+    camera = camera_to_json(result_tree.camera(POSES[0]))
+    for got, said in (({}, "not as the workflow writes it"), (camera, "is no file's name")):
+        write_json(tmp_path / "capture.json", {"shots": [{"name": "../../secret.png", "got": got}]})
+        with pytest.raises(InputError, match=said):
+            camera_readers.read_shots(tmp_path / "capture.json")
+
+
+@pytest.fixture(scope="module")
+def cut(tree):
+    return store.read_tiles(tree.tiles / "tiles", tree.tiles / "seams.json")
+
+
+def test_neighbours_meet_at_edges_of_one_colour():
+    at = {tuple(np.rint(corner[:2]).astype(int)): tile for tile, corner in readers.place_tiles(16, 1.0)}
+    assert sorted(at.values()) == list(range(16))
+    for (x, y), tile in at.items():
+        west, south = at[(x - 1) % 4, y], at[x, (y - 1) % 4]
+        assert edge_colours(west)[2] == edge_colours(tile)[0] and edge_colours(south)[1] == edge_colours(tile)[3]
+
+
+def test_a_cut_covers_the_cells_where_labels_change_just_above_the_ground(cut):
+    labels = cut.labels[5]
+    centres = readers.make_cuts(cut, 5, 0).cell_centers().points
+    column, row = np.floor(centres[:, :2] / cut.spacing).astype(int).T
+    changes = np.pad(labels, ((1, 0), (1, 0)), mode="edge")
+    changed = (changes[1:, 1:] != changes[1:, :-1]) | (changes[1:, 1:] != changes[:-1, 1:])
+    assert changed.sum() == len(centres) > 0 and changed[row, column].all()
+    ground = cut.fields[0][5].means[cut.fields[0][5].ground]
+    lift = centres[:, 2] - [ground[np.abs(ground[:, :2] - at[:2]).sum(1).argmin(), 2] for at in centres]
+    assert abs(np.median(lift) - cut.spacing) < 0.3 * cut.spacing
+
+
+def test_gaussians_have_the_patch_of_their_cell(cut):
+    some = cut.fields[0][3]
+    found = readers.find_patches(some, cut, 3)
+    inside = (some.means[:, :2] >= 0).all(1) & (some.means[:, :2] < cut.side).all(1)
+    for i in np.flatnonzero(inside)[::97]:
+        x, y = (some.means[i, :2] / cut.spacing).astype(int)
+        assert found[i] == cut.labels[3][y, x]
+
+
+def test_tiles_that_are_not_what_seams_json_says_are_refused(tree, tmp_path):
+    told = read_json(tree.tiles / "seams.json")
+    (tmp_path / "tiles").symlink_to(tree.tiles / "tiles")
+    write_json(tmp_path / "seams.json", told | {"side": 99.0})
+    with pytest.raises(InputError, match="labels.npz is not a map of each tile"):
+        readers.read_scene(tmp_path, MOST)

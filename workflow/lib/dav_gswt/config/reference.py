@@ -1,0 +1,112 @@
+"""The key reference, the page of policies and the JSON schema: `make reference` writes them from the config models."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from dav_gswt.config.base import ANY, Place, Schema, iterate_tables
+from dav_gswt.config.model import Config
+from dav_gswt.views.policy_names import POLICY_SPECS
+
+HEAD = """# Config reference
+
+Made from the models in `workflow/lib/dav_gswt/config/` by `make reference`. The config is closed: a misspelt or
+out-of-range key stops the program before the first job with one message. `config/config.yaml` is the experiment, and
+each `config/scenes/<name>.yaml` is one scene. Lay single keys over them on the command line (`snakemake --cores 2
+--config rounds=3`), or a file (`--configfile mine.yaml`). A key whose default is *required* must be given. A key
+without a default may be left out."""
+POLICIES_HEAD = """# Policies
+
+How the next views are chosen: the config's `policy`. `auto`, the default, takes `farthest` where a scene chooses from
+given photos (`agent: replay`), else `coverage-error`; [what each is worth](../active-views.md). Made from the table in
+`workflow/lib/dav_gswt/views/policy_names.py` by `make reference`; the functions are in `policies.py` beside it, and
+[architecture](../architecture.md#a-policy) says how to add one.
+
+Every policy knows where the candidates and the photos so far are; the column `reads` says what it reads besides:
+the scores by a prior, the field itself, the photos so far, or what candidates truly show, which is known for
+`agent: render` and `replay` only. `prior`, `p_drop` and `lam` matter to policies that read a prior; settings
+after "not" have no effect. k is the config's `k`.
+"""
+
+
+def describe_tables(model: type[BaseModel], place: Place = ()) -> str:
+    """Every table of a model, with its keys. place: where the model lies in the config."""
+    return "\n\n".join(_describe_table((*place, *where), table) for where, table in iterate_tables(model))
+
+
+def describe_policies() -> str:
+    """The page docs/reference/policies.md."""
+    rows = [f"| `{spec.name}` | {spec.chooses} | {spec.describe_inputs()} |" for spec in POLICY_SPECS]
+    return "\n".join([POLICIES_HEAD, "| policy | chooses | reads |", "|---|---|---|", *rows]) + "\n"
+
+
+def make_schema() -> str:
+    """The JSON schema of the config, for editors."""
+    text = json.dumps(Config.model_json_schema())
+    ours = ("read_by", "agents")  # of `config.base.key`, of no use to an editor
+    schema = json.loads(text, object_hook=lambda table: {key: v for key, v in table.items() if key not in ours})
+    return json.dumps(schema, indent=1) + "\n"
+
+
+def make_reference() -> dict[str, str]:
+    """The text of each file that is made from the config models, by its path in the repository."""
+    return {
+        "docs/reference/config.md": f"{HEAD}\n\n{describe_tables(Config)}\n",
+        "docs/reference/policies.md": describe_policies(),
+        "workflow/schemas/config.schema.json": make_schema(),
+    }
+
+
+def write_files(texts: dict[str, str]) -> None:
+    """Write texts to their paths below the working directory."""
+    for name, text in texts.items():
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text(text, encoding="utf-8")
+
+
+def _describe_table(place: Place, table: Schema) -> str:
+    name = ".".join("<name>" if part == ANY else part for part in place) or "Top level"
+    rows = [_describe_key(key, value, key in table.get("required", ())) for key, value in table["properties"].items()]
+    head = ["| key | meaning | values | default |", "|---|---|---|---|"]
+    return "\n".join([f"### {name}", "", table.get("description", ""), "", *head, *rows])
+
+
+def _describe_key(key: str, value: Schema, required: bool) -> str:
+    unit = f", {value['unit']}" if "unit" in value else ""
+    default = "" if value.get("default") is None else f"`{_format_value(value['default'])}`"
+    meaning, default = value.get("description", ""), "*required*" if required else default
+    return f"| `{key}` | {meaning} | {_describe_values(value)}{unit} | {default} |"
+
+
+def _describe_values(value: Schema) -> str:
+    if named := value.get("enum", [value["const"]] if "const" in value else []):
+        return ", ".join(f"`{name}`" for name in named)
+    if choices := value.get("anyOf", value.get("oneOf")):
+        kinds = [_describe_values(choice) for choice in choices if choice.get("type") != "null"]
+        return " or ".join(dict.fromkeys(kinds))
+    kind = value.get("type", "object")
+    if kind == "array" and "prefixItems" in value:
+        return f"{len(value['prefixItems'])} numbers"
+    if kind == "array":
+        return f"list of {_describe_values(value['items'])}"
+    if kind == "object":
+        return "table by name" if "additionalProperties" in value else "table"
+    words = {"minimum": "from", "exclusiveMinimum": "above", "maximum": "to", "exclusiveMaximum": "below"}
+    bounds = [f"{word} {value[bound]:g}" for bound, word in words.items() if bound in value]
+    names = {"integer": "whole number", "number": "number", "string": "text", "boolean": "`true`, `false`"}
+    return " ".join([names[kind], *bounds])
+
+
+def _format_value(value: Any) -> str:
+    """A default as YAML and JSON have it, without the keys that have no value."""
+    if isinstance(value, dict):
+        value = {key: each for key, each in value.items() if each is not None}
+    if isinstance(value, list):
+        return f"[{', '.join(map(_format_value, value))}]"
+    return json.dumps(value)
+
+
+if __name__ == "__main__":
+    write_files(make_reference())
