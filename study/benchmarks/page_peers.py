@@ -31,9 +31,8 @@ from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.raster import render
 from dav_gswt.terrain import endless, stills, visibility
 from dav_gswt.terrain.backdrop import Backdrop
-from dav_gswt.terrain.object_placement import group_by_cell
 from dav_gswt.terrain.page import write_page
-from dav_gswt.terrain.placement import place_cell
+from dav_gswt.terrain.placement import group_by_cell, place_cell
 from dav_gswt_study.terrain.frames import VISIT
 
 GPU = "--gpu" in sys.argv

@@ -15,7 +15,7 @@ from dav_gswt.images.figures import encode_jpeg
 from dav_gswt.materials.store import read_report
 from dav_gswt.sweeps import MEGA, select_metrics
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.page_front import name_of_scene
+from dav_gswt.terrain.page import name_of_scene
 from dav_gswt_study.cover import crop_and_shrink
 from dav_gswt_study.markdown import format_number, format_table
 

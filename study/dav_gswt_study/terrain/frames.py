@@ -19,8 +19,7 @@ from dav_gswt.logs import progress
 from dav_gswt.provenance import describe_machine
 from dav_gswt.terrain import endless, heights, stills, visibility
 from dav_gswt.terrain.page import write_page
-from dav_gswt.terrain.stills import Shot
-from dav_gswt.terrain.timing import FrameTiming
+from dav_gswt.terrain.stills import FrameTiming, Shot
 from dav_gswt_study.tables import spread
 
 PARTS = ("render", "sort", "update")

@@ -92,7 +92,7 @@ def _export(options: argparse.Namespace, settings: dict[str, Any], ground: bool)
     from dav_gswt.bundle import store  # here, not above: these modules are slow to load
     from dav_gswt.export import ground_files, terrain_files
     from dav_gswt.geometry.scene_frame import read_scene_frame
-    from dav_gswt.terrain.finished import terrain_from_page
+    from dav_gswt.terrain.endless import terrain_from_page
     from dav_gswt.tiles.store import read_material_tiles
 
     source, sets = find_terrain(options.path), []

@@ -14,7 +14,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import figures, image_files
-from dav_gswt.images.jpeg import encode_jpeg
+from dav_gswt.images.figures import encode_jpeg
 from dav_gswt.photos.view_split import find_aim_point
 
 if TYPE_CHECKING:
