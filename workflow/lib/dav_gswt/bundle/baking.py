@@ -10,7 +10,7 @@ from numpy import ndarray as Array
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.materials.model import ObjectLevels
-from dav_gswt.materials.placing import turn_and_scale, turn_rows
+from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.tiles.compose import equalise_heights
 
 _log = logging.getLogger(__name__)

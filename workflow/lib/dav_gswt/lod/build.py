@@ -43,7 +43,7 @@ def build_levels(
 ) -> Levels:
     """Fit as many coarser levels as are wanted and as the exemplar has room for.
 
-    Coarser levels are merged from each tile's own cells (`tiles.coarse_levels`), so a level is fitted only if it has at
+    Coarser levels are merged from each tile's own cells (`tiles.compose`), so a level is fitted only if it has at
     least MIN_CELLS cells across the exemplar. The first is always fitted: it gives every field a ground. With AUTO, a
     level that saves too few Gaussians is dropped.
 

@@ -8,7 +8,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.orders import sort_back_to_front
 from dav_gswt.field import GaussianField, concatenate_fields
-from dav_gswt.materials.placing import turn_and_scale, turn_rows
+from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain import draw_order
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.scatter import Instances
