@@ -7,6 +7,6 @@ from dav_gswt.export import splats
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
-    bundle = manifest.read_manifest(Path(snakemake.input.manifest).parent, snakemake.params.schema)
+    bundle = manifest.read_manifest(Path(snakemake.input.manifest).parent)
     axes = snakemake.wildcards.axes
     splats.write_plys(snakemake.input.archive, bundle.tile_side, snakemake.output.plys, axes)

@@ -12,7 +12,6 @@ from dav_gswt.config.load import check_model
 from dav_gswt.errors import InputError
 
 GROUND = "ground"  # beside the formats of `export.formats`: the files of exports/ground
-SCHEMA = Path("workflow/schemas/davgswt.schema.json")  # of a checkout
 OPTIONS = {"centre": "at", "formats": "format"}  # where an option has another name than its key of the config
 
 
@@ -108,7 +107,7 @@ def _export(options: argparse.Namespace, settings: dict[str, Any], ground: bool)
     for name in wanted:
         check_target(options.out / name, f"{name}.json")
     result = _find_result(source) if ground else None
-    bundle = store.read_bundle(source, _find_schema())
+    bundle = store.read_bundle(source)
     reference = _find_reference(source)
     terrain = terrain_from_page(bundle)
     sets = [] if result is None else _read_sets(result)
@@ -130,14 +129,6 @@ def check_target(folder: Path, mark: str) -> None:
         raise InputError(f"-o {folder.parent}: a file is in the way; name a folder")
     if folder.is_symlink() or (folder.exists() and not (folder / mark).is_file()):
         raise InputError(f"{folder} is in the way, and is no export (it has no {mark}): name another folder with -o")
-
-
-def _find_schema() -> Path:
-    """Raises: InputError: this is no checkout."""
-    for root in (Path(__file__).parents[4], Path.cwd()):
-        if (root / SCHEMA).is_file():
-            return root / SCHEMA
-    raise InputError(f"{SCHEMA} is not here: work in a checkout of the repository")
 
 
 def _find_result(source: Path) -> Path:

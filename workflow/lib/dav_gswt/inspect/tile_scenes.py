@@ -31,7 +31,6 @@ CUT_WIDTH, MIN_CUT_WIDTH = 0.35, 0.012  # of a cut: in finest cells, and at leas
 CUT_LIFT = 0.6  # of a cut above the ground, in cells of its level
 CUT_COLOUR = (255, 214, 10)
 PATCH_COLOURS = [(187, 187, 187), *LEVEL_COLOURS[:4], (102, 204, 238), (170, 51, 119), (153, 102, 51), (0, 0, 0)]
-SCHEMA = Path(__file__).parents[3] / "schemas" / "davgswt.schema.json"
 
 
 def build_tiles(path: Path, options: ViewOptions) -> Scene:
@@ -45,9 +44,7 @@ def build_tiles(path: Path, options: ViewOptions) -> Scene:
 
 def build_bundle(path: Path, options: ViewOptions) -> Scene:
     """A bundle's folder: the quantized tiles, without cuts."""
-    if not SCHEMA.is_file():
-        raise InputError(f"{path}: bundles are read by {SCHEMA}, which is not there; install from a checkout")
-    bundle = bundles.read_bundle(path, SCHEMA)
+    bundle = bundles.read_bundle(path)
     with result_files.wrap_errors(path / "davgswt.json"):
         side = bundle.manifest.tile_side
     return arrange_tiles(str(path), bundle.fields(), side, None, options)

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from dav_gswt.bundle import manifest
 from dav_gswt.config.model import Config
 from dav_gswt.study.config import StudyConfig
 from dav_gswt.study.config_tables import HEAD, describe_policies, describe_tables, make_schema
@@ -18,6 +19,7 @@ def make_reference() -> dict[str, str]:
         "docs/reference/policies.md": describe_policies(),
         "docs/reference/reruns.md": describe_reruns(),
         "workflow/schemas/config.schema.json": make_schema(),
+        "workflow/schemas/davgswt.schema.json": manifest.make_schema(),
     }
 
 

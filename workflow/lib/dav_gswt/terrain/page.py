@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from dav_gswt.bundle.manifest import FORMAT, READABLE, VERSION, Manifest
+from dav_gswt.bundle.manifest import FORMAT, VERSION, Manifest
 from dav_gswt.bundle.manifest import NAME as MANIFEST
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, read_json, write_json
@@ -111,7 +111,7 @@ def replace_classes(value: dict[str, Any], rule: Sequence[dict[str, Any]]) -> tu
 def list_chunks(bundle: Path) -> list[str]:
     """The chunk files that a bundle's manifest names, checked against the folder. Raises: InputError, as write_page."""
     manifest = read_json(bundle / MANIFEST)
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT or manifest.get("version") not in READABLE:
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT or manifest.get("version") != VERSION:
         raise InputError(f"{bundle / MANIFEST}: not a bundle of format {FORMAT!r}, version {VERSION}; make it again")
     try:
         holders = [*manifest["tiles"], *manifest.get("objects", [])]

@@ -236,7 +236,7 @@ def _sum_costs(labels: Array, right: Array, upper: Array) -> int:
 
 
 def _terminal_capacities(terminal: int, tails: Array, heads: Array, costs: Array, free: int) -> Array:
-    """Capacity from each free node to a terminal: the sum, in whole numbers, over its neighbours that are forced to it."""
+    """Capacity from each free node to a terminal: the sum over its neighbours that are forced to it, in quanta."""
     out = np.zeros(free, np.int64)
     for here, there in ((tails, heads), (heads, tails)):
         pick = (here >= 0) & (there == terminal)
