@@ -17,7 +17,7 @@ from dav_gswt.terrain import endless
 from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page
 from dav_gswt.terrain.sphere import make_sphere
-from dav_gswt.tiles.store import write_material_tiles
+from dav_gswt.tiles.store import write_tiles
 
 HILLS = Hills(2.0, 30.0, 3, 5)
 
@@ -30,7 +30,7 @@ def result(root, tmp_path_factory):
     bundle.parent.mkdir(parents=True)
     write_cover_bundle(bundle)
     write_page(bundle, root / "workflow/viewer", bundle / "terrain/page", HILLS)
-    write_material_tiles(cover_content().tiles, bundle.parent / "tiles", bundle.parent / "seams.json", {})
+    write_tiles(cover_content().tiles, bundle.parent / "tiles", bundle.parent / "seams.json", {})
     return folder
 
 

@@ -2,12 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dav_gswt.materials.mask_images import NO_CLASS, GroundMasks
 from fixtures import mixed_ground as made
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.materials import classes
-from dav_gswt.materials.maps import GroundMaps
+from dav_gswt.materials.maps import NO_CLASS, GroundMaps, GroundMasks
 from dav_gswt.tiles.layout import Exemplar
 
 

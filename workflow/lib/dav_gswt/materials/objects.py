@@ -284,7 +284,7 @@ def linear_light(colour: Float[Array, "n 3"]) -> Float[Array, "3"]:
 
 def is_shade(light: Float[Array, "3"], other: Float[Array, "3"]) -> bool:
     """Whether ground of this light may be the other in shade: darker in all channels, and bluer, as the sky is."""
-    return bool(_is_shaded_light(light / np.maximum(other, 1e-6)))
+    return bool(_is_shaded_light(light[None] / np.maximum(other, 1e-6))[0])
 
 
 def find_shade(

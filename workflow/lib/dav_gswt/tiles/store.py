@@ -22,7 +22,7 @@ def tile_file_name(level: int, tile: int) -> str:
     return f"lod{level}_tile_{tile:02d}.ply"
 
 
-def write_material_tiles(
+def write_tiles(
     sets: list[TileSet], folder: Path | str, seams: Path | str, provenance: dict[str, Any]
 ) -> None:
     """Write the sets of several materials; `folder` and `seams` appear whole or not at all, the folder first."""
@@ -58,7 +58,7 @@ def read_tiles(folder: Path | str, seams: Path | str) -> TileSet:
 
 
 def read_material_tiles(folder: Path | str, seams: Path | str) -> list[TileSet]:
-    """Read what `write_material_tiles` wrote. Raises: InputError: as `read_tiles`."""
+    """Read what `write_tiles` wrote. Raises: InputError: as `read_tiles`."""
     table = read_json(seams)
     more = table.get("materials", []) if isinstance(table, dict) else []
     if not isinstance(more, list):
