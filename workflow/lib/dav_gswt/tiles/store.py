@@ -22,9 +22,7 @@ def tile_file_name(level: int, tile: int) -> str:
     return f"lod{level}_tile_{tile:02d}.ply"
 
 
-def write_tiles(
-    sets: list[TileSet], folder: Path | str, seams: Path | str, provenance: dict[str, Any]
-) -> None:
+def write_tiles(sets: list[TileSet], folder: Path | str, seams: Path | str, provenance: dict[str, Any]) -> None:
     """Write the sets of several materials; `folder` and `seams` appear whole or not at all, the folder first."""
     folder, seams = Path(folder), Path(seams)
     seams.unlink(missing_ok=True)
