@@ -16,12 +16,11 @@ from fixtures.splats import rough_ground
 from fixtures.tile_sets import report_of
 from record import report_figures
 
-from dav_gswt.bundle import build, direction_search, order_directions, orders, store
+from dav_gswt.bundle import build, direction_search, orders, store
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.terrain import endless, stills
 from dav_gswt.tiles.build import TileSet
 
-SCHEMA = Path(__file__).parents[1] / "workflow/schemas/davgswt.schema.json"
 CELLS, LEVELS, SIDE = 232, 6, 4.0
 TARGETS = {"presort_seconds": 2.0, "terrain_presort_psnr": 40.0}
 
@@ -51,13 +50,13 @@ def walker(tiles: TileSet) -> float | None:
     """PSNR of a walker's still in pre-sorted orders against all Gaussians sorted exactly."""
     with tempfile.TemporaryDirectory() as folder:
         content, options = BundleContent.of_one_material(tiles), build.BundleOptions(tau=0.5)
-        build.write_bundle(content, Path(folder, "bundle"), options, SCHEMA, {})
-        bundle = store.read_bundle(Path(folder, "bundle"), SCHEMA)
+        build.write_bundle(content, Path(folder, "bundle"), options, {})
+        bundle = store.read_bundle(Path(folder, "bundle"))
         terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
     value = bundle.manifest
     camera = stills.shot_camera(stills.SHOTS[0], terrain, value.eye_floor, 960, 540)
     pictures = [stills.render_view(terrain, camera, value.sky, value.ground_colour, exact) for exact in (False, True)]
-    return order_directions.compute_psnr([tuple(pictures)])
+    return direction_search.compute_psnr([tuple(pictures)])
 
 
 def main() -> int:

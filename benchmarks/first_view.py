@@ -22,7 +22,6 @@ from dav_gswt.paths import RESULTS
 from dav_gswt.terrain import endless, stills
 
 SCENE = "desert"
-SCHEMA = Path(__file__).parents[1] / "workflow/schemas/davgswt.schema.json"
 SIZE = {"width": 1280, "height": 720}
 VISITS, LONGEST = 3, 300  # seconds
 TARGETS = {"page_sharp_seconds": 1.5, "page_live_seconds": 4.0, "page_whole_seconds": 60.0, "page_whole_psnr": 38.0}
@@ -53,7 +52,7 @@ def main() -> int:
     with served(pages[0]) as address:
         visits = [visit_page(address) for _ in range(VISITS)]
     middle = [statistics.median(times) for times in zip(*(times for times, _ in visits), strict=True)]
-    terrain = endless.terrain_from_bundle(bundle := store.read_bundle(pages[0], SCHEMA), {"kind": "flat"})
+    terrain = endless.terrain_from_bundle(bundle := store.read_bundle(pages[0]), {"kind": "flat"})
     still = np.clip(stills.render_shot(terrain, stills.SHOTS[0], bundle.manifest, **SIZE), 0, 1)
     worst = min(psnr(seen / 255, still.astype(float), np.ones(still.shape[:2])) for _, seen in visits)
     report_figures(dict(zip(TARGETS, [*middle, worst], strict=True)), TARGETS)

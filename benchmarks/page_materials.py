@@ -26,7 +26,6 @@ from dav_gswt.terrain.page import write_page
 
 DISCS, LEVELS, BLADES = 100, 3, 64  # 10,000 Gaussians a tile, and some
 BUDGET, WALKS = 600_000, 4
-SCHEMA = Path(__file__).resolve().parents[1] / "workflow/schemas/davgswt.schema.json"
 HEADERS = {
     "Content-Type": "text/html",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -91,7 +90,7 @@ def content(materials: int) -> BundleContent:
 
 
 def write_page_of(folder: Path, materials: int) -> Path:
-    build.write_bundle(content(materials), folder / "bundle", build.BundleOptions(tau=0.5, salt=7), SCHEMA, {})
+    build.write_bundle(content(materials), folder / "bundle", build.BundleOptions(tau=0.5, salt=7), {})
     manifest = read_json(folder / "bundle" / NAME)
     for level in manifest["levels"][:-1]:
         level |= {"distance": 2 * land_covers.SIDE * 2 ** level["level"], "band": 0.1 * land_covers.SIDE}

@@ -29,7 +29,6 @@ rule bundle_tiles:
     params:
         tau=real("tau"),
         seed=integer("seed"),
-        schema=BUNDLE_SCHEMA,
         source=code_of("bundle_tiles"),
     script:
         "../scripts/bundle_tiles.py"

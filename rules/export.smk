@@ -46,7 +46,6 @@ rule export_plys:
         mem_mb=per_attempt(2500),
         runtime=per_attempt("10m"),
     params:
-        schema=BUNDLE_SCHEMA,
         source=code_of("export_plys"),
     script:
         "../scripts/export_plys.py"
@@ -74,7 +73,6 @@ rule export_terrain:
         export=export_keys("export_terrain"),
         heights=lookup(dpath="heights", within=config),
         classes=lookup(dpath="classes", within=config),
-        schema=BUNDLE_SCHEMA,
         source=code_of("export_terrain"),
     script:
         "../scripts/export_terrain.py"
@@ -103,7 +101,6 @@ rule export_ground:
         export=export_keys("export_ground"),
         heights=lookup(dpath="heights", within=config),
         classes=lookup(dpath="classes", within=config),
-        schema=BUNDLE_SCHEMA,
         source=code_of("export_ground"),
     script:
         "../scripts/export_ground.py"

@@ -22,7 +22,6 @@ from dav_gswt.views.policy_names import NEEDS_PHOTOS, ORACLES, POLICY_NAMES, PRI
 from dav_gswt.workflow import NamedEntries, lift_job_rate_limit, list_command_line_values
 
 BASE = Path(str(workflow.current_basedir)).parent
-BUNDLE_SCHEMA = str(BASE / "workflow/schemas/davgswt.schema.json")
 VIEWER = sorted(
     str(path) for path in (BASE / "workflow/viewer").rglob("*") if path.suffix in (".js", ".ts", ".html", ".css")
 )

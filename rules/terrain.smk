@@ -53,7 +53,6 @@ rule render_terrain:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
         classes=lookup(dpath="classes", within=config),
-        schema=BUNDLE_SCHEMA,
         source=code_of("render_terrain"),
     script:
         "../scripts/render_terrain.py"
@@ -102,7 +101,6 @@ rule render_flight:
         heights=lookup(dpath="heights", within=config),
         classes=lookup(dpath="classes", within=config),
         flight=lookup(dpath="flight", within=config),
-        schema=BUNDLE_SCHEMA,
         source=code_of("render_flight"),
     script:
         "../scripts/render_flight.py"

@@ -21,6 +21,5 @@ with logging_to(snakemake.log[0]):
         gather_content(tiles, paths.get("materials"), params.seed),
         Path(snakemake.output.manifest).parent,
         build.BundleOptions(tau=params.tau, salt=params.seed, unit=frame.unit, threads=snakemake.threads),
-        params.schema,
         source | {name: report["provenance"] for name, report in reports.items()},
     )

@@ -22,4 +22,4 @@ with logging_to(snakemake.log[0]):
     inputs = {path.relative_to(paths.levels).with_suffix("").as_posix(): path for path in files}
     inputs |= {name: paths[name] for name in ("lpips", "sam2") if paths.get(name)}
     record = record_provenance(inputs, dict(tiling))
-    store.write_material_tiles(tiles, snakemake.output.tiles, snakemake.output.seams, record)
+    store.write_tiles(tiles, snakemake.output.tiles, snakemake.output.seams, record)

@@ -11,7 +11,7 @@ from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
-    bundle = read_bundle(Path(paths.manifest).parent, params.schema)
+    bundle = read_bundle(Path(paths.manifest).parent)
     terrain = endless.terrain_from_bundle(bundle, params.heights, params.classes)
     sets = store.read_material_tiles(paths.tiles, paths.seams)
     reference = read_scene_frame(paths.frame).georeference

@@ -10,7 +10,7 @@ from dav_gswt.terrain import endless
 
 with logging_to(snakemake.log[0]):
     params = snakemake.params
-    bundle = store.read_bundle(Path(snakemake.input.manifest).parent, params.schema)
+    bundle = store.read_bundle(Path(snakemake.input.manifest).parent)
     terrain = endless.terrain_from_bundle(bundle, params.heights, params.classes)
     reference = read_scene_frame(snakemake.input.frame).georeference
     out, threads = snakemake.output.terrain, snakemake.threads

@@ -22,4 +22,4 @@ with logging_to(snakemake.log[0]):
     cropped = [merge.crop_to_blocks(*exemplar, 1) for exemplar in exemplars]
     sets = [build.build_levels(*each, params.levels, steps, params.seed, params.keep) for each in cropped]
     asked = {"levels": params.levels, "level_steps": steps, "seed": params.seed}
-    store.write_material_levels(sets, snakemake.output.levels, record_provenance(inputs, asked))
+    store.write_levels(sets, snakemake.output.levels, record_provenance(inputs, asked))

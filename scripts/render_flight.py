@@ -10,7 +10,7 @@ from dav_gswt.terrain import endless, stills
 
 with logging_to(snakemake.log[0]):
     params = snakemake.params
-    bundle = store.read_bundle(Path(snakemake.input.manifest).parent, params.schema)
+    bundle = store.read_bundle(Path(snakemake.input.manifest).parent)
     terrain = endless.terrain_from_bundle(bundle, params.heights, params.classes)
     with atomic_folder(snakemake.output.frames) as folder:
         for shot in progress(stills.walk_shots(**params.flight), "render flight"):

@@ -9,7 +9,7 @@ from dav_gswt.terrain import endless, stills
 
 with logging_to(snakemake.log[0]):
     params = snakemake.params
-    bundle = store.read_bundle(Path(snakemake.input.manifest).parent, params.schema)
+    bundle = store.read_bundle(Path(snakemake.input.manifest).parent)
     terrain = endless.terrain_from_bundle(bundle, params.heights, params.classes)
     targets = {Path(path).stem: path for path in snakemake.output.stills}
     for shot in progress(stills.list_shots(terrain, bundle.manifest.eye_floor), "render stills"):

@@ -45,7 +45,6 @@ GPU_FLAGS = [  # Chromium's way to a graphics card without a screen
     "--no-first-run",
 ]
 PEERS = Path(__file__).parent / "peers"
-SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
 WIDTH, HEIGHT = (1920, 1080) if GPU else (640, 360)  # pixels
 FIELD = 60.0  # degrees across
 # Gaussians in view; the most is more than the views need, so that all renderers show the same ones
@@ -100,7 +99,7 @@ def main() -> int:
     if unknown := set(others) - set(OTHERS):
         print(f"page_peers: no renderer {', '.join(sorted(unknown))}; choose from {', '.join(OTHERS)}")
         return 1
-    bundle = store.read_bundle(folder, SCHEMA)
+    bundle = store.read_bundle(folder)
     for budget in BUDGETS:
         compare(bundle, folder, budget, others)
     return 0

@@ -24,7 +24,6 @@ rule time_library:
         runtime=per_attempt("1h"),
     params:
         asked=walk_settings,
-        schema=BUNDLE_SCHEMA,
         source=code_of_study("time_library"),
     script:
         "../scripts/time_library.py"
@@ -77,7 +76,6 @@ rule measure_flicker:
             "height": STUDY["frames"]["height"],
             "budget": max(STUDY["frames"]["budgets"]),
         },
-        schema=BUNDLE_SCHEMA,
         source=code_of_study("measure_flicker"),
     script:
         "../scripts/measure_flicker.py"

@@ -45,7 +45,6 @@ rule render_walk:
         heights=lookup(dpath="heights", within=config),
         classes=lookup(dpath="classes", within=config),
         flight=GALLERY.get("flight"),
-        schema=BUNDLE_SCHEMA,
         source=code_of_study("render_walk"),
     script:
         "../scripts/render_walk.py"

@@ -66,7 +66,6 @@ rule measure_lattice:
         mem_mb=per_attempt(4000),
     params:
         classes=lookup(dpath="classes", within=config),
-        schema=BUNDLE_SCHEMA,
         source=code_of_study("measure_lattice"),
     script:
         "../scripts/measure_lattice.py"
@@ -118,7 +117,6 @@ rule measure_transitions:
         mem_mb=per_attempt(6000),
     params:
         classes=lookup(dpath="classes", within=config),
-        schema=BUNDLE_SCHEMA,
         seed=integer("seed"),
         source=code_of_study("measure_transitions"),
     script:

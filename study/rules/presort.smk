@@ -24,7 +24,6 @@ rule measure_presort:
         runtime=per_attempt("20m"),
     params:
         seed=integer("seed"),
-        schema=BUNDLE_SCHEMA,
         source=code_of_study("measure_presort"),
     script:
         "../scripts/measure_presort.py"

@@ -83,7 +83,6 @@ rule render_grid:
         runtime=per_attempt("20m"),
     params:
         size=lookup(dpath="stills", within=config),
-        schema=BUNDLE_SCHEMA,
         source=code_of_study("render_grid"),
     script:
         "../scripts/render_grid.py"

@@ -10,6 +10,6 @@ from dav_gswt_study.terrain import flicker
 
 with logging_to(snakemake.log[0]):
     params = snakemake.params
-    bundle = store.read_bundle(Path(snakemake.input.manifest).parent, params.schema)
+    bundle = store.read_bundle(Path(snakemake.input.manifest).parent)
     terrain = endless.terrain_from_bundle(bundle, params.heights)
     csv_tables.write_table(snakemake.output.table, flicker.measure_flicker(terrain, bundle.manifest, **params.walk))

@@ -11,7 +11,7 @@ from dav_gswt.terrain import endless
 from dav_gswt_study.terrain import lattice
 
 with logging_to(snakemake.log[0]):
-    bundle = store.read_bundle(Path(snakemake.input.manifest).parent, snakemake.params.schema)
+    bundle = store.read_bundle(Path(snakemake.input.manifest).parent)
     terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"}, snakemake.params.classes)
     level, names = lattice.choose_level(terrain), [material.name for material in bundle.manifest.materials]
     picture = lattice.render_from_above(terrain, level)

@@ -16,7 +16,7 @@ with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
     grid = ground.read_ground(paths.ground)
     seen = transitions.map_photographed(read_field(paths.field), grid, accuracy.read_found_labels(paths.materials))
-    bundle = store.read_bundle(Path(paths.manifest).parent, params.schema)
+    bundle = store.read_bundle(Path(paths.manifest).parent)
     terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"}, params.classes)
     row = transitions.TransitionMeasures()  # where one material was found
     if terrain.classes is not None:

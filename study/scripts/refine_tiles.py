@@ -21,4 +21,4 @@ with logging_to(snakemake.log[0]):
     mended = build.refine_tiles(tiles, uncut, build.Options.from_config(params.refine), by, model.size)
     inputs = {name: paths[name] for name in ("seams", "weights")} | {"level0": Path(paths.levels, "level0.ply")}
     about = {"refine": dict(params.refine), "prior": dict(params.prior), "seed": params.seed}
-    store.write_tiles(mended, out.tiles, out.seams, record_provenance(inputs, about))
+    store.write_tiles([mended], out.tiles, out.seams, record_provenance(inputs, about))

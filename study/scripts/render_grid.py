@@ -9,7 +9,7 @@ from dav_gswt_study.seams import measure, pictures
 
 with logging_to(snakemake.log[0]):
     params = snakemake.params
-    bundle = store.read_bundle(Path(snakemake.input.manifest).parent, params.schema)
+    bundle = store.read_bundle(Path(snakemake.input.manifest).parent)
     folder = Path(snakemake.output.pictures[0]).parent
     for surface in progress(list(measure.GROUNDS), "draw grids"):
         for shot, picture in pictures.render_terrain_pictures(bundle, surface, params.size).items():

@@ -11,7 +11,7 @@ from dav_gswt_study import gallery
 
 with logging_to(snakemake.log[0]):
     params = snakemake.params
-    bundle = store.read_bundle(Path(snakemake.input.manifest).parent, params.schema)
+    bundle = store.read_bundle(Path(snakemake.input.manifest).parent)
     terrain = endless.terrain_from_bundle(bundle, params.heights, params.classes)
     terrain = gallery.suit_width(terrain, params.size["width"])
     with atomic_folder(snakemake.output.frames) as folder:

@@ -8,7 +8,7 @@ from dav_gswt.logs import logging_to
 from dav_gswt_study.terrain import frames
 
 with logging_to(snakemake.log[0]):
-    bundle = store.read_bundle(Path(snakemake.input.manifest).parent, snakemake.params.schema)
+    bundle = store.read_bundle(Path(snakemake.input.manifest).parent)
     csv_tables.write_table(
         snakemake.output.table, frames.time_library(bundle, frames.FrameSettings(**snakemake.params.asked))
     )

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixtures import bundles, firefox_start, paint_pages
+from fixtures import bundles, firefox_start
 from fixtures.browser import served
 from fixtures.land_covers import write_cover_bundle
 from fixtures.page_visit import VIEWER, Visit
@@ -144,7 +144,7 @@ def target(chromium, plain):
 def cover(tmp_path_factory):
     """The folder of a page of sand and grass with shrubs, on level ground."""
     folder = tmp_path_factory.mktemp("cover")
-    write_cover_bundle(folder / "bundle", paint_pages.SCHEMA)
+    write_cover_bundle(folder / "bundle")
     write_page(folder / "bundle", VIEWER, folder / "page")
     return folder
 

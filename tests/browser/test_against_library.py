@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixtures import paint_pages
 from fixtures.browser import served
 from fixtures.bundles import Ground, write_bundle
 from fixtures.land_covers import SIDE, write_cover_bundle
@@ -52,7 +51,7 @@ def pair(request, tmp_path_factory):
     """The address of a page, and the library's terrain of the same bundle."""
     folder, (surface, covered) = tmp_path_factory.mktemp("page"), TERRAINS[request.param]
     if covered:
-        write_cover_bundle(folder / "bundle", paint_pages.SCHEMA)
+        write_cover_bundle(folder / "bundle")
     else:
         write_bundle(folder / "bundle", Ground(levels=3, speckle=40, things=4))
     write_page(folder / "bundle", VIEWER, folder / "page", surface)

@@ -8,7 +8,7 @@ from base64 import b64encode
 
 import numpy as np
 import pytest
-from fixtures import bundles, paint_pages
+from fixtures import bundles
 from fixtures.browser import served
 from fixtures.bundles import Ground
 from fixtures.dropped_files import drop, files_of, with_values, zipped
@@ -52,7 +52,7 @@ def other(tmp_path_factory):
 def grown(tmp_path_factory):
     """The folder of a bundle of two materials with an object."""
     folder = tmp_path_factory.mktemp("grown") / "bundle"
-    write_cover_bundle(folder, paint_pages.SCHEMA)
+    write_cover_bundle(folder)
     return folder
 
 

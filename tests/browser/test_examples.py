@@ -103,10 +103,10 @@ def test_plain_webgl2_draws_what_the_library_draws(chromium, serve, page_of, roo
 @pytest.fixture(scope="module")
 def walked(tmp_path_factory, root):
     """A page of two materials with shrubs on hills, and its terrain."""
-    folder, schema = tmp_path_factory.mktemp("walked"), root / "workflow/schemas/davgswt.schema.json"
-    write_cover_bundle(folder / "bundle", schema)
+    folder = tmp_path_factory.mktemp("walked")
+    write_cover_bundle(folder / "bundle")
     write_page(folder / "bundle", VIEWER, folder / "page", HILLS)
-    bundle = store.read_bundle(folder / "page", schema)
+    bundle = store.read_bundle(folder / "page")
     return folder / "page", bundle.manifest, terrain_from_page(bundle)
 
 

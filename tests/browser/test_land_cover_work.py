@@ -1,7 +1,5 @@
 """What the worker does anew for a view of two materials with objects, in Gaussians: little, and nothing twice."""
 
-from pathlib import Path
-
 import pytest
 from fixtures.browser import served
 from fixtures.land_covers import SIDE, write_cover_bundle
@@ -10,7 +8,6 @@ from fixtures.page_visit import VIEWER
 from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page
 
-SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
 OPEN = """
   const { createFrameBuilder } = await import("./worker/frame_builder.js");
   const { createHeights } = await import("./terrain/heights.js");
@@ -98,7 +95,7 @@ FORGET = """async () => {
 def page(blank, tmp_path_factory):
     """A tab beside the viewer's modules and a bundle of two materials over hills."""
     folder = tmp_path_factory.mktemp("work")
-    write_cover_bundle(folder / "bundle", SCHEMA)
+    write_cover_bundle(folder / "bundle")
     write_page(folder / "bundle", VIEWER, folder / "page", Hills(1.5 * SIDE, 12.0 * SIDE, 3, 5))
     with served(folder / "page") as address:
         yield blank(address)

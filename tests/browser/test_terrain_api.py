@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from fixtures import paint_pages
 from fixtures.browser import served
 from fixtures.bundles import Ground, directions
 from fixtures.land_covers import write_cover_bundle
@@ -159,7 +158,7 @@ def test_a_ray_over_hills_ends_where_it_first_comes_down(other):
 
 def test_an_object_counts_from_its_foot(blank, tmp_path):
     """Its ground is another height than 0: the chunk's z counts from the foot already."""
-    write_cover_bundle(tmp_path / "bundle", paint_pages.SCHEMA)
+    write_cover_bundle(tmp_path / "bundle")
     manifest = read_json(tmp_path / "bundle/davgswt.json")
     manifest["objects"][0]["ground"] = 0.3
     write_json(tmp_path / "bundle/davgswt.json", manifest)

@@ -32,7 +32,6 @@ from dav_gswt.views.frozen_scales import read_frozen_scales
 from dav_gswt.views.scores import FIELDS, read_scores
 from dav_gswt.views.selection import read_pose_selection
 
-SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
 POSE = Pose("pose_0001", 60.0, 10.0, 4.0)
 CAMERA = orbit(60.0, 10.0, 4.0, (0.0, 0.0, 0.0), 8, 6, 60.0)
 SQUARE = {"west": 0, "south": 0, "side": 1}
@@ -135,7 +134,7 @@ def test_manifests_that_were_found_are_refused_soon(bundle, where, value, messag
     path.write_text(json.dumps(manifest))
     start = time.process_time()
     with pytest.raises(InputError, match=message) as refusal:
-        read_bundle(bundle, SCHEMA)
+        read_bundle(bundle)
     assert time.process_time() - start < 2
     assert "davgswt.json" in str(refusal.value) and len(str(refusal.value)) < LONGEST
 

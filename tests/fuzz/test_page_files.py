@@ -16,7 +16,6 @@ from fixtures.land_covers import write_cover_bundle
 from hypothesis import given
 
 pytestmark = pytest.mark.slow
-SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
 VIEWER = Path(__file__).parents[2] / "workflow/viewer"
 
 
@@ -85,7 +84,7 @@ def test_manifests(page, files, random):
 def cover(tmp_path_factory):
     """The files of a bundle of two materials with an object, and its manifest."""
     folder = tmp_path_factory.mktemp("bundle") / "bundle"
-    write_cover_bundle(folder, SCHEMA)
+    write_cover_bundle(folder)
     data = {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*.bin"))}
     return data, json.loads((folder / "davgswt.json").read_text())
 

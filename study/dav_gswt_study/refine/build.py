@@ -70,8 +70,8 @@ def refine_tiles(tiles: TileSet, uncut: UncutGround, options: Options, repair: R
     for level in range(1, len(tiles.fields)):
         levels.append([_update_level(tiles, level, number, finest[number]) for number in range(len(finest))])
     _log.info("%d of %d Gaussians changed", sum(f["changed"] for f in facts), sum(map(len, finest)))
-    more = tiles.report.more | {"refined": {"options": vars(options), "tiles": facts}}
-    return replace(tiles, fields=levels, report=replace(tiles.report, more=more))
+    report = tiles.report | {"refined": {"options": vars(options), "tiles": facts}}
+    return replace(tiles, fields=levels, report=report)
 
 
 def _refine_tile(
@@ -79,7 +79,7 @@ def _refine_tile(
 ) -> tuple[GaussianField, dict]:
     """The finest level of a tile, and facts about its refinement."""
     cell, labels, field = tiles.spacing, tiles.labels[number], tiles.fields[0][number]
-    share = limits.compute_shares(labels, options.reach, float(tiles.report.layout.strip))
+    share = limits.compute_shares(labels, options.reach, float(tiles.layout.strip))
     bounds = limits.compute_bounds(field, share, tiles.side, options.colour, options.opacity, options.position * cell)
     around = viewpoints.assemble_neighbours(tiles.fields[0], number, tiles.side)
     points, width = viewpoints.find_seam_points(labels, options.width // 2), options.width * cell

@@ -47,7 +47,7 @@ class ExemplarMaps:
         Patches lie at the first of UNSEARCHED places, and steps of brightness and height stay: with the search and the
         corrections straight seams would be hardly worse than cut ones.
         """
-        plan, own = tiles.report.layout, {"energy": "none", "candidates": UNSEARCHED}
+        plan, own = tiles.layout, {"energy": "none", "candidates": UNSEARCHED}
         sizes = {"tile": plan.side / plan.exemplar, "strip": plan.strip / plan.side}
         options = build.TilingOptions.from_config(tiling | own | sizes, source, len(tiles.fields))
         options = replace(options, tries=1, corrected=False)
@@ -56,7 +56,7 @@ class ExemplarMaps:
     def detrend(self, tiles: build.TileSet, tiling: dict) -> DetrendedExemplar:
         """The exemplar without the trend that was removed for a tile set."""
         options = build.TilingOptions.from_config(tiling, semantics.SemanticSource())
-        return detrend_exemplar(self.levels, self.exemplar, self.colour, options.trend * tiles.report.layout.side)
+        return detrend_exemplar(self.levels, self.exemplar, self.colour, options.trend * tiles.layout.side)
 
     def place_with_straight(
         self, tiles: build.TileSet, tiling: dict, source: semantics.SemanticSource, seed: int, tau: float, number: int

@@ -17,7 +17,7 @@ from dav_gswt.bundle.content import BundleContent
 from dav_gswt.field import GaussianField
 from dav_gswt.terrain import endless
 from dav_gswt.terrain.choice import tiles_in
-from dav_gswt.tiles import build, layout, trends
+from dav_gswt.tiles import build, compose, layout, texture
 from dav_gswt.tiles.layout import Exemplar, Layout
 from dav_gswt_study.seams.spatial_index import SpatialIndex
 
@@ -90,9 +90,9 @@ def detrend_exemplar(
     levels: list[GaussianField], exemplar: Exemplar, colour: Float[Array, "m m 3"], width: float
 ) -> DetrendedExemplar:
     """The exemplar as `build.cut_tiles` uses it. colour: NaN for holes. width: of the low-pass, in cells."""
-    _, height = build.compute_ground_maps(levels[0], exemplar)
-    trend = trends.fit_trend(colour, height, exemplar, width)
-    flat = [trends.remove_trend(field, trend) for field in levels]
+    _, height = compose.compute_ground_maps(levels[0], exemplar)
+    trend = texture.fit_trend(colour, height, exemplar, width)
+    flat = [texture.remove_trend(field, trend) for field in levels]
     corner = np.array([exemplar.west, exemplar.south, 0], np.float32)
     home = replace(exemplar, west=0.0, south=0.0)
     flat = [replace(field, means=field.means - corner) for field in flat]
@@ -107,7 +107,7 @@ def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau:
     rings = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels).rings
     manifest = describe_tiles(BundleContent.of_one_material(tiles), options, rings)
     terrain = replace(endless.terrain_from_fields(tiles.fields, manifest, {"kind": "flat"}), reach=REACH)
-    plan = tiles.report.layout
+    plan = tiles.layout
     first = -(WINDOW // 2)
     numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)
     n = plan.side
@@ -144,5 +144,5 @@ def _measure_correction(tiles: build.TileSet, source: DetrendedExemplar, number:
 
 
 def _mean_cells(field: GaussianField, cells: Exemplar) -> Float[Array, "m m 4"]:
-    colour, height = build.compute_ground_maps(field, cells)
+    colour, height = compose.compute_ground_maps(field, cells)
     return np.concatenate([colour, height[..., None]], -1)

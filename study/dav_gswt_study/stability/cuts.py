@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 from numpy import ndarray as Array
 
-from dav_gswt.tiles import cuts, energy, semantics
+from dav_gswt.tiles import energy, semantics
 from dav_gswt_study.stability.formula import FLOAT32, Case, Check
 
 SIDE = 8
@@ -83,7 +83,7 @@ FIRST[:, 0], SECOND[:, 3] = True, True
 
 def _cut_energy(right: Array, upper: Array) -> float:
     """Energy of the minimum cut over the largest cost."""
-    return cuts.find_cut(right, upper, FIRST, SECOND).energy / max(right.max(), upper.max())
+    return energy.find_cut(right, upper, FIRST, SECOND).energy / max(right.max(), upper.max())
 
 
 def _cut_energy_reference(right: Array, upper: Array) -> float:

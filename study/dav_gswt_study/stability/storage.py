@@ -103,7 +103,7 @@ def _mean_of_halves(values: Array) -> float:
 
 
 def _public_quats() -> Array:
-    return gswt.to_rows(make_splats(), 4.0)[:, 58:].astype(np.float64)
+    return gswt.to_renderer(make_splats(), 4.0).quats.astype(np.float64)
 
 
 def _depth_cases() -> list[Case]:

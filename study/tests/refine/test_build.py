@@ -73,7 +73,7 @@ def test_where_nothing_is_repaired_or_cut_every_level_keeps_its_bytes():
         found = build.refine_tiles(before, UNCUT, FEW, by, 32)
         for one, two in zip(found.fields, before.fields, strict=True):
             assert all(same(a, b) for a, b in zip(one, two, strict=True))
-        assert all(tile["changed"] == 0 for tile in found.report.more["refined"]["tiles"])
+        assert all(tile["changed"] == 0 for tile in found.report["refined"]["tiles"])
 
 
 def test_a_step_of_brightness_becomes_smaller_in_every_level(mended):
@@ -84,7 +84,7 @@ def test_a_step_of_brightness_becomes_smaller_in_every_level(mended):
             colour = tiles.fields[level][5].base_colours[:, 0].reshape(n, n)[n // 2 - wide : n // 2 + wide]
             steps.append(colour[:, edge : edge + wide].mean() - colour[:, edge - wide : edge].mean())
         assert steps[1] < 0.7 * steps[0], level
-    tile = mended.report.more["refined"]["tiles"][5]
+    tile = mended.report["refined"]["tiles"][5]
     assert tile["apart"][1] < 0.8 * tile["apart"][0] and tile["changed"] > 0
 
 

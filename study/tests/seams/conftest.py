@@ -19,7 +19,7 @@ def tiles(sample_ground):
 
 @pytest.fixture(scope="session")
 def source(sample_ground, tiles):
-    width = 0.2 * tiles.report.layout.side
+    width = 0.2 * tiles.layout.side
     return placed_tiles.detrend_exemplar(sample_ground.levels, sample_ground.exemplar, sample_ground.colour, width)
 
 

@@ -26,11 +26,10 @@ def bundled(monkeypatch, tmp_path, root):
     monkeypatch.setattr(presort, "HEIGHT", 36)
     monkeypatch.setattr(presort, "REACH", 11)
     monkeypatch.setattr(presort, "VIEWS", presort.VIEWS[:2])
-    schema = root / "workflow/schemas/davgswt.schema.json"
 
     def write(content, **more):
-        build.write_bundle(content, tmp_path / "bundle", build.BundleOptions(tau=1.0, **more), schema, {})
-        return store.read_bundle(tmp_path / "bundle", schema)
+        build.write_bundle(content, tmp_path / "bundle", build.BundleOptions(tau=1.0, **more), {})
+        return store.read_bundle(tmp_path / "bundle")
 
     return write
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fixtures.land_covers import SIDE, TILES, cover_content, shrub
 
-from dav_gswt.bundle import baking, build, gswt
+from dav_gswt.bundle import build, gswt
 from dav_gswt.bundle.build import BundleOptions
 
 
@@ -19,7 +19,7 @@ def content():
 
 @pytest.fixture(scope="module")
 def baked(content):
-    return baking.bake_objects(content, 1, 7)
+    return gswt.bake_objects(content, 1, 7)
 
 
 def added(content, baked, tile, level=0):
@@ -44,7 +44,7 @@ def test_tiles_keep_the_same_mean_height_and_their_borders(content, baked):
 
 
 def test_the_public_renderers_checker_finds_no_fault_with_objects(content, gswt_checker, tmp_path):
-    fields = baking.bake_objects(replace(content, objects=[shrub(0.4, 0.2), shrub(0.2, 0.5)]), 1, 7)
+    fields = gswt.bake_objects(replace(content, objects=[shrub(0.4, 0.2), shrub(0.2, 0.5)]), 1, 7)
     gswt.write_gswt(fields, SIDE, tmp_path / "objects.zip")
     command = [sys.executable, gswt_checker, tmp_path / "objects.zip"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -60,17 +60,17 @@ def test_every_level_has_the_same_objects_and_every_tile_others(content, baked):
 
 
 def test_an_object_wider_than_a_tile_is_left_out(content):
-    assert baking.bake_objects(content, 0, 7) is content.tiles[0].fields  # this material has none at all
+    assert gswt.bake_objects(content, 0, 7) is content.tiles[0].fields  # this material has none at all
     wide = replace(content, objects=[shrub(2.5, 0.2)])
-    fields = baking.bake_objects(wide, 1, 7)
+    fields = gswt.bake_objects(wide, 1, 7)
     assert [len(f) for f in fields[0]] == [len(f) for f in content.tiles[1].fields[0]]
 
 
 def test_every_material_has_an_archive_and_old_ones_go(content, tmp_path, root):
-    schema, out = root / "workflow/schemas/davgswt.schema.json", tmp_path / "b"
+    out = tmp_path / "b"
     out.mkdir()
     (out / "gswt_material5.zip").write_bytes(b"old")
-    build.write_bundle(content, out, BundleOptions(tau=0.5, salt=7), schema, {})
+    build.write_bundle(content, out, BundleOptions(tau=0.5, salt=7), {})
     assert sorted(p.name for p in out.glob("*.zip")) == ["gswt.zip", "gswt_material1.zip"]
     read = gswt.read_gswt(out / "gswt_material1.zip", SIDE)
-    assert [len(f) for f in read[0]] == [len(f) for f in baking.bake_objects(content, 1, 7)[0]]
+    assert [len(f) for f in read[0]] == [len(f) for f in gswt.bake_objects(content, 1, 7)[0]]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dav_gswt.bundle import direction_search, order_directions, orders
+from dav_gswt.bundle import direction_search, orders
 from dav_gswt.bundle.orders import DirectionRings
 from dav_gswt.field import GaussianField, rgb_to_sh
 
@@ -83,12 +83,12 @@ def test_so_many_splats_as_two_bytes_count_need_four():
 
 
 def test_a_picture_in_its_own_order_is_the_rasterizer_s():
-    field, sight = ground(1), order_directions.TileView(0, 37.0, 45.0)
+    field, sight = ground(1), direction_search.TileView(0, 37.0, 45.0)
     exact, same = (
-        order_directions.render_in_order(field, SIDE, sight.direction, 0.01, o) for o in (None, sight.direction)
+        direction_search.render_in_order(field, SIDE, sight.direction, 0.01, o) for o in (None, sight.direction)
     )
     assert (exact == same).all() and exact.max() > 0.5
-    backwards = order_directions.render_in_order(field, SIDE, sight.direction, 0.01, -sight.direction)
+    backwards = direction_search.render_in_order(field, SIDE, sight.direction, 0.01, -sight.direction)
     assert np.abs(backwards - exact).max() > 0.1
 
 
@@ -101,7 +101,7 @@ def test_one_colour_needs_the_fewest_directions():
 
 
 def test_directions_are_added_until_the_error_is_small_or_the_room_is_full(monkeypatch):
-    monkeypatch.setattr(order_directions, "VIEWS", 2)
+    monkeypatch.setattr(direction_search, "VIEWS", 2)
     fields = [ground(seed, stones=150) for seed in range(2)]
     wanted = [15.0, 60.0]
     found = [direction_search.search_directions(fields, SIDE, w) for w in wanted]

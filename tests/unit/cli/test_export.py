@@ -9,14 +9,14 @@ from fixtures import bundles
 from fixtures.land_covers import cover_content, write_cover_bundle
 
 from dav_gswt.bundle import store
-from dav_gswt.cli import export, main
+from dav_gswt.cli import main
 from dav_gswt.config.exports import Export
 from dav_gswt.export import terrain_files
 from dav_gswt.field import read_field
 from dav_gswt.terrain import endless
 from dav_gswt.terrain.heights import Hills, make_sphere
 from dav_gswt.terrain.page import write_page
-from dav_gswt.tiles.store import write_material_tiles
+from dav_gswt.tiles.store import write_tiles
 
 HILLS = Hills(2.0, 30.0, 3, 5)
 
@@ -27,9 +27,9 @@ def result(root, tmp_path_factory):
     folder = tmp_path_factory.mktemp("results") / "scene"
     bundle = folder / "tiles_auto/bundle_tau0.6"
     bundle.parent.mkdir(parents=True)
-    write_cover_bundle(bundle, root / "workflow/schemas/davgswt.schema.json")
+    write_cover_bundle(bundle)
     write_page(bundle, root / "workflow/viewer", bundle / "terrain/page", HILLS)
-    write_material_tiles(cover_content().tiles, bundle.parent / "tiles", bundle.parent / "seams.json", {})
+    write_tiles(cover_content().tiles, bundle.parent / "tiles", bundle.parent / "seams.json", {})
     return folder
 
 
@@ -45,7 +45,7 @@ def test_it_writes_what_the_rule_writes(result, tmp_path):
     bundle, size = result / "tiles_auto/bundle_tau0.6", ("--columns", 2, "--rows", 3)
     assert run(bundle, *size, "--format", "glb", "--format", "ply", "--format", "ground", "-o", tmp_path / "out") == 0
     assert (tmp_path / "out/ground/ground.xml").is_file()
-    read = store.read_bundle(bundle, export.SCHEMA)
+    read = store.read_bundle(bundle)
     terrain = endless.terrain_from_fields(
         read.fields(), read.manifest, HILLS, [[read.object_chunk(0, level)[0] for level in range(2)]]
     )

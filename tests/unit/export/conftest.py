@@ -33,9 +33,9 @@ def placed(field, tmp_path):
 
 @pytest.fixture(scope="session")
 def cover_bundle(tmp_path_factory, root):
-    folder, schema = tmp_path_factory.mktemp("cover") / "b", root / "workflow/schemas/davgswt.schema.json"
-    write_cover_bundle(folder, schema)
-    return store.read_bundle(folder, schema)
+    folder = tmp_path_factory.mktemp("cover") / "b"
+    write_cover_bundle(folder)
+    return store.read_bundle(folder)
 
 
 @pytest.fixture(scope="session")

@@ -101,7 +101,7 @@ def test_a_level_that_saves_nothing_is_not_made(monkeypatch):
 
 def test_levels_that_were_written_read_back(levels, tmp_path):
     fields, grids = zip(*levels, strict=True)
-    store.write_levels(Levels(list(fields), list(grids), AUTO, "why"), tmp_path / "levels", {})
+    store.write_levels([Levels(list(fields), list(grids), AUTO, "why")], tmp_path / "levels", {})
     back = store.read_levels(tmp_path / "levels")
     assert back.wanted == AUTO and back.stopped == "why" and len(back.fields) == 2
     np.testing.assert_array_equal(back.fields[1].means, fields[1].means)

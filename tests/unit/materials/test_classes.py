@@ -6,8 +6,7 @@ from fixtures import mixed_ground as made
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.materials import classes
-from dav_gswt.materials.maps import GroundMaps
-from dav_gswt.materials.mask_images import NO_CLASS, GroundMasks
+from dav_gswt.materials.maps import NO_CLASS, GroundMaps, GroundMasks
 from dav_gswt.tiles.layout import Exemplar
 
 

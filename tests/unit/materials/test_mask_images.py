@@ -3,7 +3,7 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.materials import mask_images
+from dav_gswt.materials import maps
 
 
 @pytest.fixture
@@ -22,14 +22,14 @@ def north(size=64, rows=16):
 
 
 def test_masks_of_any_size_are_read_north_up(draw):
-    masks = mask_images.read_masks({"lawn": draw("lawn", north()), "exclude": draw("out", north()[::-1])}, 32)
+    masks = maps.read_masks({"lawn": draw("lawn", north()), "exclude": draw("out", north()[::-1])}, 32)
     assert masks.materials["lawn"][24:].all() and not masks.materials["lawn"][:24].any()
     assert masks.excluded[:8].all() and not masks.excluded[8:].any()
 
 
 def test_the_first_of_two_that_overlap_counts_larger_ones_come_first_and_other_cells_have_none(draw):
     files = {"small": draw("small", north(rows=16)), "large": draw("large", north(rows=48))}
-    labels, names = mask_images.read_masks(files | {"exclude": draw("out", north(rows=4))}, 32).label()
+    labels, names = maps.read_masks(files | {"exclude": draw("out", north(rows=4))}, 32).label()
     assert names == ["large", "small"]
     wanted = np.repeat([-1, 0, 1, -1], [8, 16, 6, 2])[:, None]
     np.testing.assert_array_equal(labels, np.tile(wanted, 32))
@@ -51,4 +51,4 @@ def test_masks_that_are_not_square_or_leave_nothing_and_what_is_no_picture_are_r
     if cells is not None:
         draw("a", cells)
     with pytest.raises(InputError, match=message):
-        mask_images.read_masks({name: tmp_path / "a.png"}, 32)
+        maps.read_masks({name: tmp_path / "a.png"}, 32)

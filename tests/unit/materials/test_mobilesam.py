@@ -25,8 +25,8 @@ class Encoder:
 class Decoder:
     """Gives the same cells for every prompt."""
 
-    def __init__(self, cells, score=0.9):
-        self.cells, self.score, self.prompts = cells, score, []
+    def __init__(self, cells):
+        self.cells, self.prompts = cells, []
 
     def get_inputs(self):
         return [SimpleNamespace(name=name) for name in mobilesam.DECODER_INPUTS]
@@ -35,10 +35,10 @@ class Decoder:
         return [SimpleNamespace(name=name) for name in ("masks", "iou_predictions", "low_res_masks")]
 
     def run(self, names, feed):
-        assert set(feed) == mobilesam.DECODER_INPUTS and names == ["masks", "iou_predictions"]
+        assert set(feed) == mobilesam.DECODER_INPUTS and names == ["masks"]
         assert feed["orig_im_size"].tolist() == list(self.cells.shape)
         self.prompts.append((feed["point_coords"], feed["point_labels"]))
-        return [np.where(self.cells, 3.0, -3.0)[None, None], np.array([[self.score]], np.float32)]
+        return [np.where(self.cells, 3.0, -3.0)[None, None]]
 
 
 def square(low, high, side=40):
@@ -47,10 +47,10 @@ def square(low, high, side=40):
     return cells
 
 
-def segment(cells, box, score=0.9):
-    segmenter = mobilesam.Segmenter(Encoder(), Decoder(cells, score))
-    (found,) = segmenter.segment_boxes(segmenter.embed_image(np.zeros((*cells.shape, 3))), np.array([box], float))
-    return found
+def segment(cells, box):
+    return mobilesam.Segmenter(Encoder(), Decoder(cells)).open_picture(np.zeros((*cells.shape, 3)))(
+        np.array(box, float)
+    )
 
 
 def test_a_picture_is_normalized_and_padded_with_zeros():
@@ -66,7 +66,8 @@ def test_a_picture_is_normalized_and_padded_with_zeros():
 def test_a_prompt_is_the_two_corners_of_a_box_in_the_encoders_picture():
     cells = np.zeros((50, 100), bool)
     segmenter = mobilesam.Segmenter(Encoder(), decoder := Decoder(cells))
-    segmenter.segment_boxes(segmenter.embed_image(np.zeros((50, 100, 3))), np.array([[0.0, 10, 50, 20]] * 2))
+    find = segmenter.open_picture(np.zeros((50, 100, 3)))
+    find(np.array([0.0, 10, 50, 20])), find(np.array([0.0, 10, 50, 20]))
     (points, labels), _ = decoder.prompts
     np.testing.assert_allclose(points, [[[-0.5, 101.9], [511.5, 204.3]]], atol=1e-4)
     assert labels.tolist() == [[2.0, 3.0]]
@@ -85,13 +86,12 @@ def test_masks_that_are_not_what_was_asked_for_are_dropped(cells, box):
     assert segment(cells, box) is None
 
 
-def test_a_mask_that_fills_its_box_is_kept_with_its_score_and_those_of_another_shape_are_refused():
-    found = segment(square(10, 20), [9, 9, 21, 21], 0.75)
-    assert found is not None and (found.cells == square(10, 20)).all() and found.predicted_iou == 0.75
+def test_a_mask_that_fills_its_box_is_kept_and_masks_of_another_shape_are_refused():
+    assert (segment(square(10, 20), [9, 9, 21, 21]) == square(10, 20)).all()
     segmenter = mobilesam.Segmenter(Encoder(), Decoder(square(10, 20)))
-    segmenter.decoder.run = lambda names, feed: [np.zeros((1, 3, 8, 8)), np.ones((1, 3))]
+    segmenter.decoder.run = lambda names, feed: [np.zeros((1, 3, 8, 8))]
     with pytest.raises(InputError, match="its masks are not those of MobileSAM"):
-        segmenter.segment_boxes(segmenter.embed_image(np.zeros((40, 40, 3))), np.array([[10.0, 10, 20, 20]]))
+        segmenter.open_picture(np.zeros((40, 40, 3)))(np.array([10.0, 10, 20, 20]))
 
 
 def pretend_runtime(monkeypatch, *sessions):

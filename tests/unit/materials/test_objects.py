@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.materials import objects
-from dav_gswt.materials.surroundings import Surroundings
+from dav_gswt.materials.maps import Surroundings
 
 M = 120
 

@@ -6,7 +6,6 @@ from scipy.ndimage import binary_dilation, label
 
 from dav_gswt.materials import mobilesam, outlines
 from dav_gswt.materials.maps import GroundMaps
-from dav_gswt.materials.mobilesam import Embedding, PredictedMask
 from dav_gswt.materials.objects import Footprint
 from dav_gswt.tiles.layout import Exemplar
 
@@ -44,14 +43,15 @@ class Segmenter(mobilesam.Segmenter):
     def __init__(self, *answers):
         self.answers, self.picture, self.boxes = list(answers), None, []
 
-    def embed_image(self, picture):
+    def open_picture(self, picture):
         self.picture = picture
-        return Embedding(np.zeros((1, 256, 64, 64), np.float32), picture.shape[:2])
 
-    def segment_boxes(self, embedding, boxes):
-        self.boxes += boxes.tolist()
-        answers = [self.answers.pop(0) for _ in boxes]
-        return [None if cells is None else PredictedMask(cells[::-1], 0.9) for cells in answers]
+        def find(box):
+            self.boxes.append(box.tolist())
+            cells = self.answers.pop(0)
+            return None if cells is None else cells[::-1]
+
+        return find
 
 
 @pytest.mark.parametrize("before", [disc(20, 22, 5.5), disc(20, 22, 10), disc(22, 20, 8)])

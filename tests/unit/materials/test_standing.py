@@ -5,7 +5,7 @@ from fixtures import mixed_ground as made
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.materials import segmentation, standing
-from dav_gswt.materials.surroundings import Surroundings
+from dav_gswt.materials.maps import Surroundings
 
 M = made.CELLS
 

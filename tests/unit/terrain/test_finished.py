@@ -24,16 +24,15 @@ RULE = [{"kind": "noise"}, {"kind": "height", "material": "grass", "low": 0.1, "
 
 
 def test_a_page_is_the_terrain_that_it_was_made_of(root, tmp_path):
-    schema = root / "workflow/schemas/davgswt.schema.json"
     colours = np.array([[[200, 180, 120], [60, 120, 50]]]).repeat(2, 0) / 255
     image_files.write_png(tmp_path / "m.png", colours)
     picture = {"kind": "image", "file": str(tmp_path / "m.png"), "width": 40.0, "weight": 9}
     rule = [*RULE, picture | {"colours": {"sand": "#c8b478", "grass": "#3c7832"}}]
-    write_cover_bundle(tmp_path / "bundle", schema)
+    write_cover_bundle(tmp_path / "bundle")
     write_page(tmp_path / "bundle", root / "workflow/viewer", tmp_path / "page", SURFACES["hills"], rule)
-    terrain = endless.terrain_from_page(store.read_bundle(tmp_path / "page", schema))
+    terrain = endless.terrain_from_page(store.read_bundle(tmp_path / "page"))
     surface = {"kind": "hills", "height": 2 / SIDE, "wavelength": 30 / SIDE, "octaves": 3, "seed": 5}
-    wanted = endless.terrain_from_bundle(store.read_bundle(tmp_path / "bundle", schema), surface, rule)
+    wanted = endless.terrain_from_bundle(store.read_bundle(tmp_path / "bundle"), surface, rule)
     assert terrain.heights == wanted.heights == SURFACES["hills"]
     points = np.random.default_rng(3).integers(-60, 60, (2, 200))
     np.testing.assert_array_equal(terrain.classes.lattice_scores(*points), wanted.classes.lattice_scores(*points))
@@ -76,9 +75,9 @@ def test_a_surface_that_is_damaged_is_named(tmp_path, changes, said):
 
 @pytest.fixture(scope="module")
 def bundle(tmp_path_factory, root):
-    folder, schema = tmp_path_factory.mktemp("cover") / "b", root / "workflow/schemas/davgswt.schema.json"
-    write_cover_bundle(folder, schema)
-    return store.read_bundle(folder, schema)
+    folder = tmp_path_factory.mktemp("cover") / "b"
+    write_cover_bundle(folder)
+    return store.read_bundle(folder)
 
 
 @pytest.mark.parametrize("surface, corner", [({"kind": "flat"}, (0, 0)), (HILLS, (4000, -7000))], ids=["flat", "hills"])

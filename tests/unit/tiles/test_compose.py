@@ -12,7 +12,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import concatenate_fields
 from dav_gswt.reconstruction import discs, underlay
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.tiles import coarse_levels, compose, store
+from dav_gswt.tiles import compose, store
 
 
 def test_every_tile_holds_exactly_one_disc_a_cell_at_every_level(tiles):
@@ -85,7 +85,7 @@ def test_things_follow_the_cell_under_their_centre(sample_ground):
 def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, sample_ground, tmp_path):
     again = tile_sets.tiles_of(sample_ground)
     for name, made in (("a", tiles), ("b", again)):
-        store.write_tiles(made, tmp_path / name / "tiles", tmp_path / name / "seams.json", {"from": "a test"})
+        store.write_tiles([made], tmp_path / name / "tiles", tmp_path / name / "seams.json", {"from": "a test"})
     back = store.read_tiles(tmp_path / "a" / "tiles", tmp_path / "a" / "seams.json")
     np.testing.assert_array_equal(back.labels, tiles.labels)
     np.testing.assert_array_equal(back.shifts, tiles.shifts)
@@ -99,7 +99,7 @@ def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, sample_g
     "changes", [{"levels": "x"}, {"tiles": 0}, {"side": None}, {"side": -1}, {"seams": []}, {"materials": 3}]
 )
 def test_a_set_that_is_none_is_refused_by_name(tiles, tmp_path, changes):
-    store.write_tiles(replace(tiles, fields=[]), tmp_path / "tiles", tmp_path / "seams.json", {})
+    store.write_tiles([replace(tiles, fields=[])], tmp_path / "tiles", tmp_path / "seams.json", {})
     values = json.loads((tmp_path / "seams.json").read_text()) | {"levels": 1}
     (tmp_path / "seams.json").write_text(json.dumps(values | changes))
     with pytest.raises(InputError, match="seams.json: not the table of a tile set"):
@@ -110,7 +110,7 @@ def test_a_set_that_is_none_is_refused_by_name(tiles, tmp_path, changes):
 
 
 def test_tiles_of_another_table_or_with_damaged_labels_are_refused(tiles, tmp_path):
-    store.write_tiles(replace(tiles, fields=tiles.fields[-1:]), tmp_path / "tiles", tmp_path / "seams.json", {})
+    store.write_tiles([replace(tiles, fields=tiles.fields[-1:])], tmp_path / "tiles", tmp_path / "seams.json", {})
     (tmp_path / "tiles/labels.npz").write_bytes(b"PK")
     with pytest.raises(InputError, match="labels.npz: not readable"):
         store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
@@ -137,7 +137,7 @@ def tile():
 
 
 def test_four_discs_become_one_of_their_means(tile):
-    half = coarse_levels.merge_cells(tile, CELLS, SPACING)
+    half = compose.merge_cells(tile, CELLS, SPACING)
     flat, fine = half[half.ground], tile[tile.ground]
     assert len(flat) == CELLS**2 // 4
     for disc in (0, 9, 37):
@@ -151,22 +151,22 @@ def test_four_discs_become_one_of_their_means(tile):
 
 
 def test_the_underlay_is_renewed_and_nothing_else_is_taken_for_it(tile):
-    assert coarse_levels.find_underlay(tile, SPACING).sum() == CELLS**2 // 4
-    half = coarse_levels.merge_cells(tile, CELLS, SPACING)
-    assert coarse_levels.find_underlay(half, 2 * SPACING).sum() == CELLS**2 // 16
-    bare = coarse_levels.merge_cells(tile[~coarse_levels.find_underlay(tile, SPACING)], CELLS, SPACING)
-    assert not coarse_levels.find_underlay(bare, 2 * SPACING).any() and bare.ground.sum() == half.ground.sum()
+    assert compose.find_underlay(tile, SPACING).sum() == CELLS**2 // 4
+    half = compose.merge_cells(tile, CELLS, SPACING)
+    assert compose.find_underlay(half, 2 * SPACING).sum() == CELLS**2 // 16
+    bare = compose.merge_cells(tile[~compose.find_underlay(tile, SPACING)], CELLS, SPACING)
+    assert not compose.find_underlay(bare, 2 * SPACING).any() and bare.ground.sum() == half.ground.sum()
 
 
 def test_a_cell_without_a_disc_stays_empty(tile):
     inside = (tile.means[:, :2] < 2 * SPACING).all(1) & tile.ground
-    half = coarse_levels.merge_cells(tile[~inside], CELLS, SPACING)
+    half = compose.merge_cells(tile[~inside], CELLS, SPACING)
     assert half.ground.sum() == CELLS**2 // 4 - 1 and np.isfinite(half.means).all()
 
 
 def test_tiles_go_on_where_the_exemplar_ends(cut, tiles):
     five = cut(wanted=5)
-    assert five.report.layout.levels == 5 and five.report.layout.composed_levels == 3
+    assert five.layout.levels == 5 and five.layout.composed_levels == 3
     assert five.side == tiles.side
     scales = [[float(np.exp(f.log_scales).mean()) for f in level] for level in five.fields]
     assert (np.diff(scales, axis=0) > 0).all()

@@ -62,7 +62,7 @@ def test_tiles_that_a_material_has_no_room_for_are_refused(sets):
 
 
 def test_tiles_of_several_materials_are_written_and_read(tiles, tmp_path):
-    store.write_material_tiles(tiles, tmp_path / "tiles", tmp_path / "seams.json", {})
+    store.write_tiles(tiles, tmp_path / "tiles", tmp_path / "seams.json", {})
     read = store.read_material_tiles(tmp_path / "tiles", tmp_path / "seams.json")
     assert len(read) == 2
     for one, two in zip(read, tiles, strict=True):

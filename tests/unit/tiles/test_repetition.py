@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.tiles import layout, patches, repetition
+from dav_gswt.tiles import layout, patches
 
 
 def exemplar(seed=0, m=40):
@@ -13,7 +13,7 @@ def exemplar(seed=0, m=40):
 def power(picture):
     """Of a mean tile, per sample: its squares, and those of its rows' and columns' means, LINES times."""
     squares = [(part**2).sum(-1).mean() for part in (picture, picture.mean(0), picture.mean(1))]
-    return squares[0] + repetition.LINE_WEIGHT * (squares[1] + squares[2])
+    return squares[0] + patches.LINE_WEIGHT * (squares[1] + squares[2])
 
 
 def own(picture):
@@ -22,7 +22,7 @@ def own(picture):
 
 
 def test_charges_sum_to_the_power_of_what_comes_back_but_for_the_patches_own():
-    shown = repetition.start_overlay(exemplar(), 16, (16, 16))
+    shown = patches.start_overlay(exemplar(), 16, (16, 16))
     places, total = np.array([[0, 0], [8, 4], [20, 24]]), 0.0
     for place in places:
         total += shown.compute_costs(place[None])[0]
@@ -32,7 +32,7 @@ def test_charges_sum_to_the_power_of_what_comes_back_but_for_the_patches_own():
 
 
 def test_only_what_shows_counts():
-    shown = repetition.start_overlay(exemplar(), 16, (16, 12), (4, 3))
+    shown = patches.start_overlay(exemplar(), 16, (16, 12), (4, 3))
     x, y = place = np.array([8, 4])
     tile = np.zeros((16, 16, 3))  # what does not show adds nothing to a row's mean
     tile[:6, :8] = shown.ground[y + 3 : y + 9, x + 4 : x + 12]
@@ -40,7 +40,7 @@ def test_only_what_shows_counts():
 
 
 def test_pairs_are_charged_what_both_bring_back_but_for_their_own():
-    empty = repetition.start_overlay(exemplar(), 16, (16, 16))
+    empty = patches.start_overlay(exemplar(), 16, (16, 16))
     places = np.array([[0, 0], [8, 4], [20, 24]])
     charges = empty.compute_pair_costs(places)
     for i, j in np.ndindex(charges.shape):
@@ -52,7 +52,7 @@ def test_what_lies_over_a_patch_shows_in_its_place():
     over = np.zeros((16, 8), bool)
     over[:3] = over[-2:] = True
     rows, columns = (v + k for v, k in zip(np.mgrid[:16, :8], (20, 30), strict=True))
-    shown = repetition.start_overlay(exemplar(), 16, (8, 16), cover=(over, (rows, columns)))
+    shown = patches.start_overlay(exemplar(), 16, (8, 16), cover=(over, (rows, columns)))
     crop = shown.crop(np.array([4, 6]))
     np.testing.assert_array_equal(crop[over], shown.ground[20:36, 30:38][over])
     np.testing.assert_array_equal(crop[~over], shown.ground[6:22, 4:12][~over])

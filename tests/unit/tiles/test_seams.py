@@ -9,7 +9,7 @@ from fixtures.tile_sets import splats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dav_gswt.tiles import cuts, energy, occluders, semantics
+from dav_gswt.tiles import compose, energy, semantics
 from dav_gswt.tiles.energy import ColourLayer, LayerScales
 from dav_gswt.tiles.layout import Exemplar
 
@@ -103,26 +103,25 @@ def test_cut_of_a_small_grid_is_as_cheap_as_the_best_of_all_partitions(seed):
     first[:, 0], second[:, -1] = True, True
     if seed % 2:  # forced cells of any shape
         first[:, 0], first[1, 1], second[2, 1] = rng.random(4) < 0.5, True, True
-    found = cuts.find_cut(right, upper, first, second)
+    found = energy.find_cut(right, upper, first, second)
     # capacities are rounded to 2^-32 of the largest: 24 edges lose at most 24 halves of that
     assert found.energy == pytest.approx(cheapest(right, upper, first, second), abs=24 * 2.0**-32)
-    assert found.flow == found.cost
     assert not found.labels[first].any() and found.labels[second].all()
 
 
 def test_cut_without_free_cells_costs_its_forced_border():
     forced = np.array([[True, False]])
-    found = cuts.find_cut(np.array([[0.7]]), np.zeros((0, 2)), forced, ~forced)
-    assert found.energy == pytest.approx(0.7) and found.flow == found.cost
+    found = energy.find_cut(np.array([[0.7]]), np.zeros((0, 2)), forced, ~forced)
+    assert found.energy == pytest.approx(0.7)
 
 
 @pytest.mark.parametrize("forced", [0, 1])
 def test_where_only_one_patch_is_forced_all_is_that_patch_and_there_is_no_seam(forced):
     sides = [np.zeros((3, 4), bool), np.zeros((3, 4), bool)]
     sides[forced][0] = True
-    found = cuts.find_cut(np.full((3, 3), 0.3), np.full((2, 4), 0.3), *sides)
+    found = energy.find_cut(np.full((3, 3), 0.3), np.full((2, 4), 0.3), *sides)
     assert found.energy == 0 and (found.labels == bool(forced)).all()
-    assert cuts.find_cut(np.zeros((3, 3)), np.zeros((2, 4)), *sides).energy == 0  # free cells may show either
+    assert energy.find_cut(np.zeros((3, 3)), np.zeros((2, 4)), *sides).energy == 0  # free cells may show either
 
 
 def test_a_straight_seam_costs_what_it_crosses_and_no_less_than_the_cut():
@@ -130,22 +129,22 @@ def test_a_straight_seam_costs_what_it_crosses_and_no_less_than_the_cut():
     right, upper = rng.random((5, 5)), rng.random((4, 6))
     half = np.arange(6) >= 3
     labels = np.broadcast_to(half, (5, 6))
-    straight = cuts.price_cut(right, upper, labels)
+    straight = energy.price_cut(right, upper, labels)
     assert straight.energy == pytest.approx(right[:, 2].sum(), abs=5 * 2.0**-32)
     first, second = np.zeros((5, 6), bool), np.zeros((5, 6), bool)
     first[:, 0], second[:, -1] = True, True
-    assert cuts.find_cut(right, upper, first, second).energy < straight.energy
+    assert energy.find_cut(right, upper, first, second).energy < straight.energy
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -1.0])
 def test_costs_that_mean_nothing_and_cells_forced_both_ways_are_refused(bad):
     costs, none, every = (np.array([[bad]]), np.zeros((0, 2))), np.zeros((1, 2), bool), np.ones((2, 2), bool)
     with pytest.raises(ValueError, match="finite"):
-        cuts.find_cut(*costs, none, none)
+        energy.find_cut(*costs, none, none)
     with pytest.raises(ValueError, match="finite"):
-        cuts.price_cut(*costs, none)
+        energy.price_cut(*costs, none)
     with pytest.raises(ValueError, match="both"):
-        cuts.find_cut(np.ones((2, 1)), np.ones((1, 2)), every, every)
+        energy.find_cut(np.ones((2, 1)), np.ones((1, 2)), every, every)
 
 
 def a_field(*rows):
@@ -159,7 +158,7 @@ def a_field(*rows):
 def test_cover_is_the_opaque_area_over_a_cell():
     # over cells (0, 0) and (2, 1), far up or just over half a cell
     field = a_field([-0.9, 2.1, 9.0, 0.05, 0.8], [0.2, 2.6, 0.26, 0.1, 0.5], [0.2, 2.6, 0.26, 0.1, 0.5])
-    found = occluders.compute_cover(field, EXEMPLAR, np.zeros((4, 4)))
+    found = compose.compute_cover(field, EXEMPLAR, np.zeros((4, 4)))
     expected = np.zeros((4, 4))
     expected[0, 0] = 0.8 * 2 * np.pi * 0.05**2 / 0.25
     expected[1, 2] = 2 * 0.5 * 2 * np.pi * 0.1**2 / 0.25
@@ -168,15 +167,15 @@ def test_cover_is_the_opaque_area_over_a_cell():
 
 def test_what_lies_on_the_ground_or_under_it_hides_nothing():
     field = a_field([-0.9, 2.1, 0.2, 1.0, 0.9], [-0.4, 2.1, -3.0, 1.0, 0.9])
-    assert not occluders.compute_cover(field, EXEMPLAR, np.zeros((4, 4))).any()
-    assert occluders.compute_cover(field, EXEMPLAR, np.full((4, 4), -4.0)).any()  # of a ground below them they stand
+    assert not compose.compute_cover(field, EXEMPLAR, np.zeros((4, 4))).any()
+    assert compose.compute_cover(field, EXEMPLAR, np.full((4, 4), -4.0)).any()  # of a ground below them they stand
 
 
 def test_cover_is_at_most_one_and_nothing_stands_on_ground_that_is_not_known():
     field = a_field([-0.9, 2.1, 5.0, 9.0, 0.99], [-0.4, 2.1, 5.0, 9.0, 0.99])
     height = np.zeros((4, 4))
     height[0, 1] = np.nan
-    found = occluders.compute_cover(field, EXEMPLAR, height)
+    found = compose.compute_cover(field, EXEMPLAR, height)
     assert found[0, 0] == 1 and found.sum() == 1
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.lod.merge import compute_covariances
-from dav_gswt.tiles import poisson_blending, trends
+from dav_gswt.tiles import poisson_blending, texture
 from dav_gswt.tiles.layout import Exemplar, Layout
 
 EXEMPLAR = Exemplar(0.0, 0.0, 0.5, 64)
@@ -15,22 +15,22 @@ def test_a_plane_is_its_own_trend():
     y, x = np.mgrid[:64, :64]
     plane = 0.3 * x - 0.2 * y + 5
     # least squares in double precision over values around 20
-    np.testing.assert_allclose(trends.fit_low_pass(plane, KNOWN, 8.0), plane, atol=1e-10)
+    np.testing.assert_allclose(texture.fit_low_pass(plane, KNOWN, 8.0), plane, atol=1e-10)
 
 
 def test_grain_and_single_bushes_are_no_trend():
     values = np.where(np.indices((64, 64)).sum(0) % 2, 1.0, -1.0)
-    assert np.abs(trends.fit_low_pass(values, KNOWN, 6.0)).max() < 0.1  # a checkerboard's one-sided mean at the border
+    assert np.abs(texture.fit_low_pass(values, KNOWN, 6.0)).max() < 0.1  # a checkerboard's one-sided mean at the border
     bush = np.zeros((64, 64))
     bush[30:34, 30:34] = 1
     # a plain average would take 16 / (2 pi 6^2) = 0.07 of it
-    assert trends.fit_low_pass(bush, KNOWN, 6.0).max() < 0.01
+    assert texture.fit_low_pass(bush, KNOWN, 6.0).max() < 0.01
 
 
 def test_unknown_cells_take_no_part():
     values, known = np.full((64, 64), 2.0), KNOWN.copy()
     values[:20], known[:20] = 99, False
-    np.testing.assert_allclose(trends.fit_low_pass(values, known, 6.0), 2, atol=1e-9)
+    np.testing.assert_allclose(texture.fit_low_pass(values, known, 6.0), 2, atol=1e-9)
 
 
 def test_detrending_flattens_a_slope_and_keeps_mean_and_cover(sample_ground):
@@ -40,8 +40,8 @@ def test_detrending_flattens_a_slope_and_keeps_mean_and_cover(sample_ground):
     x = np.mgrid[: e.cells, : e.cells][1] * e.spacing
     tilted = ground.means.copy()
     tilted[:, 2] = 0.4 * x.ravel()
-    trend = trends.fit_trend(np.full((e.cells, e.cells, 3), np.nan), 0.4 * x, e, 10.0)
-    flat = trends.remove_trend(type(ground)(**{**vars(ground), "means": tilted}), trend)
+    trend = texture.fit_trend(np.full((e.cells, e.cells, 3), np.nan), 0.4 * x, e, 10.0)
+    flat = texture.remove_trend(type(ground)(**{**vars(ground), "means": tilted}), trend)
     np.testing.assert_allclose(flat.means[:, 2], 0.4 * x.mean(), atol=1e-5)  # float32 heights up to 5
     # z' = z - 0.4 x shears a flat disc: var z' = 0.16 var x + var z, cov = -0.4 var x
     before, after = compute_covariances(ground)[0], compute_covariances(flat)[0]

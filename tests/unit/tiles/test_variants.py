@@ -20,14 +20,14 @@ def every(cut):
 def test_every_way_has_its_share_of_colour(every):
     for kind, found in every.items():
         gamma = {"colour": 1.0, "semantic-nogamma": 0.5}.get(kind, 0.7310585786)  # of no uncertainty: 1 / (1 + exp(-1))
-        assert found.report.tile_gamma + found.report.strip_gamma == pytest.approx([gamma] * 20)
+        assert found.report["tile_gamma"] + found.report["strip_gamma"] == pytest.approx([gamma] * 20)
 
 
 def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap_and_dearer(every):
     straight, cheapest = every["none"].report, every["semantic"].report
     for k in (0, 2):  # the first strips were chosen before anything was cut
-        assert straight.strip_energy[k] > cheapest.strip_energy[k]
-    assert straight.places.vertical == cheapest.places.vertical
+        assert straight["strip_energy"][k] > cheapest["strip_energy"][k]
+    assert straight["places"]["vertical"] == cheapest["places"]["vertical"]
     plan = layout.plan_layout(96, 3, 0.5, 0.17)
     depth = (plan.block + plan.strip) // 2
     for labels in every["none"].labels:
@@ -38,7 +38,7 @@ def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap_and_d
 
 def test_uncertain_ground_is_cut_by_semantics_more_than_by_colour(cut):
     report = cut(kind="semantic", slope=8.0, uncertainty=np.full((96, 96), 0.75)).report
-    assert report.tile_gamma == pytest.approx([1 / (1 + np.exp(2))] * 16)
+    assert report["tile_gamma"] == pytest.approx([1 / (1 + np.exp(2))] * 16)
 
 
 def test_tiles_go_around_holes_and_unknown_ground_where_they_can(cut, sample_ground, caplog):

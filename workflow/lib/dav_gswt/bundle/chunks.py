@@ -12,33 +12,37 @@ sequence, which of its `directions` these are.
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Integer
 from numpy import ndarray as Array
+from pydantic import Field
 
-from dav_gswt.bundle.encoding import RECORD, Encoding
+from dav_gswt.bundle.encoding import RECORD, Encoding, Entry, Natural
 from dav_gswt.bundle.orders import index_type
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 
+Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
 
 @dataclass(frozen=True)
-class ChunkOrders:
+class ChunkOrders(Entry):
     """Which directions a tile at one level keeps orders for: indices into the manifest's `directions`."""
 
-    level: int
-    orders: list[int]
+    level: Natural
+    orders: Annotated[list[Natural], Field(min_length=1)]
 
 
 @dataclass(frozen=True)
 class ChunkEntry(ChunkOrders):
     """A chunk in the manifest: its path relative to the manifest, size and digest of the file, number of splats."""
 
-    file: str
-    bytes: int
-    sha256: str
-    count: int
+    file: Annotated[str, Field(pattern=r"^chunks/[A-Za-z0-9_]+\.bin$")]
+    bytes: Natural
+    sha256: Digest
+    count: Annotated[int, Field(ge=1)]
 
 
 def chunk_size(count: int, orders: int) -> int:

@@ -1,21 +1,46 @@
-"""Search for the fewest pre-sorted orders of a tile set with which pictures reach a wanted PSNR."""
+"""Search for the fewest pre-sorted orders of a tile set with which pictures reach a wanted PSNR.
+
+Tiles are rendered by parallel projection in a given order. A parallel projection does not change when a
+Gaussian moves along the viewing direction. So the rasterizer, which sorts by depth, draws any order if each
+Gaussian is moved to the depth of its place in it.
+"""
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.bundle import order_directions
-from dav_gswt.bundle.order_directions import TileView
+from dav_gswt.bundle import level_distances, orders
 from dav_gswt.bundle.orders import DirectionRings
 from dav_gswt.field import GaussianField
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.images.metrics import mse_to_psnr
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 
 _log = logging.getLogger(__name__)
 
 MAX_ORDERS = 33  # of a tile that keeps every second azimuth: with its record, 82 bytes a Gaussian
 MIN_AZIMUTHS = 4
+ELEVATIONS = {"walker": float(np.degrees(np.arcsin(0.1))), "oblique": 45.0}  # a walker's eye: a tenth of the distance
+WIDTH, HEIGHT = 256, 128  # pixels about the tile's middle
+VIEWS = 8  # at each elevation
+
+Picture = Float32[Array, "h w 3"]
+
+
+@dataclass(frozen=True)
+class TileView:
+    """A tile's number, and from where it is looked at: degrees from the east, degrees below the horizon."""
+
+    tile: int
+    azimuth: float
+    elevation: float
+
+    @property
+    def direction(self) -> Float[Array, "3"]:
+        return orders.unit_vectors(np.radians([self.azimuth]), np.radians(self.elevation))[0]
 
 
 @dataclass(frozen=True)
@@ -24,9 +49,9 @@ class DirectionSearchResult:
 
     Attributes:
         rings: the directions.
-        decibels: by elevation (`order_directions.ELEVATIONS`), the PSNR of the finest level drawn in the order of the
-            nearest direction that a tile with every second azimuth keeps, half-way between two of these azimuths, where
-            it is worst. None: no difference.
+        decibels: by elevation (ELEVATIONS), the PSNR of the finest level drawn in the order of the
+            nearest direction that a tile with every second azimuth keeps, half-way between two of these
+            azimuths, where it is worst. None: no difference.
     """
 
     rings: DirectionRings
@@ -38,42 +63,42 @@ def search_directions(
 ) -> DirectionSearchResult:
     """The fewest directions with which every view reaches `wanted` decibels, or as many as `most` allow.
 
-    Starts with a ring of MIN_AZIMUTHS azimuths 20 degrees below the horizon. While the worst view is below `wanted`, it
-    is compared with views along the kept azimuths: if the elevation causes most of the error, a ring at that elevation
-    is added, otherwise every ring gets twice the azimuths. Views steeper than 45 degrees are left out: they are of the
-    tiles about the eye, which are sorted exactly.
+    The search starts with a ring of MIN_AZIMUTHS azimuths 20 degrees below the horizon. While the worst
+    view is below `wanted`, it is compared with views along the kept azimuths: if the elevation causes most
+    of the error, a ring at that elevation is added, otherwise every ring gets twice the azimuths. Views
+    steeper than 45 degrees are left out: they show the tiles about the eye, which are sorted exactly.
 
-    Args: fields: the tiles of the finest level; a coarser level is used only where its discs cover a pixel.
+    fields: the tiles of the finest level; a coarser level is used only where its discs cover a pixel.
     """
     elevations, kept = (20.0,), MIN_AZIMUTHS
     while True:
         found = DirectionSearchResult(
             DirectionRings(elevations, 2 * kept), measure_elevations(fields, side, elevations, kept)
         )
-        worst = min(found.decibels, key=lambda view: _as_number(found.decibels[view]))
-        if _as_number(found.decibels[worst]) >= wanted:
+        decibels, worst = min((_as_number(level), view) for view, level in found.decibels.items())
+        if decibels >= wanted:
             return found
-        elevation = order_directions.ELEVATIONS[worst]
-        half = 3.0 + _as_number(found.decibels[worst])  # of the error is 3 dB
+        elevation = ELEVATIONS[worst]
         more = tuple(sorted({*elevations, elevation}))
-        along_azimuths = DirectionRings(elevations, kept)
-        missing = more != elevations and (
-            _as_number(measure_psnr(fields, side, along_azimuths, elevation, halfway=False)) < half
-        )
+        along_azimuths = measure_psnr(fields, side, DirectionRings(elevations, kept), elevation, halfway=False)
+        missing = more != elevations and _as_number(along_azimuths) < decibels + 3.0  # half of the error is 3 dB
         elevations_next, kept_next = (more, kept) if missing else (elevations, 2 * kept)
         if len(elevations_next) * kept_next + 1 > most:
-            decibels = _as_number(found.decibels[worst])
             _log.warning("orders: %.1f dB with %d directions, and no room for more", decibels, most)
             return found
         elevations, kept = elevations_next, kept_next
 
 
+def _as_number(decibels: float | None) -> float:
+    return np.inf if decibels is None else decibels
+
+
 def measure_elevations(
     fields: list[GaussianField], side: float, elevations: tuple[float, ...], kept: int
 ) -> dict[str, float | None]:
-    """`measure_psnr` at each of `order_directions.ELEVATIONS`, for rings of `kept` azimuths at `elevations`."""
+    """`measure_psnr` at each of ELEVATIONS, for rings of `kept` azimuths at `elevations`."""
     rings = DirectionRings(elevations, kept)
-    return {view: measure_psnr(fields, side, rings, down) for view, down in order_directions.ELEVATIONS.items()}
+    return {view: measure_psnr(fields, side, rings, down) for view, down in ELEVATIONS.items()}
 
 
 def measure_psnr(
@@ -81,25 +106,51 @@ def measure_psnr(
 ) -> float | None:
     """PSNR of views at one elevation, drawn in the order of the nearest direction, against their own order.
 
-    Args: halfway: views lie half-way between two azimuths, where an order is worst; otherwise along an azimuth.
+    halfway: views lie half-way between two azimuths, where an order is worst; otherwise along an azimuth.
     """
+    pixel = side / level_distances.FOCAL  # of the reference picture a tile's side away: nearer tiles are sorted exactly
     along, pairs = rings.directions(), []
-    for view in order_directions.spread_views(len(fields), elevation, rings.azimuths):
-        seen = view if halfway else TileView(view.tile, view.azimuth - 180 / rings.azimuths, elevation)
-        pairs.append(render_in_two_orders(fields[seen.tile], side, seen, along))
-    return order_directions.compute_psnr(pairs)
+    for view in spread_views(len(fields), elevation, rings.azimuths):
+        seen = view if halfway else replace(view, azimuth=view.azimuth - 180 / rings.azimuths)
+        field, direction = fields[seen.tile], seen.direction
+        best = along[int(np.argmax(along @ direction))]
+        exact = render_in_order(field, side, direction, pixel)
+        same = np.array_equal(best, direction)
+        pairs.append((exact if same else render_in_order(field, side, direction, pixel, best), exact))
+    return compute_psnr(pairs)
 
 
-def render_in_two_orders(
-    field: GaussianField, side: float, view: TileView, along: Float[Array, "d 3"]
-) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w 3"]]:
-    """A view drawn in the order of the nearest of some directions, and in its own."""
-    direction, pixel = view.direction, order_directions.pixel_size(side)
-    best = along[int(np.argmax(along @ direction))]
-    exact = order_directions.render_in_order(field, side, direction, pixel)
-    same = np.array_equal(best, direction)
-    return (exact if same else order_directions.render_in_order(field, side, direction, pixel, best)), exact
+def spread_views(tiles: int, elevation: float, azimuths: int = 1) -> list[TileView]:
+    """VIEWS views of different tiles, evenly around, each half-way between two of so many azimuths."""
+    around = [round(azimuths * k / VIEWS) + 0.5 for k in range(VIEWS)]
+    return [TileView(5 * k % tiles, 360 / azimuths * a % 360, elevation) for k, a in enumerate(around)]
 
 
-def _as_number(decibels: float | None) -> float:
-    return np.inf if decibels is None else decibels
+def render_in_order(
+    field: GaussianField, side: float, along: Float[Array, "3"], pixel: float, order: Float[Array, "3"] | None = None
+) -> Picture:
+    """The middle of a tile seen along a direction, in the order of another one, pixels `pixel` wide; black behind."""
+    middle = np.array([side / 2, side / 2, np.median(field.means[:, 2])])
+    right = np.cross(along, [0.0, 0.0, 1.0])
+    length = np.linalg.norm(right)
+    right = right / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
+    turn = np.stack([right, np.cross(along, right), along])
+    camera = Camera(turn, np.zeros(3), 1 / pixel, 1 / pixel, WIDTH / 2, HEIGHT / 2, WIDTH, HEIGHT, True)
+    # four standard deviations about their centres overlap the picture
+    x, y, z = (field.means - middle.astype(np.float32)).T
+    radius, visible = 4 * np.exp(field.log_scales.max(1)), np.ones(len(field), bool)
+    for axis, half in zip(turn.astype(np.float32), (WIDTH, HEIGHT), strict=False):
+        visible &= np.abs(x * axis[0] + y * axis[1] + z * axis[2]) - radius < 0.5 * half / np.float32(camera.fx)
+    field = field[visible]
+    means = field.means.astype(float) - middle
+    place = np.empty(len(field))
+    place[orders.sort_back_to_front(field.means, along if order is None else order)] = np.arange(len(field), 0, -1)
+    depth = side * (1 + place / max(len(field), 1))
+    means += (depth - means @ along)[:, None] * along
+    moved = replace(field, means=means.astype(np.float32))
+    return Rasterizer(near=1e-6).forward(**to_raster_arrays(moved), camera=camera).colour
+
+
+def compute_psnr(pairs: list[tuple[Picture, Picture]]) -> float | None:
+    """PSNR of pictures against others, over all pixels of all; None: they are equal."""
+    return mse_to_psnr(float(np.mean([((a.astype(float) - b) ** 2).mean() for a, b in pairs])))

@@ -12,10 +12,12 @@ border move alike. Colour does not depend on the direction.
 """
 
 from dataclasses import asdict, dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float, Float64, Int
 from numpy import ndarray as Array
+from pydantic import ConfigDict, Field
 from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
@@ -33,9 +35,24 @@ MIN_PIXELS = 1 / 64  # a thinner axis does not show: the rasterizer widens every
 MAX_TILE_SIDES = 4.0  # longer axes are cut: a tile farther away than that is not drawn for what reaches out of it
 HALF_STEP = 0.5 / 255  # of opacity: bytes 0 and 255 decode to half a step inside 0 and 1
 
+# what the numbers of a manifest may be
+Natural = Annotated[int, Field(ge=0)]
+Length = Annotated[float, Field(gt=0)]
+Size = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Colour = Annotated[list[Share], Field(min_length=3, max_length=3)]
+
+
+class Entry:
+    """A JSON object of the manifest: a base of dataclasses whose fields are its only keys."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
 
 @dataclass(frozen=True)
-class Encoding:
+class Encoding(Entry):
     """How the records of all chunks of a bundle are read.
 
         position  = origin + step * (three uint16)
@@ -49,10 +66,10 @@ class Encoding:
         sh_degree: of the colours; always 0.
     """
 
-    origin: list[float]
-    step: list[float]
-    log_scale: list[float]
-    sh_degree: int = 0
+    origin: Point
+    step: Annotated[list[Size], Field(min_length=3, max_length=3)]
+    log_scale: Pair
+    sh_degree: Literal[0] = 0
 
     @classmethod
     def fit(cls, parts: list[GaussianField], side: float, pixel: float) -> "Encoding":
@@ -139,7 +156,7 @@ def _multiply_quaternions(p: Float[Array, "n 4"], q: Float[Array, "n 4"]) -> Flo
 
 
 @dataclass(frozen=True)
-class EncodingErrors:
+class EncodingErrors(Entry):
     """Largest differences between Gaussians and their records.
 
     Attributes:
@@ -150,13 +167,13 @@ class EncodingErrors:
         clipped: number of axes outside of the encoding's range of sizes; they do not count for scale_percent.
     """
 
-    position: float = 0.0
-    position_pixels: float = 0.0
-    scale_percent: float = 0.0
-    angle_degrees: float = 0.0
-    colour: float = 0.0
-    opacity: float = 0.0
-    clipped: int = 0
+    position: Size = 0.0
+    position_pixels: Size = 0.0
+    scale_percent: Size = 0.0
+    angle_degrees: Size = 0.0
+    colour: Size = 0.0
+    opacity: Size = 0.0
+    clipped: Natural = 0
 
     @classmethod
     def measure(cls, encoding: Encoding, field: GaussianField, rows: Array, pixel: float) -> "EncodingErrors":

@@ -5,12 +5,20 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
-from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders
+from pydantic import Field
+
+from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders, Digest
+from dav_gswt.bundle.encoding import Entry, Length, Natural, Pair, Share, Size
 
 MAX_PAINTED = 2**18  # points
 MAX_COORDINATE = 2**23  # of a painted point
+
+Octaves = Annotated[int, Field(ge=1, le=8)]
+Pixels = Annotated[int, Field(ge=1, le=4096)]
+Salt = Annotated[int, Field(ge=0, lt=2**32)]
+Name = Annotated[str, Field(min_length=1, max_length=80)]
 
 
 @dataclass(frozen=True)
@@ -25,9 +33,9 @@ class NoiseTerm:
     """
 
     kind: Literal["noise"]
-    weight: float
-    wavelengths: list[float]
-    octaves: list[int]
+    weight: Size
+    wavelengths: list[Length]
+    octaves: list[Octaves]
     biases: list[float]
 
 
@@ -43,11 +51,11 @@ class RangeTerm:
     """
 
     kind: Literal["height", "slope"]
-    weight: float
-    material: int
+    weight: Size
+    material: Natural
     low: float | None
     high: float | None
-    soft: float
+    soft: Length
 
 
 @dataclass(frozen=True)
@@ -63,29 +71,29 @@ class ImageTerm:
     """
 
     kind: Literal["image"]
-    weight: float
-    file: str
-    bytes: int
-    sha256: str
-    rows: int
-    columns: int
-    width: float
+    weight: Size
+    file: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+\.bin$")]
+    bytes: Natural
+    sha256: Digest
+    rows: Pixels
+    columns: Pixels
+    width: Length
     beyond: Literal["mirror", "clamp"]
 
 
 @dataclass(frozen=True)
-class JitterEntry:
+class JitterEntry(Entry):
     """Fine noise that frays the borders of classes: its widest octave has `cells` cells along a tile's side, each next
     one twice as many; scores change by `amplitude` at most.
     """
 
-    cells: int
-    octaves: int
-    amplitude: float
+    cells: Pixels
+    octaves: Octaves
+    amplitude: Size
 
 
 @dataclass(frozen=True)
-class RiseEntry:
+class RiseEntry(Entry):
     """How far what rises above the ground reaches over a border of classes.
 
     Attributes:
@@ -95,14 +103,17 @@ class RiseEntry:
         clearance: by material, the relief of the ground itself, which gains nothing.
     """
 
-    slope: float
-    most: float
+    slope: Size
+    most: Size
     ground: list[float]
-    clearance: list[float]
+    clearance: list[Size]
+
+
+RuleTerm = Annotated[NoiseTerm | RangeTerm | ImageTerm, Field(discriminator="kind")]
 
 
 @dataclass(frozen=True)
-class ClassesEntry:
+class ClassesEntry(Entry):
     """Which material lies where: a sum of terms, and the transition between two materials.
 
     Attributes:
@@ -113,11 +124,11 @@ class ClassesEntry:
             the manifest of a page.
     """
 
-    salt: int
-    rule: list[NoiseTerm | RangeTerm | ImageTerm]
+    salt: Salt
+    rule: Annotated[list[RuleTerm], Field(min_length=1, max_length=64)]
     jitter: JitterEntry
     rise: RiseEntry
-    painted: list[list[int]] = field(default_factory=list)
+    painted: Annotated[list[list[int]], Field(max_length=MAX_PAINTED)] = field(default_factory=list)
 
     def find_faults(self, materials: int) -> Iterator[str]:
         """What does not fit a number of materials."""
@@ -150,7 +161,7 @@ def find_run_fault(runs: Sequence[Sequence[int]], materials: int) -> str | None:
 
 
 @dataclass(frozen=True)
-class ObjectOrders:
+class ObjectOrders(Entry):
     """An object on the terrain.
 
     Attributes:
@@ -164,13 +175,13 @@ class ObjectOrders:
         chunks: one a level.
     """
 
-    name: str
-    radius: float
-    z: list[float]
+    name: Name
+    radius: Length
+    z: Pair
     ground: float
-    material: int
-    density: float
-    probability: float
+    material: Natural
+    density: Size
+    probability: Share
     chunks: Sequence[ChunkOrders]
 
 
@@ -178,11 +189,11 @@ class ObjectOrders:
 class ObjectEntry(ObjectOrders):
     """An object whose chunks are files."""
 
-    chunks: Sequence[ChunkEntry]
+    chunks: Annotated[Sequence[ChunkEntry], Field(min_length=1)]
 
 
 @dataclass(frozen=True)
-class ScatterEntry:
+class ScatterEntry(Entry):
     """Where objects stand.
 
     Attributes:
@@ -192,7 +203,7 @@ class ScatterEntry:
         salt: of the hashes, 32 bits.
     """
 
-    cells: int
-    turn: float
-    size: float
-    salt: int
+    cells: Annotated[int, Field(ge=1, le=64)]
+    turn: Annotated[float, Field(ge=0, le=180)]
+    size: Annotated[float, Field(ge=0, lt=1)]
+    salt: Salt

@@ -1,45 +1,68 @@
 """davgswt.json: the manifest of a bundle, the only contract between the pipeline and a viewer.
 
-The classes here are the JSON objects of the file, with the same keys in the same order. The JSON schema
-(workflow/schemas/davgswt.schema.json) checks types and bounds, on writing and on reading; `check_manifest` also
-checks what belongs together. All lengths are in the bundle's unit, z is up, and x, y of a tile count from its
-south-western corner.
+The classes here are the JSON objects of the file, with the same keys in the same order. Their types hold
+the bounds of the values, which `Manifest.from_dict` checks with what belongs together;
+workflow/schemas/davgswt.schema.json is generated from them. All lengths are in the bundle's unit, z is
+up, and x, y of a tile count from its south-western corner.
 """
 
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import KW_ONLY, asdict, dataclass, field
-from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from jsonschema import Draft202012Validator
-from jsonschema.exceptions import best_match
+from pydantic import AfterValidator, Field, TypeAdapter, WithJsonSchema
 
 from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders, chunk_size
-from dav_gswt.bundle.encoding import POSITION_STEPS, SCALE_STEPS, Encoding, EncodingErrors
-from dav_gswt.bundle.land_cover import ClassesEntry, ObjectEntry, ObjectOrders, ScatterEntry
+from dav_gswt.bundle.encoding import (
+    POSITION_STEPS,
+    SCALE_STEPS,
+    Colour,
+    Encoding,
+    EncodingErrors,
+    Entry,
+    Length,
+    Natural,
+    Pair,
+    Share,
+    Size,
+)
+from dav_gswt.bundle.land_cover import ClassesEntry, Name, ObjectEntry, ObjectOrders, Salt, ScatterEntry
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import parse_record, read_json
 
 NAME = "davgswt.json"
 FORMAT, VERSION = "davgswt", 3
-READABLE = (2, VERSION)  # version 2 has one material, which it does not name
 ONLY_MATERIAL = "ground"  # the name of the material of a set that has one
 MAX_BYTES = 1 << 26  # of a manifest
 FARTHEST, MAX_LOG_SCALE = 1e9, 60.0  # of lengths, whose squares single precision keeps; of logarithms of deviations
+SURFACES = ("flat", "hills", "image", "sphere")  # kinds of the surface under the tiles
+
+
+Direction = Annotated[list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=3, max_length=3)]
+
+
+def _check_surface(heights: dict[str, Any]) -> dict[str, Any]:
+    if heights.get("kind") not in SURFACES:
+        raise ValueError(f"kind must be one of {', '.join(SURFACES)}")
+    return heights
+
+
+_SURFACE_SCHEMA = {"type": "object", "required": ["kind"], "properties": {"kind": {"enum": [*SURFACES]}}}
+Surface = Annotated[dict[str, Any], AfterValidator(_check_surface), WithJsonSchema(_SURFACE_SCHEMA)]
 
 
 @dataclass(frozen=True)
-class Sky:
+class Sky(Entry):
     """sRGB colours, in [0, 1], of the sky straight up and at the horizon."""
 
-    zenith: list[float] = field(default_factory=lambda: [0.36, 0.55, 0.8])
-    horizon: list[float] = field(default_factory=lambda: [0.78, 0.84, 0.88])
+    zenith: Colour = field(default_factory=lambda: [0.36, 0.55, 0.8])
+    horizon: Colour = field(default_factory=lambda: [0.78, 0.84, 0.88])
 
 
 @dataclass(frozen=True)
-class LevelEntry:
+class LevelEntry(Entry):
     """One level of detail.
 
     Attributes:
@@ -49,21 +72,21 @@ class LevelEntry:
         band: half the width of the cross-fade about `distance`.
     """
 
-    level: int
-    mean_scale: float
-    distance: float | None
-    band: float
+    level: Natural
+    mean_scale: Length
+    distance: Length | None
+    band: Size
 
 
 @dataclass(frozen=True)
-class TileOrders:
+class TileOrders(Entry):
     """One tile: its number 16 c + 8 W + 4 N + 2 E + S of variant c and the colours of its edges, its mean uncertainty
     in [0, 1], the lowest and highest z of its Gaussians, and the orders of its chunks, one a level.
     """
 
-    tile: int
-    uncertainty: float
-    z: list[float]
+    tile: Natural
+    uncertainty: Share
+    z: Pair
     chunks: Sequence[ChunkOrders]
 
 
@@ -71,24 +94,24 @@ class TileOrders:
 class TileEntry(TileOrders):
     """A tile whose chunks are files."""
 
-    chunks: Sequence[ChunkEntry]
+    chunks: Annotated[Sequence[ChunkEntry], Field(min_length=1)]
 
 
 @dataclass(frozen=True)
-class MaterialEntry:
+class MaterialEntry(Entry):
     """A material: its name, its share of the ground, the number of its first tile and its mean sRGB colour.
 
     Its tile T has the number first_tile + T, with T = 16 c + 8 W + 4 N + 2 E + S; all materials have as many tiles.
     """
 
-    name: str
-    share: float
-    first_tile: int
-    ground_colour: list[float]
+    name: Name
+    share: Share
+    first_tile: Natural
+    ground_colour: Colour
 
 
 @dataclass(frozen=True)
-class TileSetInfo:
+class TileSetInfo(Entry):
     """How a tile set is placed and drawn: all that a terrain needs beside the Gaussians.
 
     Attributes:
@@ -105,14 +128,14 @@ class TileSetInfo:
         scatter: where objects stand; None without objects.
     """
 
-    tile_side: float
-    salt: int
-    eye_floor: float
-    ground_colour: list[float]
-    directions: list[list[float]]
-    levels: list[LevelEntry]
+    tile_side: Length
+    salt: Salt
+    eye_floor: Length
+    ground_colour: Colour
+    directions: Annotated[list[Direction], Field(min_length=1)]
+    levels: Annotated[list[LevelEntry], Field(min_length=1, max_length=16)]
     tiles: Sequence[TileOrders]
-    materials: list[MaterialEntry]
+    materials: Annotated[list[MaterialEntry], Field(min_length=1, max_length=8)]
     _: KW_ONLY
     classes: ClassesEntry | None = None
     objects: Sequence[ObjectOrders] | None = None
@@ -130,15 +153,15 @@ class RoundingErrors(EncodingErrors):
 
 
 @dataclass(frozen=True)
-class OrdersReport:
+class OrdersReport(Entry):
     """Rings of directions: elevations in degrees below the horizon, azimuths of a ring, the tau from which a tile keeps
     all of them, the PSNR that was asked for, and the PSNR of pictures drawn in a neighbour's order (None: no
     difference).
     """
 
-    elevations: list[float]
-    azimuths: int
-    tau: float
+    elevations: Annotated[list[Annotated[float, Field(ge=0, le=90)]], Field(min_length=1)]
+    azimuths: Annotated[int, Field(ge=2)]
+    tau: Share
     wanted_db: float
     walker_db: float | None
     oblique_db: float | None
@@ -159,17 +182,19 @@ class Manifest(TileSetInfo):
         heights: of the surface under the tiles; only in the manifest of a page.
     """
 
-    tiles: Sequence[TileEntry]
-    objects: Sequence[ObjectEntry] | None = field(default=None, kw_only=True)
-    format: str
-    version: int
-    unit: str
+    tiles: Annotated[Sequence[TileEntry], Field(min_length=16)]
+    objects: Annotated[Sequence[ObjectEntry], Field(min_length=1, max_length=256)] | None = field(
+        default=None, kw_only=True
+    )
+    format: Literal["davgswt"]
+    version: Literal[3]
+    unit: Annotated[str, Field(min_length=1)]
     sky: Sky
     encoding: Encoding
     error: RoundingErrors
     orders: OrdersReport
     provenance: dict[str, Any]
-    heights: dict[str, Any] | None = None
+    heights: Surface | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON object."""
@@ -182,31 +207,24 @@ class Manifest(TileSetInfo):
         return value
 
     @classmethod
-    def from_dict(cls, value: dict[str, Any]) -> "Manifest":
-        """The manifest of a JSON object. Raises: ValueError: not one that `check_manifest` has passed."""
-        return parse_record(value, cls)
+    def from_dict(cls, value: Any, name: Path | str = NAME) -> "Manifest":
+        """The manifest of a JSON object. Raises: InputError: the key and what is wrong with it; name: of the file."""
+        try:
+            manifest = parse_record(value, cls)
+        except ValueError as error:
+            raise InputError(f"{name}: {summarize_error(error)}; make the bundle again") from error
+        for fault in _find_faults(manifest):
+            raise InputError(f"{name}: {fault}; make the bundle again")
+        return manifest
 
 
-def check_manifest(value: Any, schema: Path | str, name: Path | str = NAME) -> None:
-    """Check a manifest's JSON object against the JSON schema and its tables against one another.
-
-    Raises: InputError: the key and what is wrong with it.
-    """
-    rules = json.loads(Path(schema).read_text(encoding="utf-8"))
-    # the first error alone: a later keyword may take hours on what an earlier one refuses
-    if error := best_match(islice(Draft202012Validator(rules).iter_errors(value), 1)):
-        key = ".".join(str(p) for p in error.absolute_path)[:80] or "manifest"
-        raise InputError(f"{name}: {key}: {summarize_error(error.message)}; make the bundle again")
-    try:
-        manifest = Manifest.from_dict(value)
-    except ValueError as error:
-        raise InputError(f"{name}: {summarize_error(error)}; make the bundle again") from error
-    for fault in _find_faults(manifest):
-        raise InputError(f"{name}: {fault}; make the bundle again")
+def make_schema() -> str:
+    """The JSON schema of a manifest: workflow/schemas/davgswt.schema.json."""
+    return json.dumps(TypeAdapter(Manifest).json_schema(), indent=1) + "\n"
 
 
 def _find_faults(manifest: Manifest) -> Iterator[str]:
-    """What the schema cannot express."""
+    """What contradicts itself: the types of single values cannot express it."""
     levels, tiles, objects = manifest.levels, manifest.tiles, manifest.objects or []
     yield from _find_wrong_lengths(manifest)
     if [level.level for level in levels] != list(range(len(levels))):
@@ -227,6 +245,8 @@ def _find_faults(manifest: Manifest) -> Iterator[str]:
         for chunk in chunks:
             if chunk.bytes != chunk_size(chunk.count, len(chunk.orders)):
                 yield f"{chunk.file}: bytes do not fit count and orders"
+            if len(set(chunk.orders)) < len(chunk.orders):
+                yield f"{chunk.file}: an order is there twice"
             if max(chunk.orders) >= len(manifest.directions):
                 yield f"{chunk.file}: an order of a direction that is not there"
 
@@ -261,25 +281,15 @@ def _find_wrong_cover(manifest: Manifest) -> Iterator[str]:
         yield f"classes: {fault}"
 
 
-def upgrade_manifest(value: dict[str, Any]) -> dict[str, Any]:
-    """A manifest of version 2 as one of version 3: with its only material."""
-    if value.get("version") != 2:
-        return value
-    ground = {"name": ONLY_MATERIAL, "share": 1.0, "first_tile": 0, "ground_colour": value.get("ground_colour")}
-    return value | {"version": VERSION, "materials": [ground]}
-
-
-def read_manifest(folder: Path | str, schema: Path | str) -> Manifest:
+def read_manifest(folder: Path | str) -> Manifest:
     """Read and check a bundle's manifest.
 
-    Raises: InputError: missing, too large, no JSON, of another format or version, or see `check_manifest`.
+    Raises: InputError: missing, too large, no JSON, of another format or version, or see `Manifest.from_dict`.
     """
     path = Path(folder) / NAME
     if path.is_file() and path.stat().st_size > MAX_BYTES:
         raise InputError(f"{path}: {path.stat().st_size} bytes are no manifest; make the bundle again")
     value = read_json(path)
-    if not isinstance(value, dict) or value.get("format") != FORMAT or value.get("version") not in READABLE:
+    if not isinstance(value, dict) or value.get("format") != FORMAT or value.get("version") != VERSION:
         raise InputError(f"{path}: not a bundle of format {FORMAT!r}, version {VERSION}; make the bundle again")
-    value = upgrade_manifest(value)
-    check_manifest(value, schema, path)
-    return Manifest.from_dict(value)
+    return Manifest.from_dict(value, path)

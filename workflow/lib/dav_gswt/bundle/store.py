@@ -37,6 +37,6 @@ class Bundle:
         return [[self.chunk(t, level)[0] for t in tiles] for level in progress(levels, "read levels")]
 
 
-def read_bundle(folder: Path | str, schema: Path | str) -> Bundle:
+def read_bundle(folder: Path | str) -> Bundle:
     """Open a bundle. Raises: InputError: see `manifest.read_manifest`."""
-    return Bundle(Path(folder), read_manifest(folder, schema))
+    return Bundle(Path(folder), read_manifest(folder))

@@ -11,10 +11,8 @@ from dav_gswt.bundle.manifest import NAME as MANIFEST
 from dav_gswt.config.exports import Export, Format
 from dav_gswt.config.load import REFERENCE, check_model
 from dav_gswt.errors import InputError
-from dav_gswt.files import REPOSITORY
 
 GROUND = "ground"  # beside the formats of `export.formats`: the files of exports/ground
-SCHEMA = REPOSITORY / "workflow/schemas/davgswt.schema.json"
 SHORT = {"centre": "--at", "formats": "--format"}  # other names of options
 LISTS = {"centre": {"nargs": 2}, "corner": {"nargs": 2}, "formats": {"action": "append"}}
 
@@ -107,7 +105,7 @@ def _export(options: argparse.Namespace, settings: dict[str, Any], ground: bool)
         sets = read_material_tiles(result / "tiles", result / "seams.json")
     frame = next((file for folder in parents if (file := folder / "photos/ground.json").is_file()), None)
     reference = read_scene_frame(frame).georeference if frame else None
-    bundle = store.read_bundle(source, SCHEMA)
+    bundle = store.read_bundle(source)
     terrain, manifest = terrain_from_page(bundle), bundle.manifest
     if ground:
         ground_files.check_ground(terrain, manifest, sets, reference, settings)

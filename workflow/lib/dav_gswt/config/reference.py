@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from dav_gswt.bundle import manifest
 from dav_gswt.config.base import ANY, Place, Schema, iterate_tables
 from dav_gswt.config.model import Config
 from dav_gswt.views.policy_names import POLICY_SPECS
@@ -56,6 +57,7 @@ def make_reference() -> dict[str, str]:
         "docs/reference/config.md": f"{HEAD}\n\n{describe_tables(Config)}\n",
         "docs/reference/policies.md": describe_policies(),
         "workflow/schemas/config.schema.json": make_schema(),
+        "workflow/schemas/davgswt.schema.json": manifest.make_schema(),
     }
 
 

@@ -24,7 +24,6 @@ from dav_gswt.bundle import store as bundles
 from dav_gswt.errors import InputError
 from dav_gswt.export.splats import TILES_PER_ROW
 from dav_gswt.field import GaussianField, read_field
-from dav_gswt.files import REPOSITORY
 from dav_gswt.inspect.plot import Bar, Scene, to_bytes
 from dav_gswt.lod import store as levels
 from dav_gswt.reconstruction.ground import Ground
@@ -34,7 +33,6 @@ from dav_gswt.tiles.layout import EDGES, LABELS, arrange_torus
 
 Reader = Callable[..., Scene]
 READERS: dict[str, Reader] = {}
-SCHEMA = REPOSITORY / "workflow/schemas/davgswt.schema.json"
 MIN_OPACITY = 0.1  # peak opacity below which a Gaussian is left out: solids would hide what lies behind it
 FLAT_RATIO = 0.35  # a Gaussian whose least axis is shorter than this share of the middle one is drawn flat
 GAP = 0.2  # between two fields or tiles, in their widths
@@ -207,7 +205,7 @@ def read_tile_set(path: Path, *, most: int, colour: str | None = None, level: in
 @reader("davgswt.json")
 def read_bundle(path: Path, *, most: int, colour: str | None = None, level: int = 0) -> Scene:
     """The quantized tiles of a bundle, without cuts."""
-    bundle = bundles.read_bundle(path.parent, SCHEMA)
+    bundle = bundles.read_bundle(path.parent)
     return _arrange_tiles(path, bundle.fields(), bundle.manifest.tile_side, None, colour, level, most)
 
 

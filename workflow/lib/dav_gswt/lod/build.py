@@ -1,7 +1,8 @@
 """Build the levels of detail of a field: each is its finer neighbour, merged and then fitted to pictures of it.
 
-Pictures are rendered from above, from the side and at eye level. The fit changes colours, sizes and objects. Ground
-discs keep the mean height of the cells they cover: fitted heights are rough, and at eye level one disc hides the next.
+Pictures are rendered from above, from the side and at eye level. The fit changes colours, sizes and
+objects. Ground discs keep the mean height of the cells they cover: fitted heights are rough, and at eye
+level one disc hides the next.
 """
 
 import logging
@@ -43,7 +44,7 @@ def build_levels(
 ) -> Levels:
     """Fit as many coarser levels as are wanted and as the exemplar has room for.
 
-    Coarser levels are merged from each tile's own cells (`tiles.coarse_levels`), so a level is fitted only if it has at
+    Coarser levels are merged from each tile's own cells (`tiles.compose`), so a level is fitted only if it has at
     least MIN_CELLS cells across the exemplar. The first is always fitted: it gives every field a ground. With AUTO, a
     level that saves too few Gaussians is dropped.
 
@@ -58,24 +59,17 @@ def build_levels(
             stopped = f"level {number} would be {finer_grid.cells / 2:g} cells wide; tiles make it from their own cells"
             break
         level, coarse = fit_coarser_level(finer, finer_grid, steps, np.random.default_rng([seed, number]), keep)
-        if wanted == AUTO and (fault := _reason_to_drop(finer, level)):
-            wanted, stopped = number, f"level {number}: {fault}"
+        rises = mean_scale([level]) > mean_scale([finer])
+        if wanted == AUTO and not (rises and len(level) <= MAX_SHARE * len(finer)):
+            saved = f"it saves too little ({len(finer)} to {len(level)} Gaussians)"
+            wanted, stopped = number, f"level {number}: {saved if rises else 'its mean scale does not rise'}"
             break
-        if not mean_scale([level]) > mean_scale([finer]):
+        if not rises:
             raise InputError(f"levels: the mean scale does not rise from level {number - 1} to {number}; ask for fewer")
         fields.append(level)
         grids.append(coarse)
     _log.info("%d levels: %s", len(fields), stopped)
     return Levels(fields, grids, wanted, stopped)
-
-
-def _reason_to_drop(finer: GaussianField, level: GaussianField) -> str | None:
-    """Why a level is not kept; None if it is."""
-    if not mean_scale([level]) > mean_scale([finer]):
-        return "its mean scale does not rise"
-    if len(level) > MAX_SHARE * len(finer):
-        return f"it saves too little ({len(finer)} to {len(level)} Gaussians)"
-    return None
 
 
 def fit_coarser_level(

@@ -17,34 +17,23 @@ def material_folder(folder: Path | str, number: int) -> Path:
     return Path(folder, f"material{number}") if number else Path(folder)
 
 
-def write_levels(levels: Levels, folder: Path | str, provenance: dict) -> None:
-    """Write the levels; the folder appears whole or not at all."""
-    write_material_levels([levels], folder, provenance)
-
-
-def write_material_levels(sets: list[Levels], folder: Path | str, provenance: dict) -> None:
-    """Write the levels of several materials; the folder appears whole or not at all."""
+def write_levels(sets: list[Levels], folder: Path | str, provenance: dict) -> None:
+    """Write the levels of each material; the folder appears whole or not at all."""
     with atomic_folder(folder) as part:
-        for number, levels in enumerate(sets):
-            own = material_folder(part, number)
+        for material, levels in enumerate(sets):
+            own, table = material_folder(part, material), []
             own.mkdir(exist_ok=True)
-            _write_folder(levels, own, provenance)
-
-
-def _write_folder(levels: Levels, part: Path, provenance: dict) -> None:
-    for number, (fitted, grid) in enumerate(zip(levels.fields, levels.grids, strict=True)):
-        write_field(fitted, part / f"level{number}.ply")
-        ground.write_ground(grid, part / f"level{number}.exr")
-    table = [
-        {"level": number, "spacing": grid.spacing, "gaussians": len(f), "mean_scale": mean_scale([f])}
-        for number, (f, grid) in enumerate(zip(levels.fields, levels.grids, strict=True))
-    ]
-    content = {"wanted": levels.wanted, "levels": table, "stopped": levels.stopped, "provenance": provenance}
-    write_json(part / "levels.json", content)
+            for number, (f, grid) in enumerate(zip(levels.fields, levels.grids, strict=True)):
+                write_field(f, own / f"level{number}.ply")
+                ground.write_ground(grid, own / f"level{number}.exr")
+                entry = {"level": number, "spacing": grid.spacing, "gaussians": len(f), "mean_scale": mean_scale([f])}
+                table.append(entry)
+            content = {"wanted": levels.wanted, "levels": table, "stopped": levels.stopped, "provenance": provenance}
+            write_json(own / "levels.json", content)
 
 
 def read_material_levels(folder: Path | str) -> list[Levels]:
-    """Read what `write_material_levels` wrote. Raises: InputError: see `read_levels`."""
+    """Read what `write_levels` wrote. Raises: InputError: see `read_levels`."""
     sets = [read_levels(folder)]
     while material_folder(folder, len(sets)).is_dir():
         sets.append(read_levels(material_folder(folder, len(sets))))
@@ -52,7 +41,7 @@ def read_material_levels(folder: Path | str) -> list[Levels]:
 
 
 def read_levels(folder: Path | str) -> Levels:
-    """Read what `write_levels` wrote. Raises: InputError: a file is missing or not what levels.json says."""
+    """Read the levels of the first material. Raises: InputError: a file is missing or not what levels.json says."""
     folder = Path(folder)
     content = read_json(folder / "levels.json")
     try:
@@ -63,9 +52,8 @@ def read_levels(folder: Path | str) -> Levels:
     except (KeyError, TypeError, ValueError) as error:
         why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         raise InputError(f"{folder / 'levels.json'}: not a table of levels ({why}); make the levels again") from error
-    fields = [read_field(folder / f"level{number}.ply") for number in range(len(counts))]
+    names = [folder / f"level{number}" for number in range(len(counts))]
+    fields = [read_field(f"{name}.ply") for name in names]
     if [len(f) for f in fields] != counts:
         raise InputError(f"{folder}: the levels are not those that levels.json lists; make them again")
-    return Levels(
-        fields, [ground.read_ground(folder / f"level{number}.exr") for number in range(len(counts))], wanted, stopped
-    )
+    return Levels(fields, [ground.read_ground(f"{name}.exr") for name in names], wanted, stopped)

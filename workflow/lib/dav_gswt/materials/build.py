@@ -1,9 +1,9 @@
 """The materials of a field: their exemplars, the objects on them, and a verdict."""
 
 import logging
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +13,13 @@ from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
-from dav_gswt.materials import extraction, mask_images, outlines, segmentation, verdict
+from dav_gswt.materials import extraction, outlines, segmentation
 from dav_gswt.materials.borders import measure_bend, measure_fray
 from dav_gswt.materials.classes import GroundClasses, classify_ground
-from dav_gswt.materials.filling import CellSources, box_sums, fill_cells
-from dav_gswt.materials.maps import GroundMaps, measure_ground
+from dav_gswt.materials.filling import box_sums, fill_cells
+from dav_gswt.materials.maps import GroundMaps, measure_ground, read_masks
 from dav_gswt.materials.mobilesam import Segmenter
 from dav_gswt.materials.model import MaterialInfo
-from dav_gswt.materials.verdict import MaterialVerdict
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import energy, layout, patches, texture
 
@@ -34,13 +33,23 @@ SMALLEST_TILE = 0.22  # of the exemplar's side
 LEAST_AREAS = 0.5  # smallest tiles' areas of a material, of which less was photographed: it is left out
 ROOM = 1.6  # sides of a tile that an exemplar is wide at least
 PATCH, SMALLEST_PATCH = 3.0, 8  # side of a filling patch, in scales of the texture and in cells, at least
+GOOD, MARGINAL = 4.0, 2.0  # tile areas of a material that were photographed
+ROUNDING = 1e-6  # of areas: tiles are made so large that the scarcest material has MARGINAL of them
+
+
+@dataclass(frozen=True)
+class MaterialVerdict:
+    """Whether there is enough of a material: good, marginal or no; and the reason as a sentence for people."""
+
+    grade: str
+    reason: str
 
 
 @dataclass(frozen=True)
 class Material:
     """A material: what it is, its exemplar (a field whose grid has no margin), and whether there is enough of it.
 
-    filled: share of the exemplar's cells that show copies of others. pattern: see `texture.measure_pattern`.
+    filled: share of the exemplar's cells that show copies of others.
     """
 
     info: MaterialInfo
@@ -48,7 +57,6 @@ class Material:
     grid: Ground
     filled: float
     verdict: MaterialVerdict
-    pattern: float | None = None
 
 
 @dataclass(frozen=True)
@@ -81,19 +89,15 @@ class FoundMaterials:
 
 @dataclass(frozen=True)
 class _Parts:
-    """What all steps read."""
+    """What all steps read. features: weighed CIELAB of all cells."""
 
     field: GaussianField
     grid: Ground
     maps: GroundMaps
+    features: Float[Array, "m m k"]
     classes: GroundClasses
     tile_side: float
     seed: int
-
-    @cached_property
-    def features(self) -> Float[Array, "m m k"]:
-        """Weighed CIELAB of all cells."""
-        return segmentation.describe_cells(self.maps.colour)[..., :3]
 
 
 def find_materials(
@@ -105,22 +109,29 @@ def find_materials(
 ) -> FoundMaterials:
     """Find the materials of a field's exemplar and the objects on them.
 
-    mask_files: by material, or `exclude`; see `mask_images`. segmenter: of the outlines of objects; None: they are cut
-    by colour and height.
+    Ground of one material without objects is given back as it is. So are, with a warning, ground of
+    which nothing would be left to tile, and a field without a ground layer (an imported field, or ground
+    that is too rough for a layer).
 
-    Ground of one material without objects is given back as it is. So are, with a warning, ground of which nothing would
-    be left to tile, and a field without a ground layer (one that was imported, or of ground too rough for a layer).
+    Args:
+        mask_files: by material, or `exclude`; see `maps.read_masks`.
+        segmenter: finds the outlines of objects; None: they are cut by colour and height.
     """
     maps = measure_ground(field, grid)
     if not field.ground.any():
         _log.warning("materials: this field has no ground layer: all of the ground is tiled as one")
         return _keep_whole(field, grid, maps)
-    masks = mask_images.read_masks(mask_files, maps.cells) if mask_files else None
-    classes = _refine_objects(maps, classify_ground(maps, masks), segmenter)
+    masks = read_masks(mask_files, maps.cells) if mask_files else None
+    classes = classify_ground(maps, masks)
+    free = replace(maps, known=maps.known & ~classes.excluded)
+    refined = replace(classes, footprints=outlines.refine_footprints(free, classes.footprints, segmenter))
+    # what stood out beside the closer outlines is shown nowhere
+    classes = replace(refined, excluded=classes.excluded | (classes.occupied & ~refined.occupied))
     sources = [_ignore_scarce(classes, k) for k in range(classes.number)]
     if all(source.all() for source in sources) and masks is None:
         return _keep_whole(field, grid, maps)
-    parts = _Parts(field, grid, maps, classes, choose_tile_side(maps, sources), seed)
+    features = segmentation.describe_cells(maps.colour)[..., :3]
+    parts = _Parts(field, grid, maps, features, classes, choose_tile_side(maps, sources), seed)
     made = {k: _make_material(parts, k, sources[k]) for k in progress(range(classes.number), "fill materials")}
     kept = {k: each for k, each in made.items() if each is not None}
     if not kept:
@@ -128,21 +139,10 @@ def find_materials(
             "materials: nothing is left to tile (shade, objects or cut off): all of the ground is tiled as one"
         )
         return _keep_whole(field, grid, maps)
-    materials = _rescale_shares(list(kept.values()))
+    total = sum(each.info.share for each in kept.values())
+    materials = [replace(each, info=replace(each.info, share=each.info.share / total)) for each in kept.values()]
     objects = _extract_objects(parts, {k: place for place, k in enumerate(kept)})
-    strips = int(classes.kinds.max()) + 1 - classes.number
-    verdicts = {each.info.name: each.verdict for each in materials}
-    shares = {each.info.name: each.info.share for each in materials}
-    patterned = [each.info.name for each in materials if each.pattern]
-    judged = verdict.judge_set(verdicts, shares, float(classes.excluded.mean()), max(strips, 0), patterned)
-    return _report(FoundMaterials(maps, classes, parts.tile_side, materials, objects, judged))
-
-
-def _refine_objects(maps: GroundMaps, classes: GroundClasses, segmenter: Segmenter | None) -> GroundClasses:
-    """Closer outlines of objects, off excluded ground. What stood out beside them is excluded too."""
-    free = replace(maps, known=maps.known & ~classes.excluded)
-    refined = replace(classes, footprints=outlines.refine_footprints(free, classes.footprints, segmenter))
-    return replace(refined, excluded=classes.excluded | (classes.occupied & ~refined.occupied))
+    return _report(maps, classes, parts.tile_side, materials, objects)
 
 
 def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMaterials:
@@ -151,31 +151,39 @@ def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMa
     side = choose_tile_side(maps, [everything])
     colour = [float(value) for value in maps.colour.mean((0, 1))]
     info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, colour, None, None)
-    pattern = texture.measure_pattern(maps.colour)
-    judged = verdict.judge_material(info.name, (maps.cells / side) ** 2, 0.0, pattern)
+    judged = judge_material(info.name, (maps.cells / side) ** 2, 0.0)
     classes = GroundClasses(
         np.zeros(maps.known.shape, int), np.zeros(maps.known.shape, int), [], nothing, ["material0"]
     )
-    material = Material(info, field, grid, 0.0, judged, pattern)
-    judged_set = verdict.judge_set({info.name: judged}, {info.name: 1.0}, 0.0, 0, [info.name] if pattern else [])
-    return _report(FoundMaterials(maps, classes, None, [material], [], judged_set))
+    return _report(maps, classes, None, [Material(info, field, grid, 0.0, judged)], [])
 
 
-def _report(found: FoundMaterials) -> FoundMaterials:
-    for each in found.materials:
-        _log.info("%s: %s: %s", each.info.name, each.verdict.grade, each.verdict.reason)
-    _log.info("%d objects; %s: %s", len(found.objects), found.verdict.grade, found.verdict.reason)
-    return found
+def _report(
+    maps: GroundMaps,
+    classes: GroundClasses,
+    tile_side: float | None,
+    materials: list[Material],
+    objects: list[ExtractedObject],
+) -> FoundMaterials:
+    """What was found, with a verdict on all of it, which is logged."""
+    strips = max(int(classes.kinds.max()) + 1 - classes.number, 0)
+    verdicts = {each.info.name: each.verdict for each in materials}
+    shares = {each.info.name: each.info.share for each in materials}
+    judged = judge_set(verdicts, shares, float(classes.excluded.mean()), strips)
+    for name, each in verdicts.items():
+        _log.info("%s: %s: %s", name, each.grade, each.reason)
+    _log.info("%d objects; %s: %s", len(objects), judged.grade, judged.reason)
+    return FoundMaterials(maps, classes, tile_side, materials, objects, judged)
 
 
 def choose_tile_side(maps: GroundMaps, sources: list[Bool[Array, "m m"]]) -> float:
-    """Side of a tile in cells: by the texture of the first material; the area of the scarcest holds AREAS tiles of it.
+    """Side of a tile in cells: by the texture of the first material, smaller if a material has no AREAS of it.
 
-    At least SMALLEST_TILE of the exemplar's side. A material too scarce for AREAS even of these has no say: it would
-    make the others' tiles small for nothing.
+    It is at least SMALLEST_TILE of the exemplar's side. A material that has no AREAS even of such tiles
+    is ignored: it would make the tiles of the others small for nothing.
     """
     first = sources[0] if sources[0].any() else np.ones_like(sources[0])
-    by_texture, _ = texture.choose_sizes(_texture_scale(maps, first) / maps.cells)
+    by_texture, _ = texture.choose_sizes(texture.measure_texture_scale(_blur_others(maps, first)) / maps.cells)
     shares = [float(source.mean()) for source in sources]
     by_area = min([1.0, *(np.sqrt(share / AREAS) for share in shares if share >= AREAS * SMALLEST_TILE**2)])
     return float(max(SMALLEST_TILE, min(by_texture, by_area))) * maps.cells
@@ -198,45 +206,36 @@ def _make_material(parts: _Parts, number: int, own: Bool[Array, "m m"]) -> Mater
         return None
     row, column, cells = choose_window(own, parts.tile_side)
     window, source = parts.maps.crop(row, column, cells), own[row : row + cells, column : column + cells]
-    sources = _fill_window(window, source, parts.tile_side, np.random.default_rng([parts.seed, number]))
+    hidden = energy.make_occluder_layer(window.cover)
+    terms = energy.SeamEnergy("colour", 0.0, energy.make_colour_layer(window.colour), None, hidden).terms(1.0)
+    plan = layout.plan_layout(cells, 1, min(1.0, parts.tile_side / cells), 0.125)
+    features = patches.make_guidance(window.colour, window.height, np.zeros(source.shape), plan).features
+    rng = np.random.default_rng([parts.seed, number])
+    sources = fill_cells(features, terms, source, _choose_patch(window, source), rng)
     if sources is None:
         _log.warning("%s is too small and narrow to be tiled; it is left out", parts.classes.names[number])
         return None
     small = replace(grid, first_row=grid.first_row + row, first_column=grid.first_column + column, cells=cells)
     made, made_grid = extraction.extract_exemplar(parts.field, small, window, sources, source)
     filled = float(sources.copied.mean())
-    # with the excluded ground beside it: shade of a tree parts no material
-    patch_scale = _measure_patches(parts.classes.materials == number) * grid.spacing
     colour = [float(value) for value in parts.maps.colour[own].mean(0)]
-    share, (fray, bend) = float(parts.classes.shares[number]), _measure_borders(parts, number)
+    share = float(parts.classes.shares[number])
+    counted = parts.maps.known & ~parts.classes.excluded & ~parts.classes.occupied
+    whole = parts.classes.materials == number  # with the excluded ground in it: shade of a tree parts no material
+    patch_scale = _measure_patches(whole) * grid.spacing
+    fray = measure_fray(parts.features, whole, counted, parts.tile_side)
+    bend = measure_bend(whole, counted, parts.tile_side)
+    fray, bend = (None if value is None else value * grid.spacing for value in (fray, bend))
     info = MaterialInfo(parts.classes.names[number], share, patch_scale, colour, fray, bend)
-    pattern = texture.measure_pattern(_blur_others(window, source))
-    judged = verdict.judge_material(info.name, float(own.sum()) / parts.tile_side**2, filled, pattern)
-    return Material(info, made, made_grid, filled, judged, pattern)
-
-
-def _fill_window(
-    window: GroundMaps, source: Bool[Array, "m m"], tile_side: float, rng: np.random.Generator
-) -> CellSources | None:
-    colours = energy.make_colour_layer(window.colour)
-    hidden = energy.make_occluder_layer(window.cover)
-    terms = energy.SeamEnergy("colour", 0.0, colours, None, hidden).terms(1.0)
-    plan = layout.plan_layout(window.cells, 1, min(1.0, tile_side / window.cells), 0.125)
-    features = patches.make_guidance(window.colour, window.height, np.zeros(source.shape), plan).features
-    return fill_cells(features, terms, source, _choose_patch(window, source), rng)
-
-
-def _rescale_shares(materials: list[Material]) -> list[Material]:
-    """Shares that sum to 1 where a material was left out."""
-    total = sum(each.info.share for each in materials)
-    return [replace(each, info=replace(each.info, share=each.info.share / total)) for each in materials]
+    judged = judge_material(info.name, float(own.sum()) / parts.tile_side**2, filled)
+    return Material(info, made, made_grid, filled, judged)
 
 
 def choose_window(own: Bool[Array, "m m"], tile_side: float) -> tuple[int, int, int]:
     """South-western cell (row, column) and side of the square that a material's exemplar is made of.
 
-    The largest square that the material fills by OWN_SHARE, or else the smallest one; wide enough that patches of a
-    tile's side have places to choose from.
+    It is the largest square that the material fills by OWN_SHARE, or else the smallest one. Patches of a
+    tile's side have places to choose from in it.
     """
     m = len(own)
     unit = int(np.gcd(m, BLOCK))
@@ -253,13 +252,8 @@ def choose_window(own: Bool[Array, "m m"], tile_side: float) -> tuple[int, int, 
 def _choose_patch(maps: GroundMaps, source: Bool[Array, "m m"]) -> int:
     """Side of a patch in cells: some scales of the texture, and not too wide for the source."""
     width = 2 * float(distance_transform_edt(np.pad(source, 1)).max())
-    scale = _texture_scale(maps, source)
+    scale = texture.measure_texture_scale(_blur_others(maps, source))
     return int(np.clip(round(PATCH * scale), SMALLEST_PATCH, max(SMALLEST_PATCH, width / 3)))
-
-
-def _texture_scale(maps: GroundMaps, source: Bool[Array, "m m"]) -> float:
-    """Scale of the texture in cells."""
-    return texture.measure_texture_scale(_blur_others(maps, source))
 
 
 def _blur_others(maps: GroundMaps, source: Bool[Array, "m m"]) -> Float[Array, "m m 3"]:
@@ -267,16 +261,6 @@ def _blur_others(maps: GroundMaps, source: Bool[Array, "m m"]) -> Float[Array, "
     blur = texture.TREND * len(source)
     soft = [extraction.blur_over(layer, source, blur) for layer in np.moveaxis(maps.colour, -1, 0)]
     return np.where(source[..., None], maps.colour, np.dstack(soft))
-
-
-def _measure_borders(parts: _Parts, number: int) -> tuple[float | None, float | None]:
-    """Fray and bend of a material's borders, in world units."""
-    classes, spacing = parts.classes, parts.grid.spacing
-    counted = parts.maps.known & ~classes.excluded & ~classes.occupied
-    own = classes.materials == number
-    fray = measure_fray(parts.features, own, counted, parts.tile_side)
-    bend = measure_bend(own, counted, parts.tile_side)
-    return None if fray is None else fray * spacing, None if bend is None else bend * spacing
 
 
 def _measure_patches(own: Bool[Array, "m m"]) -> float:
@@ -301,3 +285,44 @@ def _extract_objects(parts: _Parts, index: dict[int, int]) -> list[ExtractedObje
         material = index[ground]
         objects.append(ExtractedObject(f"object{number:02d}", own, material, radius, height, density))
     return objects
+
+
+def judge_material(name: str, areas: float, filled: float) -> MaterialVerdict:
+    """The verdict on a material by the number of tile areas of it that were photographed.
+
+    filled: share of its exemplar that is made of patches.
+    """
+    areas *= 1 + ROUNDING
+    tenth = round(areas, 1)  # but never up to a bound that is not reached
+    tenth -= 0.1 * any(areas < bound <= tenth for bound in (GOOD, MARGINAL))
+    seen = f"{name} was photographed on {tenth:.1f} tile areas"
+    if areas >= GOOD:
+        return MaterialVerdict("good", seen)
+    times = math.ceil(10 * GOOD / max(areas, 0.1)) / 10  # up, for "1.0 times" asks for nothing
+    more = f"photograph {times:.1f} times as much of it"
+    if areas >= MARGINAL:
+        return MaterialVerdict("marginal", f"{seen}: repeats may be seen; {more}")
+    made = f", and {filled:.0%} of what its tiles are cut from is made of patches" if filled > 0.05 else ""
+    return MaterialVerdict("no", f"{seen}{made}: repeats will be seen; {more}, or leave it out")
+
+
+def judge_set(
+    verdicts: dict[str, MaterialVerdict], shares: dict[str, float], excluded: float, strips: int
+) -> MaterialVerdict:
+    """The verdict on all: that on the material that covers most. Materials of which there is too little are named.
+
+    Args:
+        verdicts, shares: by the materials' names.
+        excluded: share of ground that is shown nowhere.
+        strips: number of paths, roads and the like in it.
+    """
+    grade = verdicts[max(shares, key=lambda name: shares[name])].grade
+    if excluded > 0.5 and grade == "good":
+        reason = f"{excluded:.0%} of the ground is shade, rare or cut off, and shown nowhere"
+        return MaterialVerdict("marginal", reason)
+    several = "a path, road or the like" if strips == 1 else f"{strips} paths, roads or the like"
+    crossing = f", {several} among it" if strips else ""
+    many = "1 material" if len(verdicts) == 1 else f"{len(verdicts)} materials"
+    scarce = [name for name, verdict in verdicts.items() if verdict.grade == "no"]
+    lacking = f"; of {' and '.join(scarce)} there is too little" if scarce else ""
+    return MaterialVerdict(grade, f"{many}, {excluded:.0%} of the ground is shown nowhere{crossing}{lacking}")

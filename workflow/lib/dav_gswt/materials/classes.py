@@ -8,11 +8,8 @@ from numpy import ndarray as Array
 from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
 from dav_gswt.materials import objects, segmentation, standing
-from dav_gswt.materials.maps import GroundMaps
-from dav_gswt.materials.mask_images import NO_CLASS, GroundMasks
-from dav_gswt.materials.objects import Footprint
-from dav_gswt.materials.shade import find_shade, is_shade, linear_light
-from dav_gswt.materials.surroundings import Surroundings
+from dav_gswt.materials.maps import NO_CLASS, GroundMaps, GroundMasks, Surroundings, unite
+from dav_gswt.materials.objects import Footprint, find_shade, is_shade, linear_light
 
 MAX_MATERIALS = 4
 LEAST_SHARE = 0.05  # of the exemplar, of a material
@@ -33,11 +30,12 @@ class GroundClasses:
     """The classes of an exemplar's cells.
 
     Attributes:
-        materials: of every cell, by number; cells of objects and of excluded ground have the nearest one's.
+        materials: of every cell, by number; cells of objects and of excluded ground have the nearest
+            cell's.
         footprints: the objects.
         excluded: cells that are shown nowhere: shade, what is rare or cut off, ground that no photo saw.
-        kinds: what every cell is: its material's number, also of small pieces within another material, which are
-            excluded there; from `number` on each strip (a path, a road).
+        kinds: what every cell is: its material's number, also of small pieces within another material,
+            which are excluded there; from `number` on each strip (a path, a road).
         names: of the materials.
     """
 
@@ -55,10 +53,7 @@ class GroundClasses:
     @property
     def occupied(self) -> Bool[Array, "m m"]:
         """Cells of objects."""
-        cells = np.zeros(self.materials.shape, bool)
-        for footprint in self.footprints:
-            cells |= footprint.cells
-        return cells
+        return unite([each.cells for each in self.footprints], self.materials.shape)
 
     def source(self, material: int) -> Bool[Array, "m m"]:
         """Cells that a material is made of."""
@@ -74,12 +69,17 @@ class GroundClasses:
 def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> GroundClasses:
     """Find materials and objects.
 
-    A class is a material if it is wide somewhere, common enough, and not the shade of another; at most MAX_MATERIALS
-    are kept, the largest. Without any, all of the ground is one material. What is left is objects and excluded ground.
-    masks: drawn by people; materials that they name are taken as they are, and ground that they do not is excluded.
+    A class is a material if it is wide somewhere, common enough, and not the shade of another; at most
+    MAX_MATERIALS are kept, the largest. If no class is one, all of the ground is one material. Other
+    cells are objects or excluded ground.
+    masks: drawn by people. Materials that they name are taken as they are, and the rest is excluded.
     """
     features = segmentation.describe_cells(maps.colour)
-    ground = _name_ground(maps, masks) if masks and masks.materials else _segment_ground(maps, features[..., -1])
+    if masks and masks.materials:
+        classes, names = masks.label()
+        ground = _LabelledGround(classes, list(range(len(names))), names, np.zeros(classes.shape, bool), [])
+    else:
+        ground = _segment_ground(maps, features[..., -1])
     known = maps.known & (ground.classes != NO_CLASS)
     maps = replace(maps, known=known & ~masks.excluded if masks else known)
     around = _describe_surroundings(maps, features[..., :3], ground)
@@ -88,7 +88,7 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
     kinds = np.where(ground.pieces, np.searchsorted(ground.chosen, np.maximum(ground.classes, 0)), around.materials)
     for place, strip in enumerate(ground.strips):
         kinds[strip] = len(ground.chosen) + place
-    taken = np.any([excluded | around.strips, *(each.cells for each in footprints)], axis=0)
+    taken = unite([each.cells for each in footprints], known.shape) | excluded | around.strips
     if masks is None and around.rough == {0} and len(ground.chosen) == 1 and taken.mean() < LITTLE:
         return GroundClasses(around.materials, kinds, [], ~maps.known, ground.names)
     shown_nowhere = excluded & maps.known
@@ -100,7 +100,7 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
 
 @dataclass(frozen=True)
 class _LabelledGround:
-    """Classes of all cells, NO_CLASS: none; those that are materials; small pieces of these within others; strips."""
+    """Classes of all cells (or NO_CLASS), those that are materials, their small pieces within others, and strips."""
 
     classes: Int[Array, "m m"]
     chosen: list[int]
@@ -109,40 +109,23 @@ class _LabelledGround:
     strips: list[Bool[Array, "m m"]]
 
 
-def _name_ground(maps: GroundMaps, masks: GroundMasks) -> _LabelledGround:
-    """Ground as masks name it."""
-    classes, names = masks.label()
-    return _LabelledGround(classes, list(range(len(names))), names, np.zeros(maps.known.shape, bool), [])
-
-
 def _segment_ground(maps: GroundMaps, contrast: Float[Array, "m m"]) -> _LabelledGround:
-    """Ground by its looks. contrast: of the grain around each cell.
+    """Ground by its looks: the segmentation with the most materials, since a start of k-means may hide one in another.
 
-    Of the segmentations that which tells most materials apart, since a start of k-means may hide one in another.
+    contrast: of the grain around each cell.
     """
-    found = [(*each, _choose_apart(*each, maps, contrast)) for each in segmentation.list_segmentations(maps.colour)]
+    found = []
+    for classes, strips in segmentation.list_segmentations(maps.colour):
+        apart = np.where(unite(strips, classes.shape), NO_CLASS, classes)
+        found.append((classes, strips, choose_materials(apart, maps.colour, contrast)))
     classes, strips, chosen = max(found, key=lambda each: len(each[-1]))  # of several the first: it explains most
     names = [f"material{k}" for k in range(len(chosen))]
     return _LabelledGround(classes, chosen, names, find_scattered(classes, chosen), strips)
 
 
-def _choose_apart(
-    classes: Int[Array, "m m"], strips: list[Bool[Array, "m m"]], maps: GroundMaps, contrast: Float[Array, "m m"]
-) -> list[int]:
-    """The materials of a segmentation, its strips left out."""
-    apart = np.where(_unite(strips, classes.shape), NO_CLASS, classes)
-    return choose_materials(apart, maps.colour, contrast)
-
-
-def _unite(strips: list[Bool[Array, "m m"]], shape: tuple[int, ...]) -> Bool[Array, "m m"]:
-    """Cells of any strip."""
-    return np.any([np.zeros(shape, bool), *strips], axis=0)
-
-
 def _describe_surroundings(maps: GroundMaps, features: Float[Array, "m m 3"], ground: _LabelledGround) -> Surroundings:
-    """What things are judged by."""
     classes, chosen = ground.classes, ground.chosen
-    crossing = _unite(ground.strips, classes.shape)
+    crossing = unite(ground.strips, classes.shape)
     wide = np.isin(classes, chosen) & maps.known & ~ground.pieces & ~crossing
     nearest = tuple(distance_transform_edt(~wide, return_distances=False, return_indices=True))
     materials = np.searchsorted(chosen, classes[nearest])
@@ -158,10 +141,7 @@ def _describe_surroundings(maps: GroundMaps, features: Float[Array, "m m 3"], gr
 def _find_halos(
     features: Float[Array, "m m 3"], ground: Bool[Array, "m m"], materials: Int[Array, "m m"]
 ) -> Bool[Array, "m m"]:
-    """Cells beside the ground of a material and of its colour, that are of another class by their grain.
-
-    Around a thing the contrast of the grain is that of the thing.
-    """
+    """Cells that are of another class only by the contrast of a thing beside them: near ground of their own colour."""
     near = distance_transform_edt(~ground) <= HALO * len(ground)
     found = np.zeros_like(ground)
     for number in np.unique(materials[ground]):
@@ -175,20 +155,18 @@ def _widen(excluded: Bool[Array, "m m"], footprints: list[Footprint]) -> Bool[Ar
     if not excluded.any():
         return excluded
     wide = binary_dilation(excluded, iterations=max(1, round(RIM * len(excluded))))
-    for each in footprints:
-        wide &= ~each.cells
-    return wide | excluded
+    return wide & ~unite([each.cells for each in footprints], excluded.shape) | excluded
 
 
 def _find_outstanding(maps: GroundMaps, around: Surroundings) -> Bool[Array, "m m"]:
-    """Cells that are no ground of a material, or stand out of a smooth one that is not dense with such."""
+    """Cells that are no ground of a material, or stand out of a smooth one that is not dense with such cells."""
     things = ~around.ground & maps.known & ~around.strips
     for number in np.unique(around.materials):
         own = around.materials == number
         found = things & own
         if number not in around.rough:
             found |= objects.find_outliers(around.features, maps, own & around.ground)
-        things = things & ~own | (found & own)
+        things = things & ~own | found
         if objects.is_dense(found & around.ground, own):
             things = things & ~(own & around.ground)
     return things
@@ -209,14 +187,13 @@ def find_scattered(classes: Int[Array, "m m"], chosen: list[int]) -> Bool[Array,
 def find_growth(classes: Int[Array, "m m"], chosen: list[int]) -> Bool[Array, "m m"]:
     """Cells of classes that are nowhere wide and together dense, as the flowers of a meadow: texture of a material.
 
-    Where much of them lies together without plain ground between, as the crowns of a wood do, that is no texture; but
-    ground on which not even a material is wide has classes of texture alone.
+    Where much of them lies together without plain ground between, as the crowns of a wood do, that is
+    no texture; but on ground where no material is wide, all classes are texture.
     """
     m = len(classes)
     widths = {number: _measure_width(classes == number) for number in range(int(classes.max()) + 1)}
-    growth = np.isin(
-        classes, [number for number, width in widths.items() if width < LEAST_WIDTH * m and number not in chosen]
-    )
+    narrow = [number for number, width in widths.items() if width < LEAST_WIDTH * m and number not in chosen]
+    growth = np.isin(classes, narrow)
     wooded = _find_wide_parts(growth, WOOD * m).sum() > WOODED * growth.sum()
     if wooded and max(widths[number] for number in chosen) >= LEAST_WIDTH * m:
         growth &= ~_find_wide_parts(growth, CROWNS * m)
@@ -237,9 +214,9 @@ def _measure_width(cells: Bool[Array, "m m"]) -> float:
 def choose_materials(
     classes: Int[Array, "m m"], colour: Float[Array, "m m 3"], contrast: Float[Array, "m m"]
 ) -> list[int]:
-    """Numbers of the classes that are materials, ascending; classes are numbered by descending share.
+    """Numbers of the classes that are materials, ascending.
 
-    classes: NO_CLASS: cells that are judged apart, of strips. contrast: of the grain around each cell.
+    classes: by descending share; NO_CLASS for cells of strips. contrast: of the grain around each cell.
     """
     m, chosen = len(classes), []
     for number in range(int(classes.max()) + 1):

@@ -1,8 +1,9 @@
 """Fill cells of an exemplar with patches of other cells: which cell each of them copies.
 
-Square patches of the source are placed along the rim of the hole, where most is known around, and joined to it along
-the cheapest seam (Kwatra et al. 2003, "Graphcut textures"; the order is that of Criminisi et al. 2004). Of many places
-the one is taken that differs least from what is known, with a charge for ground that other patches show already.
+Square patches of the source are placed along the rim of the hole, where most is known around, and joined
+to it along the cheapest seam (Kwatra et al. 2003, "Graphcut textures", in the order of Criminisi et al.
+2004). A patch comes from the place that differs least from what is known, with a charge for ground that
+other patches show already.
 """
 
 from collections.abc import Sequence
@@ -12,8 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
-from dav_gswt.tiles import cuts
-from dav_gswt.tiles.energy import CostLayer, compute_edge_costs
+from dav_gswt.tiles.energy import CostLayer, compute_edge_costs, find_cut
 from dav_gswt.tiles.patches import divide_by_median
 
 CANDIDATES = 160  # places that are compared for a patch
@@ -90,25 +90,18 @@ class _Filling:
 
     def __init__(self, features, terms, source, places, patch: int, rng: np.random.Generator):
         self.features, self.terms, self.places, self.patch, self.rng = features, terms, places, patch, rng
-        whole = CellSources.identity(len(source))
-        self.rows, self.columns = whole.rows.copy(), whole.columns.copy()
+        self.rows, self.columns = np.mgrid[: len(source), : len(source)]
         self.known = source.copy()
         self.shown = np.zeros(source.shape)  # how often each cell has been copied
-        step = max(1, patch // 2)
         last = len(source) - patch
-        starts = np.unique(np.append(np.arange(0, last + 1, step), last))
-        self.grid = np.ix_(starts, starts)
-        self.starts = starts
+        self.starts = np.unique(np.append(np.arange(0, last + 1, max(1, patch // 2)), last))
 
     def next_corner(self) -> tuple[int, int] | None:
         """Where the next patch goes: of the places on a grid that are not full, the one with most known cells."""
-        counts = box_sums(self.known, self.patch)[self.grid]
+        counts = box_sums(self.known, self.patch)[np.ix_(self.starts, self.starts)]
         counts = np.where(counts == self.patch**2, -1, counts)
-        best = int(counts.argmax())
-        if counts.ravel()[best] < 0:
-            return None
-        row, column = divmod(best, len(self.starts))
-        return int(self.starts[row]), int(self.starts[column])
+        row, column = np.unravel_index(int(counts.argmax()), counts.shape)
+        return None if counts.max() < 0 else (int(self.starts[row]), int(self.starts[column]))
 
     def place_patch(self, row: int, column: int) -> None:
         """Choose a patch for a place, cut it against what is known there, and copy it."""
@@ -148,4 +141,4 @@ class _Filling:
         keep = known & rim
         if not keep.any():
             return ~known if known.any() else np.ones_like(known)
-        return cuts.find_cut(*compute_edge_costs(self.terms, here, there), keep, ~known).labels
+        return find_cut(*compute_edge_costs(self.terms, here, there), keep, ~known).labels

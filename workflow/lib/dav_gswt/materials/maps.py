@@ -1,19 +1,27 @@
-"""Maps of an exemplar, one value a finest cell, row 0 in the south: what materials and objects are found by."""
+"""Maps of an exemplar, one value a finest cell, row 0 in the south; and masks that people draw over it."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt
 
+from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
+from dav_gswt.images import image_files
 from dav_gswt.reconstruction import top_view
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.tiles import build, occluders
+from dav_gswt.tiles.compose import compute_cover, compute_ground_maps
 from dav_gswt.tiles.layout import Exemplar
 
 UNKNOWN = 0.9  # uncertainty from which nothing is known of a cell
+EXCLUDE = "exclude"  # name of the mask of ground that is shown nowhere
+NO_CLASS = -1  # of cells that belong to no material
+HALF = 0.5  # brightness from which a pixel of a mask counts
+ASPECT = 0.01  # a mask that is less square does not show the exemplar
 
 
 @dataclass(frozen=True)
@@ -21,9 +29,9 @@ class GroundMaps:
     """Maps of an exemplar.
 
     Attributes:
-        colour: seen from straight above, sRGB in [0, 1]; holes have the nearest cell's.
+        colour: seen from straight above, sRGB in [0, 1]; holes have the colour of the nearest cell.
         height: of the ground discs.
-        surface: height of what is seen from straight above: of the ground or of what stands on it.
+        surface: height of the ground or of what stands on it, seen from straight above.
         cover: share of a cell that is hidden by what stands there.
         known: cells that a photo saw.
         exemplar: its place and the width of its cells.
@@ -44,16 +52,55 @@ class GroundMaps:
         """The maps of a square within the exemplar."""
         own, box = self.exemplar, np.s_[row : row + cells, column : column + cells]
         corner = own.west + column * own.spacing, own.south + row * own.spacing
-        place = Exemplar(*corner, own.spacing, cells)
-        colour, height, surface = self.colour[box], self.height[box], self.surface[box]
-        return GroundMaps(colour, height, surface, self.cover[box], self.known[box], place)
+        maps = {name: value[box] for name, value in vars(self).items() if name != "exemplar"}
+        return replace(self, **maps, exemplar=Exemplar(*corner, own.spacing, cells))
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What single things on the ground are judged by, of every cell.
+
+    Attributes:
+        colour: sRGB in [0, 1].
+        features: weighed CIELAB.
+        rise: how far the surface lies above the ground around it, in cells.
+        materials: the nearest material.
+        ground: whether it is ground of a material.
+        pieces: whether it belongs to a small piece of one material within another.
+        strips: whether it belongs to a strip.
+        known: whether a photo saw it.
+        rough: numbers of the materials that are dense with growth or stones.
+    """
+
+    colour: Float[Array, "m m 3"]
+    features: Float[Array, "m m k"]
+    rise: Float[Array, "m m"]
+    materials: Int[Array, "m m"]
+    ground: Bool[Array, "m m"]
+    pieces: Bool[Array, "m m"]
+    strips: Bool[Array, "m m"]
+    known: Bool[Array, "m m"]
+    rough: frozenset[int]
+
+    def material_of(self, own: Bool[Array, "m m"]) -> int:
+        """The material that most of a thing lies on."""
+        return int(np.bincount(self.materials[own]).argmax())
+
+    def plain(self, material: int) -> Bool[Array, "m m"]:
+        """Ground of a material without things."""
+        return self.ground & (self.materials == material)
+
+
+def unite(parts: Sequence[Bool[Array, "m m"]], shape: tuple[int, ...]) -> Bool[Array, "m m"]:
+    """Cells of any of these parts; none if there are no parts."""
+    return np.any([np.zeros(shape, bool), *parts], axis=0)
 
 
 def measure_ground(field: GaussianField, grid: Ground) -> GroundMaps:
     """The maps of a field's exemplar."""
     exemplar = Exemplar.from_grid(grid)
     above = top_view.render_exemplar(field, grid)
-    _, height = build.compute_ground_maps(field, exemplar)
+    _, height = compute_ground_maps(field, exemplar)
     known = (above.alpha > top_view.MIN_ALPHA) & (above.uncertainty < UNKNOWN) & np.isfinite(height)
     if not known.any():
         known = np.ones_like(known)
@@ -61,4 +108,58 @@ def measure_ground(field: GaussianField, grid: Ground) -> GroundMaps:
     height = np.nan_to_num(height[nearest].astype(float))
     colour = np.clip(above.colour[nearest].astype(float), 0, 1)
     surface = above.height[nearest].astype(float)
-    return GroundMaps(colour, height, surface, occluders.compute_cover(field, exemplar, height), known, exemplar)
+    return GroundMaps(colour, height, surface, compute_cover(field, exemplar, height), known, exemplar)
+
+
+@dataclass(frozen=True)
+class GroundMasks:
+    """Masks over the cells of an exemplar.
+
+    materials: by name; where two overlap, the first counts. If there are none, materials are found
+    by their looks.
+    excluded: ground that is shown nowhere.
+    """
+
+    materials: Mapping[str, Bool[Array, "m m"]]
+    excluded: Bool[Array, "m m"]
+
+    def label(self) -> tuple[Int[Array, "m m"], list[str]]:
+        """Number of each cell's material, by descending share, or NO_CLASS; and the materials' names."""
+        labels = np.full(self.excluded.shape, NO_CLASS)
+        names = list(self.materials)
+        for number in reversed(range(len(names))):
+            labels[self.materials[names[number]]] = number
+        labels[self.excluded] = NO_CLASS
+        counts = [int((labels == number).sum()) for number in range(len(names))]
+        order = sorted((k for k in range(len(names)) if counts[k]), key=lambda k: -counts[k])
+        place = np.full(len(names) + 1, NO_CLASS)  # the last entry serves the cells without a material
+        place[order] = np.arange(len(order))
+        return place[labels], [names[k] for k in order]
+
+
+def read_masks(files: Mapping[str, Path | str], cells: int) -> GroundMasks:
+    """Read masks that were drawn over `ground.png`: north up, white where the ground is what the name says.
+
+    They may have any number of pixels, as long as they are square.
+    Raises: InputError: a mask is not readable, not square or white nowhere, or together they leave no ground.
+    """
+    masks = {name: _read_mask(path, cells) for name, path in files.items()}
+    excluded = masks.pop(EXCLUDE, np.zeros((cells, cells), bool))
+    if (excluded if not masks else ~np.any(list(masks.values()), axis=0) | excluded).all():
+        raise InputError(f"{', '.join(str(path) for path in files.values())}: these masks leave no ground to tile")
+    return GroundMasks(masks, excluded)
+
+
+def _read_mask(path: Path | str, cells: int) -> Bool[Array, "m m"]:
+    """One mask at the resolution of the exemplar."""
+    bright = image_files.read_photo(path).mean(-1)
+    height, width = bright.shape
+    if abs(width / height - 1) > ASPECT:
+        raise InputError(
+            f"{path}: is {width} x {height} pixels; a mask of materials is square, drawn over materials/ground.png"
+        )
+    at = (np.arange(cells) + 0.5) / cells
+    mask = bright[np.ix_((at * height).astype(int), (at * width).astype(int))][::-1] >= HALF
+    if not mask.any():
+        raise InputError(f"{path}: is white nowhere; paint what it names white and the rest black")
+    return mask

@@ -1,13 +1,13 @@
 """MobileSAM: the outline of the thing in a box, by networks in two ONNX files.
 
-SAM (Kirillov et al. 2023) with a small image encoder (Zhang et al. 2023). A picture is encoded once; each box is then a
-prompt of its own. Read by onnxruntime on the CPU, on one thread unless asked for more.
+The networks are SAM (Kirillov et al. 2023) with a small image encoder (Zhang et al. 2023). A picture
+is encoded once; each box is then a prompt of its own. onnxruntime runs them on the CPU.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
@@ -26,82 +26,52 @@ DECODER_INPUTS = {
     *("image_embeddings", "point_coords", "point_labels"),
     *("mask_input", "has_mask_input", "orig_im_size"),
 }
-DECODER_OUTPUTS = {"masks", "iou_predictions"}
 CORNERS = (2.0, 3.0)  # labels of the two corners of a box
 MOST_BYTES = 200 * 2**20  # of a file; the published ones have 27 and 16 MiB
 OUTSIDE = b"\x0a\x08location\x12"  # key of a tensor's values that lie in another file
 MOST_COVERED = 0.5  # of the picture, by a mask: more is the ground, not a thing on it
 LEAST_BOX_IOU = 0.5  # of the mask's bounding box with the prompt: less is another thing
 
-
-@runtime_checkable
-class Session(Protocol):
-    """What is used of onnxruntime's InferenceSession."""
-
-    def get_inputs(self) -> Sequence[Any]: ...
-    def get_outputs(self) -> Sequence[Any]: ...
-    def run(self, names: list[str] | None, feed: Mapping[str, Array]) -> Sequence[Array]: ...
-
-
-@dataclass(frozen=True)
-class Embedding:
-    """A picture as the decoder reads it. shape: rows and columns of the picture."""
-
-    values: Float32[Array, "1 256 64 64"]
-    shape: tuple[int, int]
-
-
-@dataclass(frozen=True)
-class PredictedMask:
-    """The thing in a box. predicted_iou: with the true mask, by the network's own estimate."""
-
-    cells: Bool[Array, "h w"]
-    predicted_iou: float
+BoxFinder = Callable[[Float[Array, "4"]], Bool[Array, "h w"] | None]
 
 
 @dataclass(frozen=True)
 class Segmenter:
-    """The two networks."""
+    """The two networks, as sessions of onnxruntime."""
 
-    encoder: Session
-    decoder: Session
+    encoder: Any
+    decoder: Any
 
-    def embed_image(self, picture: Float[Array, "h w 3"]) -> Embedding:
-        """Encode a picture, once for all of its boxes. picture: sRGB in [0, 1]."""
-        name = self.encoder.get_inputs()[0].name
-        values = np.asarray(self.encoder.run(None, {name: prepare_picture(picture)})[0], np.float32)
-        return Embedding(values, (picture.shape[0], picture.shape[1]))
+    def open_picture(self, picture: Float[Array, "h w 3"]) -> BoxFinder:
+        """Encode a picture (sRGB in [0, 1]); returns a function that finds the mask of the thing in a box.
 
-    def segment_boxes(self, embedding: Embedding, boxes: Float[Array, "n 4"]) -> list[PredictedMask | None]:
-        """The mask of each box; None where there is none to be trusted (`is_plausible`).
-
-        boxes: edges in pixels of the picture: first column, first row, end column, end row; pixel k reaches from k to
-        k + 1.
+        A box is its edges in pixels: first column, first row, end column, end row. The mask is None if
+        it is not plausible: see `is_plausible`.
         """
-        found = []
-        for box in boxes:
-            masks, scores = self._decode(embedding, box)
-            cells = masks[0, 0] > 0
-            found.append(PredictedMask(cells, float(scores.ravel()[0])) if is_plausible(cells, box) else None)
-        return found
+        shape = picture.shape[:2]
+        name = self.encoder.get_inputs()[0].name
+        embedding = np.asarray(self.encoder.run(None, {name: prepare_picture(picture)})[0], np.float32)
 
-    def _decode(self, embedding: Embedding, box: Float[Array, "4"]) -> tuple[Array, Array]:
-        feed = {
-            "image_embeddings": embedding.values,
-            "point_coords": scale_box(box, embedding.shape)[None],
-            "point_labels": np.array([CORNERS], np.float32),
-            "mask_input": np.zeros(LOGITS, np.float32),
-            "has_mask_input": np.zeros(1, np.float32),
-            "orig_im_size": np.array(embedding.shape, np.float32),
-        }
-        masks, scores = self.decoder.run(["masks", "iou_predictions"], feed)
-        if masks.shape != (1, 1, *embedding.shape) or not np.isfinite(scores).all():
-            raise InputError(f"config: segmenter: decoder.onnx: its masks are not those of MobileSAM; {ELSE}")
-        return masks, scores
+        def find(box: Float[Array, "4"]) -> Bool[Array, "h w"] | None:
+            feed = {
+                "image_embeddings": embedding,
+                "point_coords": scale_box(box, shape)[None],
+                "point_labels": np.array([CORNERS], np.float32),
+                "mask_input": np.zeros(LOGITS, np.float32),
+                "has_mask_input": np.zeros(1, np.float32),
+                "orig_im_size": np.array(shape, np.float32),
+            }
+            (masks,) = self.decoder.run(["masks"], feed)
+            if masks.shape != (1, 1, *shape):
+                raise InputError(f"config: segmenter: decoder.onnx: its masks are not those of MobileSAM; {ELSE}")
+            cells = masks[0, 0] > 0
+            return cells if is_plausible(cells, box) else None
+
+        return find
 
 
 def load_segmenter(encoder: Path | str, decoder: Path | str, threads: int = 1) -> Segmenter:
-    """The networks in two files.
+    """Open the networks in two files.
 
     Raises: InputError: a file is missing, too large, unreadable for onnxruntime, or of another network; onnxruntime is
     not installed.
@@ -111,12 +81,12 @@ def load_segmenter(encoder: Path | str, decoder: Path | str, threads: int = 1) -
     if len(inputs) != 1 or tuple(inputs[0].shape[1:]) != ENCODER_INPUT or tuple(outputs[0].shape) != EMBEDDING:
         raise InputError(f"{encoder}: is not the encoder of MobileSAM (inputs or outputs differ); {ELSE}")
     asked, given = ({each.name for each in ends} for ends in (second.get_inputs(), second.get_outputs()))
-    if asked != DECODER_INPUTS or not given >= DECODER_OUTPUTS:
+    if asked != DECODER_INPUTS or "masks" not in given:
         raise InputError(f"{decoder}: is not the decoder of MobileSAM (inputs or outputs differ); {ELSE}")
     return Segmenter(first, second)
 
 
-def _open_session(path: Path, threads: int) -> Session:
+def _open_session(path: Path, threads: int) -> Any:
     try:
         if path.stat().st_size > MOST_BYTES:
             raise InputError(f"{path}: has more than {MOST_BYTES} bytes, so it is not of MobileSAM; {ELSE}")
@@ -134,8 +104,7 @@ def _open_session(path: Path, threads: int) -> Session:
     options.use_deterministic_compute = True
     options.log_severity_level = 4  # errors are raised
     try:
-        session: Any = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-        return session
+        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime's own exceptions have no common base
         raise InputError(f"{path}: onnxruntime cannot read it ({summarize_error(error)}); {ELSE}") from error
 
@@ -162,15 +131,11 @@ def scale_box(box: Float[Array, "4"], shape: tuple[int, int]) -> Float32[Array, 
 
 
 def is_plausible(cells: Bool[Array, "h w"], box: Float[Array, "4"]) -> bool:
-    """Whether a mask is neither empty nor most of the picture, and fills about the box that it was asked for."""
+    """Whether a mask is neither empty nor most of the picture, and about fills the box of its prompt."""
     if not cells.any() or cells.mean() > MOST_COVERED:
         return False
     rows, columns = np.flatnonzero(cells.any(1)), np.flatnonzero(cells.any(0))
     own = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1], float)
-    return _box_iou(own, np.asarray(box, float)) >= LEAST_BOX_IOU
-
-
-def _box_iou(one: Float[Array, "4"], two: Float[Array, "4"]) -> float:
-    shared = np.minimum(one[2:], two[2:]) - np.maximum(one[:2], two[:2])
-    both = float(np.prod(np.maximum(shared, 0)))
-    return both / max(float(np.prod(one[2:] - one[:2]) + np.prod(two[2:] - two[:2])) - both, 1e-12)
+    both = np.prod(np.maximum(np.minimum(own[2:], box[2:]) - np.maximum(own[:2], box[:2]), 0))
+    areas = [np.prod(edges[2:] - edges[:2]) for edges in (own, box)]
+    return bool(both >= LEAST_BOX_IOU * (sum(areas) - both))

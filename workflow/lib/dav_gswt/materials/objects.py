@@ -1,6 +1,7 @@
 """Objects: single things within a material that differ from the ground around them, within a closed outline.
 
 Dense growth is texture, not objects: where much of a material is covered, nothing is taken out of it.
+Shade is neither: it may be other ground in less light.
 """
 
 from dataclasses import dataclass
@@ -19,9 +20,7 @@ from scipy.ndimage import (
     label,
 )
 
-from dav_gswt.materials.maps import GroundMaps
-from dav_gswt.materials.shade import is_shade, linear_light
-from dav_gswt.materials.surroundings import Surroundings
+from dav_gswt.materials.maps import GroundMaps, Surroundings, unite
 
 AROUND = 1 / 10  # of the side: blur that gives the ground around a thing
 ROUNDS = 3  # of the estimate of that ground, each without what stood out in the last
@@ -35,9 +34,7 @@ MIN_FILL = 0.35  # of its bounding box that an object fills
 MAX_STRETCH = 3.5  # length over width
 MIN_SOLIDITY, SPLIT_SOLIDITY = 0.7, 0.8  # of its convex hull that an object fills; below the second it is split
 RING = 3  # cells around an object
-SLENDER = (
-    1.0  # height over width: what is taller, as trees are, was hardly seen from the side and would be a haze there
-)
+SLENDER = 1.0  # height over width: what is taller was hardly seen from the side and would be a haze there
 OPEN, WITHIN = 0.45, 0.7  # share of these that is plain ground, and share of that which is its material's
 MANY = 0.5  # area of smaller things of a thing's colour over its own, from which it is the largest of many
 COMMON, NEAR = 0.15, 0.6  # share of a material that looks like a thing, from which it is texture; and how near that is,
@@ -46,6 +43,12 @@ ALIKE = 0.85  # cosine of the angle between the differences of two things of one
 MARKER, LEAST_CONTRAST = 2.2, 0.12  # contrast of a marker over its material's, and the least that this counts as
 OTHER = 0.5  # of what stands out, that is ground of another material: then it is a piece of that, not a thing
 DENSE = 0.25  # of a material that is covered by things: then they are texture
+SHADE = 0.75  # of a material's light, in every channel, at most: darker and bluer is its shade
+BLUER = 1.1  # ratio of blue light to red in the shade over that in the sun, at least
+RARE = 0.25  # of the ground, that its shade covers: more of it is texture
+LEAST_SHADE = 1.5e-3  # of the exemplar, of a piece of shade: what is between blades and stones is smaller
+BESIDE = 1 / 32  # of the side: as near to excluded ground dapples of its shade lie
+SOFT = 1 / 200  # of the side: blur of colours in which shade is sought
 
 
 @dataclass(frozen=True)
@@ -100,37 +103,30 @@ def find_footprints(
 ) -> tuple[list[Footprint], Bool[Array, "m m"]]:
     """Objects, and the cells of everything else that is no texture.
 
-    Things at the border of the exemplar are cut off, so they are no objects; nor are things that are long, frayed,
-    large or taller than wide, lie between two materials, are small pieces of another material, shade, or markers. On
-    rough ground what has the colour of much of it, and the largest of many specks, is texture.
-    Args: standing: cells of each thing that stands on the ground. candidates: cells that stand out by colour or height.
+    Things at the border of the exemplar are cut off, so they are no objects; nor are things that are
+    long, frayed, large or taller than wide, lie between two materials, are small pieces of another
+    material, shade, or markers. On rough ground the largest of many specks, and a thing of a colour
+    that much of the ground has, is texture.
+
+    Args:
+        standing: cells of each thing that stands on the ground.
+        candidates: cells that stand out by colour or height.
     Returns: footprints; cells to be filled beside them.
     """
-    m = len(candidates)
+    least = SMALLEST_STANDING * len(candidates)
     footprints, excluded = [], ~around.known
-    tall = [own for own in standing if _measure_size(own) >= SMALLEST_STANDING * m]
-    tall, flat = _join_rims(tall, candidates)
-    for own in tall:
+    tall, flat = _join_rims([own for own in standing if _measure_size(own) >= least], candidates)
+    small = [own for own in flat if _measure_size(own) < least]
+    for number, own in enumerate([*tall, *flat]):
         material = around.material_of(own)
-        if material in around.rough and _is_texture(own, material, around):
+        rough, stands = material in around.rough, number < len(tall)
+        piece = not stands and around.pieces[own].mean() >= OTHER
+        if not stands and _measure_size(own) < (least if rough else SMALLEST * len(candidates)):
             continue
-        if _is_single(own, material, around):
-            footprints.append(Footprint(own, material))
-        else:
-            excluded = excluded | own
-    small = [own for own in flat if _measure_size(own) < SMALLEST_STANDING * m]
-    for own in flat:
-        material, piece = around.material_of(own), around.pieces[own].mean() >= OTHER
-        rough = material in around.rough
-        if _measure_size(own) < (SMALLEST_STANDING if rough else SMALLEST) * m:
+        many = rough and not stands and not piece and _is_one_of_many(own, material, small, around)
+        if many or (rough and not piece and _is_texture(own, material, around)):
             continue
-        if (
-            rough
-            and not piece
-            and (_is_one_of_many(own, material, small, around) or _is_texture(own, material, around))
-        ):
-            continue
-        unwanted = piece or _is_shaded(own, material, around) or _is_marker(own, material, around)
+        unwanted = not stands and (piece or _is_shaded(own, material, around) or _is_marker(own, material, around))
         if not unwanted and _is_single(own, material, around):
             footprints.append(Footprint(own, material))
         else:
@@ -146,7 +142,7 @@ def _join_rims(
     What would make a thing less compact is not joined. A thing that has grown may touch more, until none grows.
     """
     while True:
-        taken = np.any([np.zeros_like(candidates), *(binary_dilation(own) for own in tall)], axis=0)
+        taken = unite([binary_dilation(own) for own in tall], candidates.shape)
         rest, grown = [], list(tall)
         for rim in split_things(_clean(candidates & ~taken) & ~taken):  # an annulus is not filled with its core
             around = binary_dilation(rim, iterations=2)
@@ -279,3 +275,44 @@ def _clean(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"]:
 def is_dense(things: Bool[Array, "m m"], ground: Bool[Array, "m m"]) -> bool:
     """Whether so much of a material is covered that the things are its texture."""
     return bool(ground.any() and things[ground].mean() > DENSE)
+
+
+def linear_light(colour: Float[Array, "n 3"]) -> Float[Array, "3"]:
+    """Mean linear light of sRGB colours."""
+    return _to_linear(colour).mean(0)
+
+
+def is_shade(light: Float[Array, "3"], other: Float[Array, "3"]) -> bool:
+    """Whether ground of this light may be the other in shade: darker in all channels, and bluer, as the sky is."""
+    return bool(_is_shaded_light(light[None] / np.maximum(other, 1e-6))[0])
+
+
+def find_shade(
+    colour: Float[Array, "m m 3"], ground: Bool[Array, "m m"], excluded: Bool[Array, "m m"]
+) -> Bool[Array, "m m"]:
+    """Cells of some ground that look like its shade: the dapples beside larger shade.
+
+    Small pieces are texture, and so is shade that is everywhere or has no excluded ground beside it, as
+    between tall grass. colour: sRGB in [0, 1]. excluded: ground that is shown nowhere already.
+    """
+    if not (ground.any() and excluded.any()):
+        return np.zeros_like(ground)
+    soft = gaussian_filter(colour, (SOFT * len(colour), SOFT * len(colour), 0), mode="nearest")
+    shade = ground & _is_shaded_light(_to_linear(soft) / np.maximum(np.median(_to_linear(soft[ground]), 0), 1e-6))
+    pieces, _ = label(binary_closing(shade))
+    near = binary_dilation(excluded, iterations=max(1, round(BESIDE * len(colour))))
+    large = np.bincount(pieces.ravel()) >= LEAST_SHADE * shade.size
+    large &= np.isin(np.arange(len(large)), pieces[near])
+    large[0] = False
+    found = large[pieces] & ground
+    return found if found.sum() < RARE * ground.sum() else np.zeros_like(ground)
+
+
+def _is_shaded_light(ratio: Float[Array, "... 3"]) -> Bool[Array, "..."]:
+    """Whether ratios of light are those of shade to sunlight."""
+    return (ratio.max(-1) < SHADE) & (ratio[..., 2] >= BLUER * ratio[..., 0]) & (ratio[..., 1] >= ratio[..., 0])
+
+
+def _to_linear(colour: Float[Array, "... 3"]) -> Float[Array, "... 3"]:
+    """Linear light of sRGB colours."""
+    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)

@@ -1,20 +1,27 @@
 """Outlines of objects, refined: by a segmenter that is prompted with an object's box, or by a graph cut.
 
-The cut separates an object from the ground around it (as GrabCut, Rother et al. 2004): what its core and a ring around
-it look like, in colour and height, and borders where the map has an edge.
+The cut separates an object from the ground around it (as GrabCut, Rother et al. 2004) by the colours
+and heights of both, with borders where the map has an edge.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 from scipy.cluster.vq import kmeans2
-from scipy.ndimage import binary_dilation, binary_fill_holes, binary_opening, distance_transform_edt, label
+from scipy.ndimage import (
+    binary_dilation,
+    binary_fill_holes,
+    binary_opening,
+    distance_transform_edt,
+    find_objects,
+    label,
+)
 from scipy.special import logsumexp
 
-from dav_gswt.materials.maps import GroundMaps
+from dav_gswt.materials.maps import GroundMaps, unite
 from dav_gswt.materials.mobilesam import Segmenter
 from dav_gswt.materials.objects import BORDER, Footprint
 
@@ -41,21 +48,24 @@ def refine_footprints(
 ) -> list[Footprint]:
     """The footprints in their order, each with a closer outline where one is found, else as it is.
 
-    A new outline is one piece, without holes, on known ground, apart from the border and from all other footprints, and
-    has LEAST_AGREEMENT with the old one. A segmenter may find that a footprint holds several objects: the others come
-    last. segmenter: None: by graph cut.
+    A new outline is one piece, without holes, on known ground, apart from the border and from all other
+    footprints, and has LEAST_AGREEMENT with the old one. A segmenter may find that a footprint holds
+    several objects: the others come last. segmenter: None: by graph cut.
     """
     if not footprints:
         return []
     find = _prompt_segmenter(maps, segmenter) if segmenter else _cut_objects(maps, footprints)
-    allowed = maps.known & _interior(maps.cells)
+    allowed = np.zeros_like(maps.known)
+    inside = np.s_[BORDER : maps.cells - BORDER]
+    allowed[inside, inside] = maps.known[inside, inside]
     taken, refined = np.sum([each.cells for each in footprints], axis=0, dtype=int), []
     for footprint in footprints:
         own = footprint.cells
         new = accept_outline(own, find(own), allowed & (taken - own == 0))
         taken = taken - own + (own if new is None else new)
         refined.append(footprint if new is None else replace(footprint, cells=new))
-    for rest in list(_list_rests(footprints, refined)) if segmenter else []:
+    rests = [rest for pair in zip(footprints, refined, strict=True) for rest in _list_rests(*pair)]
+    for rest in rests if segmenter else []:
         new = accept_outline(rest.cells, find(rest.cells), allowed & (taken == 0))
         if new is not None and binary_opening(new, np.ones((LEAST_WIDTH, LEAST_WIDTH), bool)).any():
             taken = taken + new
@@ -79,38 +89,25 @@ def accept_outline(
     return piece if agreement >= LEAST_AGREEMENT else None
 
 
-def _list_rests(before: list[Footprint], after: list[Footprint]) -> Iterator[Footprint]:
-    """Pieces of footprints that their new outlines left out, where they may be other objects."""
-    for old, new in zip(before, after, strict=True):
-        pieces, number = label(binary_opening(old.cells & ~new.cells, _square(old.cells, REST_WIDTH)))
-        for piece in range(1, number + 1):
-            if (pieces == piece).sum() >= LEAST_REST * old.cells.sum():
-                yield replace(old, cells=pieces == piece)
-
-
-def _square(cells: Bool[Array, "m m"], share: float) -> Bool[Array, "w w"]:
-    """A square whose side is a share of the root of an area."""
-    width = max(3, round(share * float(np.sqrt(cells.sum()))))
-    return np.ones((width, width), bool)
-
-
-def _interior(cells: int) -> Bool[Array, "m m"]:
-    inside = np.zeros((cells, cells), bool)
-    inside[BORDER : cells - BORDER, BORDER : cells - BORDER] = True
-    return inside
+def _list_rests(old: Footprint, new: Footprint) -> list[Footprint]:
+    """Pieces of a footprint that its new outline left out, where they may be other objects."""
+    area = int(old.cells.sum())
+    width = max(3, round(REST_WIDTH * area**0.5))
+    pieces, number = label(binary_opening(old.cells & ~new.cells, np.ones((width, width), bool)))
+    parts = [pieces == piece for piece in range(1, number + 1)]
+    return [replace(old, cells=part) for part in parts if part.sum() >= LEAST_REST * area]
 
 
 def _prompt_segmenter(maps: GroundMaps, segmenter: Segmenter) -> Finder:
     """Finds what is in a footprint's box. The segmenter is shown the map with north up."""
-    embedding = segmenter.embed_image(maps.colour[::-1])
+    find_in_box = segmenter.open_picture(maps.colour[::-1])
 
     def find(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"] | None:
         rows, columns = np.nonzero(cells[::-1])
         low = np.array([columns.min(), rows.min()]) - GROWN
         high = np.array([columns.max(), rows.max()]) + 1 + GROWN
-        box = np.clip(np.concatenate([low, high]), 0, maps.cells).astype(float)
-        (mask,) = segmenter.segment_boxes(embedding, box[None])
-        return None if mask is None else mask.cells[::-1]
+        mask = find_in_box(np.clip(np.concatenate([low, high]), 0, maps.cells).astype(float))
+        return None if mask is None else mask[::-1]
 
     return find
 
@@ -121,29 +118,20 @@ def _cut_objects(maps: GroundMaps, footprints: list[Footprint]) -> Finder:
 
     relief = maps.surface / maps.exemplar.spacing
     features = np.dstack([rgb2lab(maps.colour), HEIGHT_WEIGHT * relief])
-    near = binary_dilation(np.any([each.cells for each in footprints], axis=0), iterations=RING)
-    ground = maps.known & ~near
+    objects = unite([each.cells for each in footprints], maps.known.shape)
+    ground = maps.known & ~binary_dilation(objects, iterations=RING)
 
     def find(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"] | None:
-        box = _grow_box(cells)
+        own, found = find_objects(cells.astype(int))[0], np.zeros_like(cells)
+        margins = [max(LEAST_AROUND, round(AROUND * (side.stop - side.start))) for side in own]
+        box = tuple(slice(max(0, s.start - more), s.stop + more) for s, more in zip(own, margins, strict=True))
         inside = cut_object(features[box], cells[box], ground[box])
         if inside is None:
             return None
-        found = np.zeros_like(cells)
         found[box] = inside
         return found
 
     return find
-
-
-def _grow_box(cells: Bool[Array, "m m"]) -> tuple[slice, slice]:
-    """The bounding box and what lies around it."""
-    parts = []
-    for places in np.nonzero(cells):
-        low, high = int(places.min()), int(places.max()) + 1
-        more = max(LEAST_AROUND, round(AROUND * (high - low)))
-        parts.append(slice(max(0, low - more), min(len(cells), high + more)))
-    return parts[0], parts[1]
 
 
 def cut_object(
@@ -167,21 +155,16 @@ def cut_object(
     cost[[0, -1]] = cost[:, [0, -1]] = sure
     graph = maxflow.Graph[float]()
     nodes = graph.add_grid_nodes(own.shape)
-    for weights, structure in _border_costs(features):
+    steps = [(np.diff(features, axis=axis) ** 2).sum(-1) for axis in (1, 0)]
+    usual = 2 * max(float(np.mean(np.concatenate([step.ravel() for step in steps]))), 1e-9)
+    for axis, step in zip((1, 0), steps, strict=True):  # a border is cheap where neighbours differ
+        pad, structure = np.zeros((2, 2), int), np.zeros((3, 3))
+        pad[axis, 1], structure[1 + (axis == 0), 1 + (axis == 1)] = 1, 1
+        weights = np.pad(SMOOTHING * np.exp(-step / usual), pad)
         graph.add_grid_edges(nodes, weights, structure, symmetric=True)
     graph.add_grid_tedges(nodes, np.maximum(-cost, 0), np.maximum(cost, 0))
     graph.maxflow()
     return ~graph.get_grid_segments(nodes)
-
-
-def _border_costs(features: Float[Array, "h w k"]) -> Iterator[tuple[Float[Array, "h w"], Array]]:
-    """Cost of a border between each cell and its neighbour in two directions, small where they differ."""
-    steps = [((np.diff(features, axis=axis)) ** 2).sum(-1) for axis in (1, 0)]
-    usual = 2 * max(float(np.mean(np.concatenate([step.ravel() for step in steps]))), 1e-9)
-    towards = np.zeros((3, 3)), np.zeros((3, 3))
-    towards[0][1, 2] = towards[1][2, 1] = 1
-    for step, pad, structure in zip(steps, (((0, 0), (0, 1)), ((0, 1), (0, 0))), towards, strict=True):
-        yield np.pad(SMOOTHING * np.exp(-step / usual), pad), structure
 
 
 def _mixture_cost(features: Float[Array, "h w k"], members: Float[Array, "n k"]) -> Float[Array, "h w"]:

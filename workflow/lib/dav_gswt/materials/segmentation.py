@@ -1,14 +1,13 @@
 """Segmentation of an exemplar into classes of ground that differ in colour or grain.
 
-Cells are clustered by their soft colour (CIELAB, after the exposure was normalised) and the contrast of their grain.
-Clusters are merged (Ward 1963) while two of them look alike: a small difference of their means, distributions that
-overlap, or a border that is a gradual change, as between light and shade. Labels are smoothed by graph cuts (alpha
-expansion, Boykov et al. 2001).
+Cells are clustered by their soft colour (CIELAB at a normalized exposure) and the contrast of their
+grain. Clusters are merged (Ward 1963) while two of them look alike: their means hardly differ, their
+distributions overlap, or their border is a gradual change, as between light and shade. Labels are
+smoothed by graph cuts (alpha expansion, Boykov et al. 2001).
 """
 
 import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -19,6 +18,8 @@ from scipy.cluster.vq import kmeans2
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.materials import strips
+
+logging.getLogger("maxflow.fastmin").setLevel(logging.WARNING)  # it logs every cut
 
 CLUSTERS = 12  # before merging
 STARTS = 5  # of k-means
@@ -172,21 +173,8 @@ def smooth_labels(features: Float[Array, "m m k"], labels: Int[Array, "m m"]) ->
         return labels
     costs = np.stack([_negative_log_likelihood(features, features[labels == c]) for c in range(number)], -1)
     costs = np.minimum(costs - costs.min(-1, keepdims=True), UNLIKELY)
-    with _without_messages("maxflow.fastmin"):  # of every cut
-        smoothed = fastmin.aexpansion_grid(costs, SMOOTHING * (1 - np.eye(number)), labels=labels.astype(np.int64))
+    smoothed = fastmin.aexpansion_grid(costs, SMOOTHING * (1 - np.eye(number)), labels=labels.astype(np.int64))
     return np.unique(smoothed, return_inverse=True)[1].reshape(labels.shape)
-
-
-@contextmanager
-def _without_messages(name: str) -> Iterator[None]:
-    """Keep a library's messages below warnings out of the log."""
-    logger = logging.getLogger(name)
-    level = logger.level
-    logger.setLevel(logging.WARNING)
-    try:
-        yield
-    finally:
-        logger.setLevel(level)
 
 
 def _negative_log_likelihood(features: Float[Array, "m m k"], members: Float[Array, "n k"]) -> Float[Array, "m m"]:

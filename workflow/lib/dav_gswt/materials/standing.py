@@ -21,8 +21,7 @@ from scipy.ndimage import (
     percentile_filter,
 )
 
-from dav_gswt.materials.maps import GroundMaps
-from dav_gswt.materials.surroundings import Surroundings
+from dav_gswt.materials.maps import GroundMaps, Surroundings
 
 DIAMETERS = (1 / 28, 1 / 20, 1 / 14, 1 / 10, 1 / 7)  # of blobs, of the side
 AROUND, LOW = 1 / 10, 20  # the ground below: this percentile of the heights within so much of the side

@@ -5,7 +5,7 @@ foot. materials.exr: what each cell of the exemplar is, the northern row first. 
 ground.png: the exemplar from above, north up, to draw masks over.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +14,12 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 from scipy.ndimage import binary_dilation
 
-from dav_gswt.errors import InputError
 from dav_gswt.field import read_field, write_field
-from dav_gswt.files import atomic_folder, parse_record, read_json, write_json
+from dav_gswt.files import atomic_folder, read_record, write_json
 from dav_gswt.images import figures, image_files
 from dav_gswt.lod.merge import merge_by_voxel
-from dav_gswt.materials.build import ExtractedObject, FoundMaterials, Material
+from dav_gswt.materials.build import FoundMaterials, MaterialVerdict
 from dav_gswt.materials.model import MaterialInfo, ObjectLevels
-from dav_gswt.materials.verdict import MaterialVerdict
 from dav_gswt.reconstruction import ground
 
 NAME = "materials.json"
@@ -76,55 +74,34 @@ def write_materials(found: FoundMaterials, folder: Path | str, provenance: dict[
             ground.write_ground(material.grid, part / f"material{number}.exr")
         for each in found.objects:
             write_field(each.field, part / f"{each.name}.ply")
-        _write_maps(found, part / "materials.exr")
+        classes, place = found.classes, found.maps.exemplar
+        numbers = sum((k * each.cells for k, each in enumerate(classes.footprints, 1)), np.zeros(classes.kinds.shape))
+        layers = {"material": classes.materials, "kind": classes.kinds, "object": numbers, "excluded": classes.excluded}
+        header = {name: repr(getattr(place, name)) for name in ("west", "south", "spacing")}
+        maps = {name: layer[::-1].astype(np.float32) for name, layer in layers.items()}
+        image_files.write_exr(part / "materials.exr", maps, header)
         image_files.write_png(part / "materials.png", draw_classes(found))
         image_files.write_png(part / "ground.png", np.clip(found.maps.colour[::-1], 0, 1))
-        write_json(part / NAME, _describe(found, provenance))
-
-
-def _describe(found: FoundMaterials, provenance: dict[str, Any]) -> dict[str, Any]:
-    def describe_material(each: Material) -> dict[str, Any]:
-        return vars(each.info) | {"filled": each.filled, "verdict": vars(each.verdict)}
-
-    def describe_object(each: ExtractedObject) -> dict[str, Any]:
-        return {key: value for key, value in vars(each).items() if key != "field"}
-
-    return {
-        "verdict": vars(found.verdict),
-        "excluded": float(found.classes.excluded.mean()),
-        "tile_side": found.tile_side,
-        "materials": [describe_material(each) for each in found.materials],
-        "objects": [describe_object(each) for each in found.objects],
-        "provenance": provenance,
-    }
+        report = MaterialsReport(
+            found.verdict,
+            float(found.classes.excluded.mean()),
+            found.tile_side,
+            [MaterialRecord(**vars(each.info), filled=each.filled, verdict=each.verdict) for each in found.materials],
+            [ObjectRecord(each.name, each.material, each.radius, each.height, each.density) for each in found.objects],
+            provenance,
+        )
+        write_json(part / NAME, asdict(report))
 
 
 def read_report(folder: Path | str) -> MaterialsReport:
     """Read materials.json. Raises: InputError: not readable, or not such a file."""
-    path = Path(folder, NAME)
-    try:
-        return parse_record(read_json(path), MaterialsReport)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}; find the materials again") from error
+    return read_record(Path(folder, NAME), MaterialsReport, "find the materials again")
 
 
 def read_exemplars(folder: Path | str) -> list[tuple[Any, ground.Ground]]:
     """Field and grid of each material's exemplar. Raises: InputError: see `read_report`, `read_field`."""
-    numbers = range(len(read_report(folder).materials))
-    return [
-        (read_field(Path(folder, f"material{k}.ply")), ground.read_ground(Path(folder, f"material{k}.exr")))
-        for k in numbers
-    ]
-
-
-def _write_maps(found: FoundMaterials, path: Path) -> None:
-    classes, place = found.classes, found.maps.exemplar
-    objects = np.zeros(classes.materials.shape)
-    for number, footprint in enumerate(classes.footprints, 1):
-        objects[footprint.cells] = number
-    layers = {"material": classes.materials, "kind": classes.kinds, "object": objects, "excluded": classes.excluded}
-    header = {name: repr(getattr(place, name)) for name in ("west", "south", "spacing")}
-    image_files.write_exr(path, {name: layer[::-1].astype(np.float32) for name, layer in layers.items()}, header)
+    paths = [Path(folder, f"material{k}") for k in range(len(read_report(folder).materials))]
+    return [(read_field(f"{path}.ply"), ground.read_ground(f"{path}.exr")) for path in paths]
 
 
 def draw_classes(found: FoundMaterials) -> Float[Array, "h w 3"]:

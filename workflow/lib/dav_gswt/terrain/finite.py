@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, concatenate_fields
-from dav_gswt.materials.placing import turn_and_scale, turn_rows
+from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain.choice import Ints, Vector
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import Sphere, displace_field

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from dav_gswt.bundle.manifest import FORMAT, READABLE, VERSION, Manifest
+from dav_gswt.bundle.manifest import FORMAT, VERSION, Manifest
 from dav_gswt.bundle.manifest import NAME as MANIFEST
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, read_json, write_json
@@ -105,7 +105,7 @@ def write_page(
     if not (viewer / INDEX).is_file():
         raise InputError(f"{viewer}: no viewer here (index.html is missing)")
     value = read_json(bundle / MANIFEST)
-    if not isinstance(value, dict) or value.get("format") != FORMAT or value.get("version") not in READABLE:
+    if not isinstance(value, dict) or value.get("format") != FORMAT or value.get("version") != VERSION:
         raise InputError(f"{bundle / MANIFEST}: not a bundle of format {FORMAT!r}, version {VERSION}; make it again")
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
     copies += [(bundle / name, name) for name in _list_chunks(bundle, value)]

@@ -10,7 +10,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.orders import sort_back_to_front
 from dav_gswt.field import GaussianField, concatenate_fields
-from dav_gswt.materials.placing import turn_and_scale, turn_rows
+from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain.choice import Floats, Vector
 from dav_gswt.terrain.draw_order import crossfade_opacity, level_weights, nearest_order
 from dav_gswt.terrain.endless import EndlessTerrain

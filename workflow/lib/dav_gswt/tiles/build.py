@@ -11,25 +11,12 @@ from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import SH0, GaussianField
+from dav_gswt.field import GaussianField
 from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.logs import progress
 from dav_gswt.reconstruction import top_view
-from dav_gswt.tiles import (
-    coarse_levels,
-    compose,
-    energy,
-    layout,
-    occluders,
-    patches,
-    poisson_blending,
-    search,
-    semantics,
-    texture,
-    trends,
-)
+from dav_gswt.tiles import compose, energy, layout, patches, poisson_blending, search, semantics, texture
 from dav_gswt.tiles.layout import EDGES, Exemplar, Layout
-from dav_gswt.tiles.report import EnergyReport, PlacesReport, TileReport
 
 _log = logging.getLogger(__name__)
 
@@ -103,7 +90,7 @@ class TileSet:
         labels: [tile, y, x], row 0 in the south: which patch each finest cell shows (`layout.LABELS`).
         shifts: per tile and label, what to add to a cell (x, y) of the tile for the exemplar's cell.
         uncertainty: mean over each tile's cells.
-        report: what was chosen and what it cost.
+        report: what was chosen and what it cost, as JSON.
     """
 
     side: float
@@ -112,19 +99,24 @@ class TileSet:
     labels: UInt8[Array, "tiles n n"]
     shifts: Int[Array, "tiles 9 2"]
     uncertainty: Float[Array, "tiles"]
-    report: TileReport
+    report: dict[str, Any]
 
     @property
     def variants(self) -> int:
         return len(self.labels) // EDGES
+
+    @property
+    def layout(self) -> Layout:
+        """Sizes in cells."""
+        return Layout.from_dict(self.report["layout"])
 
 
 def cut_levels(levels: Levels, options: TilingOptions, rng: np.random.Generator) -> TileSet:
     """Cut the tile set of a field's levels, as they look from straight above. Raises: InputError: see `cut_tiles`."""
     grid = levels.grids[0]
     above = top_view.render_exemplar(levels.fields[0], grid)
-    maps = above.colour_or_nan(), above.uncertainty
-    return cut_tiles(levels.fields, Exemplar.from_grid(grid), *maps, options, rng)
+    exemplar = Exemplar.from_grid(grid)
+    return cut_tiles(levels.fields, exemplar, above.colour_or_nan(), above.uncertainty, options, rng)
 
 
 def cut_materials(
@@ -148,8 +140,8 @@ def cut_materials(
     for number, own in enumerate(sets):
         share = options.share if side is None else min(1.0, side / own.grids[0].cells)
         tiles.append(cut_levels(own, replace(options, share=share), make_rng(number)))
-        side, options = tiles[0].report.layout.side, replace(options, levels=len(tiles[0].fields))
-    if len({(len(own.fields), own.report.layout.side) for own in tiles}) > 1:
+        side, options = tiles[0].layout.side, replace(options, levels=len(tiles[0].fields))
+    if len({(len(own.fields), own.layout.side) for own in tiles}) > 1:
         raise InputError(
             "tiles: a material's exemplar holds no such tiles: choose a smaller `tile` or `materials: one`"
         )
@@ -194,43 +186,48 @@ def cut_tiles(
     filled, uncertainty = _fill_holes(colour, uncertainty)
     scale = texture.measure_texture_scale(filled)
     plan = _plan_layout(options, scale, exemplar, len(levels))
-    _, height = compute_ground_maps(levels[0], exemplar)
-    trend = trends.fit_trend(colour, height, exemplar, options.trend * plan.side)
-    binned = _bin_levels(levels[: plan.composed_levels], exemplar, trend)
-    hidden = energy.make_occluder_layer(occluders.compute_cover(levels[0], exemplar, height))
+    _, height = compose.compute_ground_maps(levels[0], exemplar)
+    trend = texture.fit_trend(colour, height, exemplar, options.trend * plan.side)
+    flat = [texture.remove_trend(field, trend) for field in levels[: plan.composed_levels]]
+    binned = [_bin_level(field, exemplar, number) for number, field in enumerate(flat)]
+    hidden = energy.make_occluder_layer(compose.compute_cover(levels[0], exemplar, height))
     colour = np.clip(filled - trend.colour, 0, 1).astype(float)
     height = np.nan_to_num(height - trend.height, nan=float(np.nanmean(height)))
-    seam_energy, energy_report = _make_seam_energy(options, colour, hidden)
+    semantic = None if options.kind == "colour" else semantics.make_semantic_layer(colour, options.source)
+    seam_energy = energy.SeamEnergy(options.kind, options.slope, energy.make_colour_layer(colour), semantic, hidden)
     guide = patches.make_guidance(colour, height, uncertainty, plan)
     problem = search.SearchProblem(plan, guide, seam_energy, options.candidates, options.tries, options.relabel)
     found = search.search_patches(problem, options.variants, rng)
-    shifts = np.stack([layout.label_shifts(plan, found.places, tile) for tile in range(len(found.tiles))])
-    corrections = _solve_corrections(plan, found, shifts, poisson_blending.make_soft_maps(colour, height))
-    corrections *= options.corrected
+    shifts = np.stack([layout.label_shifts(plan, found.places, tile) for tile in range(len(found.labels))])
+    soft = poisson_blending.make_soft_maps(colour, height)
+    corrections = options.corrected * poisson_blending.solve_corrections(plan, found, shifts, soft)
     fields, raised = _compose_tiles(binned, plan, found.labels, shifts, corrections)
-    report = TileReport(
-        places=PlacesReport.from_places(found.places),
-        strip_energy=[strip.seam.energy for strip in found.strips],
-        strip_gamma=[strip.gamma for strip in found.strips],
-        tile_energy=[tile.centre.seam.energy for tile in found.tiles],
-        tile_gamma=[tile.centre.gamma for tile in found.tiles],
-        layout=plan,
-        texture=scale * exemplar.spacing,
-        raised=raised.tolist(),
-        energy=energy_report,
-        trend={"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
-        correction=np.abs(corrections).max((0, 1, 2)).tolist(),
-    )
+    report = {
+        "places": {name: places.tolist() for name, places in vars(found.places).items()},
+        "strip_energy": [strip.seam.energy for strip in found.strips],
+        "strip_gamma": [strip.gamma for strip in found.strips],
+        "tile_energy": [centre.seam.energy for centre in found.centres],
+        "tile_gamma": [centre.gamma for centre in found.centres],
+        "layout": plan.to_dict(),
+        "texture": scale * exemplar.spacing,
+        "raised": raised.tolist(),
+        "energy": seam_energy.describe() | ({"semantics": semantic.description} if semantic else {}),
+        "trend": {"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
+        "correction": np.abs(corrections).max((0, 1, 2)).tolist(),
+    }
     means = _average_uncertainty(uncertainty, found.labels, shifts)
     return TileSet(plan.side * exemplar.spacing, exemplar.spacing, fields, found.labels, shifts, means, report)
 
 
-def _bin_levels(levels: list[GaussianField], exemplar: Exemplar, trend: trends.Trend) -> list[compose.BinnedLevel]:
-    """The levels without the trend, sorted by the exemplar's cells."""
-    return [
-        _check_level(compose.bin_gaussians(trends.remove_trend(field, trend), exemplar, 2**number), number)
-        for number, field in enumerate(levels)
-    ]
+def _bin_level(field: GaussianField, exemplar: Exemplar, number: int) -> compose.BinnedLevel:
+    """A level by the exemplar's cells; a warning where a cell does not hold one ground disc."""
+    level = compose.bin_gaussians(field, exemplar, 2**number)
+    if not len(level.field):
+        raise InputError(f"level {number}: no Gaussian lies over the exemplar; is its field from another ground.json?")
+    held = np.bincount(level.numbers[level.field.ground], minlength=level.cells**2)
+    if held.any() and (held != 1).any():
+        _log.warning("level %d: %d of %d cells do not hold one ground disc", number, (held != 1).sum(), held.size)
+    return level
 
 
 def _average_uncertainty(uncertainty: Array, labels: Array, shifts: Array) -> Float[Array, "tiles"]:
@@ -256,25 +253,10 @@ def _compose_tiles(
         for tile in progress(range(len(labels)), "compose tiles")
     ]
     tiles, raised = compose.equalise_heights(tiles, plan.side * spacing)
-    tiles = [_append_merged_levels(tile, plan, spacing) for tile in tiles]
+    for number in range(len(binned), plan.levels):  # cells wider than a block are merged from the tile's own
+        cell = 2 ** (number - 1)
+        tiles = [[*tile, compose.merge_cells(tile[-1], plan.side // cell, cell * spacing)] for tile in tiles]
     return [list(level) for level in zip(*tiles, strict=True)], raised
-
-
-def _make_seam_energy(
-    options: TilingOptions, colour: Float[Array, "m m 3"], occluder_layer: energy.ColourLayer | None
-) -> tuple[energy.SeamEnergy, EnergyReport]:
-    """The energy that seams are cut with, and its description for seams.json."""
-    colour_layer = energy.make_colour_layer(colour)
-    weight = energy.OCCLUDER_WEIGHT if occluder_layer is not None else None
-    scales = {"colour": colour_layer.unit}
-    if options.kind == "colour":
-        seam_energy = energy.SeamEnergy(options.kind, options.slope, colour_layer, None, occluder_layer)
-        return seam_energy, EnergyReport(options.kind, scales, energy.EPS, weight)
-    semantic = semantics.make_semantic_layer(colour, options.source)
-    scales["semantics"] = semantic.unit
-    gamma, slope = (0.5, None) if options.kind == "semantic-nogamma" else (None, options.slope)
-    seam_energy = energy.SeamEnergy(options.kind, options.slope, colour_layer, semantic, occluder_layer)
-    return seam_energy, EnergyReport(options.kind, scales, energy.EPS, weight, gamma, slope, semantic.description)
 
 
 def _plan_layout(options: TilingOptions, scale: float, exemplar: Exemplar, fitted: int) -> Layout:
@@ -308,59 +290,9 @@ def _fill_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"
     return colour, uncertainty
 
 
-def _solve_corrections(
-    plan: Layout, found: search.SearchResult, shifts: Array, ground: poisson_blending.SoftMaps
-) -> Float[Array, "t n n 4"]:
-    """Correction of every tile's cells, so that no step is left along its seams; strips are solved first."""
-    strips = []
-    for upright, masks, places in (
-        (True, found.vertical, found.places.vertical),
-        (False, found.horizontal, found.places.horizontal),
-    ):
-        pair = [
-            layout.strip_labels(plan, mask, place, found.places.corner, upright)
-            for mask, place in zip(masks, places, strict=True)
-        ]
-        strips.append(np.stack([poisson_blending.solve_strip(labels, shift, plan, ground) for labels, shift in pair]))
-    corrections = []
-    for tile, (labels, shift) in enumerate(zip(found.labels, shifts, strict=True)):
-        border = poisson_blending.border_values(plan, strips[0], strips[1], tile)
-        corrections.append(poisson_blending.solve_tile(labels, shift, border, plan, ground))
-    return np.stack(corrections)
-
-
 def _compose_level(level: compose.BinnedLevel, labels: Array, shift: Array, correction: Array) -> GaussianField:
     """One tile at one level, corrected. A coarser level takes the majority of the finest labels."""
     majority = compose.coarsen_labels(labels, level.cell)
     splats = compose.compose_tile(level, majority, shift)
     change = poisson_blending.coarsen_correction(correction, labels, majority)
     return poisson_blending.apply_correction(splats, change, level.cell * level.exemplar.spacing)
-
-
-def _append_merged_levels(tile: list[GaussianField], plan: Layout, spacing: float) -> list[GaussianField]:
-    """A tile's levels, with those whose cells are wider than a block merged from its own cells."""
-    for number in range(len(tile), plan.levels):
-        cell = 2 ** (number - 1)
-        tile = [*tile, coarse_levels.merge_cells(tile[-1], plan.side // cell, cell * spacing)]
-    return tile
-
-
-def compute_ground_maps(field: GaussianField, exemplar: Exemplar) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
-    """Mean colour and height of each finest cell's ground discs (all Gaussians', if none is ground); NaN for none."""
-    ground = field[field.ground] if field.ground.any() else field
-    level = compose.bin_gaussians(ground, exemplar, 1)
-    count = np.diff(level.start)
-    cell = np.repeat(np.arange(len(count)), count)
-    values = [*level.field.sh[:, 0].T * SH0 + 0.5, level.field.means[:, 2]]
-    with np.errstate(invalid="ignore"):
-        maps = [(np.bincount(cell, v, len(count)) / count).reshape(exemplar.cells, exemplar.cells) for v in values]
-    return np.stack(maps[:3], -1), maps[3]
-
-
-def _check_level(level: compose.BinnedLevel, number: int) -> compose.BinnedLevel:
-    if not len(level.field):
-        raise InputError(f"level {number}: no Gaussian lies over the exemplar; is its field from another ground.json?")
-    held = compose.count_discs(level)
-    if held.any() and (held != 1).any():
-        _log.warning("level %d: %d of %d cells do not hold one ground disc", number, (held != 1).sum(), held.size)
-    return level

@@ -1,4 +1,4 @@
-"""What a seam costs: Eq. (graphcut_main) of the paper, in a form that is safe in floating point.
+"""What a seam costs, and the cheapest seam: Eq. (graphcut_main) of the paper, in a form that is safe in floating point.
 
 The cost of a seam between neighbouring cells s and t is
 
@@ -13,10 +13,11 @@ through a shrub would be cheap. W is symmetric in the patches, finite, not negat
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
+import maxflow
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
 from dav_gswt.views.uncertainty import gamma
@@ -25,6 +26,7 @@ KINDS = ("none", "colour", "semantic", "semantic-nogamma")
 OCCLUDER_WEIGHT = 2.0  # D of a hidden cell beside bare ground, in units of two random colours
 EPS = 1.0  # of the mean gradient: with less, a cut through a bush (steep everywhere) is as cheap as one through sand
 ROUNDING = 1e-9  # of colours, which are about 1
+QUANTA = 2.0**32  # capacities are whole numbers, the largest this big: the flow is exact and order-independent
 
 Cells = tuple[Array, Array]  # rows and columns of the exemplar's cells, of any one shape
 
@@ -55,7 +57,6 @@ class ColourLayer:
     """Colours of the exemplar's cells, and their gradients; cells are as far apart as their colours (2-norm)."""
 
     values: Float[Array, "h w c"]
-
     slope: Float[Array, "h w 2"]
     unit: LayerScales
 
@@ -64,7 +65,10 @@ class ColourLayer:
 
 
 def make_colour_layer(values: Float[Array, "h w c"]) -> ColourLayer:
-    return ColourLayer(values, compute_gradients(values), measure_scales(values))
+    """The layer of colours. Their scale of difference is the root mean square of D between two random places."""
+    slope = compute_gradients(values)
+    spread = float(np.sqrt(2 * values.reshape(-1, values.shape[-1]).var(0).sum()))
+    return ColourLayer(values, slope, make_scales(spread, slope))
 
 
 def make_occluder_layer(cover: Float[Array, "h w"]) -> ColourLayer | None:
@@ -77,12 +81,6 @@ def make_occluder_layer(cover: Float[Array, "h w"]) -> ColourLayer | None:
 def compute_gradients(values: Float[Array, "h w c"]) -> Float[Array, "h w 2"]:
     """Change per cell along x and along y (central differences, 2-norm over channels)."""
     return np.stack([np.linalg.norm(np.gradient(values, axis=axis), axis=-1) for axis in (1, 0)], -1)
-
-
-def measure_scales(values: Float[Array, "h w c"]) -> LayerScales:
-    """Scales of an exemplar: the root mean square of D between two places drawn at random, and the mean of G."""
-    spread = float(np.sqrt(2 * values.reshape(-1, values.shape[-1]).var(0).sum()))
-    return make_scales(spread, compute_gradients(values))
 
 
 def make_scales(spread: float, slope: Float[Array, "h w 2"]) -> LayerScales:
@@ -112,14 +110,23 @@ class SeamEnergy:
     semantics: CostLayer | None
     occluders: CostLayer | None = None
 
+    def describe(self) -> dict[str, Any]:
+        """What seams are priced by, as JSON: scales of the layers, and weights."""
+        layers = {"colour": self.colours, "semantics": self.semantics}
+        scales = {name: vars(layer.unit) for name, layer in layers.items() if layer is not None}
+        standing = {"standing": OCCLUDER_WEIGHT} if self.occluders is not None else {}
+        weight = {"gamma": 0.5} if self.kind == "semantic-nogamma" else {"slope": self.slope}
+        weights = standing | ({} if self.semantics is None else weight)
+        return {"kind": self.kind, "scales": scales, "eps": EPS} | weights
+
     def gamma(self, uncertainty: float) -> float:
         """Weight of colour in the seams of a patch of this mean uncertainty in [0, 1].
 
         Without semantics 1, `semantic-nogamma` 1/2. Raises: ValueError: uncertainty is NaN.
         """
-        weight = float(gamma(np.array([uncertainty], float), self.slope)[0])
         if self.semantics is None:
             return 1.0
+        weight = float(gamma(np.array([uncertainty], float), self.slope)[0])
         return 0.5 if self.kind == "semantic-nogamma" else weight
 
     def terms(self, share: float) -> list[tuple[float, CostLayer]]:
@@ -151,3 +158,87 @@ def divide_terms(parts: list[tuple[Array, Array, LayerScales]]) -> Array:
     """Eq. (graphcut_main) from each layer's weighed D and G."""
     difference = sum(d / unit.difference for d, _, unit in parts)
     return np.asarray(difference / (sum(g / unit.gradient for _, g, unit in parts) + EPS))
+
+
+@dataclass(frozen=True)
+class OverlapZone:
+    """Where two patches overlap. keep, take: cells that must show the first and the second patch; a seam runs through
+    the others. straight: cells that show the second patch if no seam is searched.
+    """
+
+    keep: Bool[Array, "h w"]
+    take: Bool[Array, "h w"]
+    straight: Bool[Array, "h w"]
+
+
+@dataclass(frozen=True)
+class Cut:
+    """labels: which cells show the second patch. energy: the seam's cost."""
+
+    labels: Bool[Array, "h w"]
+    energy: float
+
+
+def find_cut(
+    right: Float[Array, "h w1"], upper: Float[Array, "h1 w"], first: Bool[Array, "h w"], second: Bool[Array, "h w"]
+) -> Cut:
+    """The cheapest partition of a grid into two patches, exactly (max-flow). All of it may be one patch.
+
+    Only cells that are not forced become nodes.
+
+    Args:
+        right, upper: costs of parting a cell from its right and its upper neighbour.
+        first, second: cells that must show the first and the second patch.
+    Raises: ValueError: a cell is forced both ways, or a cost is negative or not finite.
+    """
+    if (first & second).any():
+        raise ValueError("a cell is forced to both patches")
+    right, upper, unit = _quantize(right, upper)
+    node = np.cumsum(~(first | second)).reshape(first.shape) - 1
+    free = int(node[-1, -1]) + 1
+    node[first], node[second] = -1, -2
+    tails = np.concatenate([node[:, :-1].ravel(), node[:-1].ravel()])
+    heads = np.concatenate([node[:, 1:].ravel(), node[1:].ravel()])
+    costs = np.concatenate([right.ravel(), upper.ravel()])
+    labels = second.copy()
+    if free:
+        graph = maxflow.GraphInt()
+        nodes = graph.add_nodes(free)
+        inner = (tails >= 0) & (heads >= 0) & (costs > 0)
+        graph.add_edges(tails[inner], heads[inner], costs[inner], costs[inner])
+        graph.add_grid_tedges(
+            nodes,
+            _terminal_capacities(-1, tails, heads, costs, free),
+            _terminal_capacities(-2, tails, heads, costs, free),
+        )
+        graph.maxflow()
+        labels[node >= 0] = graph.get_grid_segments(nodes)
+    return Cut(labels, _sum_costs(labels, right, upper) / unit)
+
+
+def price_cut(right: Float[Array, "h w1"], upper: Float[Array, "h1 w"], labels: Bool[Array, "h w"]) -> Cut:
+    """The cost of a given seam. Raises: ValueError: a cost is negative or not finite."""
+    right, upper, unit = _quantize(right, upper)
+    return Cut(labels, _sum_costs(labels, right, upper) / unit)
+
+
+def _quantize(right: Array, upper: Array) -> tuple[Array, Array, float]:
+    """Costs in whole quanta, and how many of them one is."""
+    largest = max(right.max(initial=0), upper.max(initial=0))
+    if not (np.isfinite(largest) and min(right.min(initial=0), upper.min(initial=0)) >= 0):
+        raise ValueError("seam costs must be finite and not negative")
+    unit = QUANTA / largest if largest > 0 else 1.0
+    return np.rint(right * unit).astype(np.int64), np.rint(upper * unit).astype(np.int64), unit
+
+
+def _sum_costs(labels: Array, right: Array, upper: Array) -> int:
+    return int(right[labels[:, 1:] != labels[:, :-1]].sum() + upper[labels[1:] != labels[:-1]].sum())
+
+
+def _terminal_capacities(terminal: int, tails: Array, heads: Array, costs: Array, free: int) -> Array:
+    """Capacity from each free node to a terminal: the sum over its neighbours that are forced to it, in quanta."""
+    out = np.zeros(free, np.int64)
+    for here, there in ((tails, heads), (heads, tails)):
+        pick = (here >= 0) & (there == terminal)
+        np.add.at(out, here[pick], costs[pick])
+    return out

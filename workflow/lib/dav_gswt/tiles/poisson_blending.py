@@ -17,7 +17,8 @@ from scipy.fft import dct, dst, idct, idst
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.field import SH0, GaussianField
-from dav_gswt.tiles.layout import Layout, edge_colours
+from dav_gswt.tiles.layout import Layout, edge_colours, strip_labels
+from dav_gswt.tiles.search import SearchResult
 
 BLUR = (2.0, 2.0, 2.0, 0.5)  # cells: grain is not a step; a surface is smooth already
 
@@ -60,6 +61,32 @@ def sum_steps(labels: UInt8[Array, "h w"], shift: Int[Array, "k 2"], ground: Sof
         np.add.at(total, (y, x), d)
         np.add.at(total, (y + dy, x + dx), -d)
     return total
+
+
+def solve_corrections(
+    plan: Layout, found: SearchResult, shifts: Int[Array, "t 9 2"], ground: SoftMaps
+) -> Float[Array, "t n n 4"]:
+    """Correction of every tile's cells, so that no step is left along its seams; strips are solved first.
+
+    shifts: of each tile's labels (`layout.label_shifts`).
+    """
+    places = found.places
+    directions = (True, found.vertical, places.vertical), (False, found.horizontal, places.horizontal)
+    vertical, horizontal = (
+        np.stack(
+            [
+                solve_strip(*strip_labels(plan, mask, place, places.corner, upright), plan, ground)
+                for mask, place in zip(masks, patches, strict=True)
+            ]
+        )
+        for upright, masks, patches in directions
+    )
+    return np.stack(
+        [
+            solve_tile(labels, shift, border_values(plan, vertical, horizontal, tile), plan, ground)
+            for tile, (labels, shift) in enumerate(zip(found.labels, shifts, strict=True))
+        ]
+    )
 
 
 def solve_strip(

@@ -8,15 +8,24 @@ from jaxtyping import Bool, Float, Int, UInt8
 from numpy import ndarray as Array
 
 from dav_gswt.logs import progress
-from dav_gswt.tiles import cuts, layout, patches, repetition
-from dav_gswt.tiles.energy import Cells, SeamEnergy, compute_edge_costs
+from dav_gswt.tiles import layout, patches
+from dav_gswt.tiles.energy import Cells, Cut, OverlapZone, SeamEnergy, compute_edge_costs, find_cut, price_cut
 from dav_gswt.tiles.layout import CENTRE, EDGES, Layout, PatchPlaces
 
 MIN_FITTING = 4  # times the number of tries: least number of fitting places
 MAX_PAIRED = 200  # strips that are compared pairwise
-REPETITION_COST = 2.0  # of `repetition`, where a median seam costs 1
+REPETITION_COST = 2.0  # of `patches.OverlaidPatches`, where a median seam costs 1
 
 Relabel = Callable[..., UInt8[Array, "n n"]]  # (problem, centre, labels, shift) -> labels
+
+
+@dataclass(frozen=True)
+class PlacedPatch:
+    """A patch in its place: where in the exemplar it comes from, its cut, and the weight that colour had in it."""
+
+    place: Int[Array, "2"]
+    seam: Cut
+    gamma: float
 
 
 @dataclass(frozen=True)
@@ -28,7 +37,8 @@ class SearchProblem:
         guide: maps that candidate places are ranked by.
         energy: what seams cost.
         candidates: places that are compared; tries: the best of them that are cut before one is taken.
-        relabel: replaces a tile's labels, given its centre, labels and shifts, after the exact cut; None: labels stay.
+        relabel: replaces a tile's labels, given its centre, labels and shifts, after the exact cut;
+            None: labels stay.
     """
 
     plan: Layout
@@ -38,39 +48,21 @@ class SearchProblem:
     tries: int
     relabel: Relabel | None = None
 
-    def gamma(self, place: Int[Array, "2"], size: tuple[int, int]) -> float:
-        """Weight of colour in the seams of a patch, by its mean uncertainty."""
-        return self.energy.gamma(float(patches.patch_means(self.guide.uncertainty, place[None], size)[0]))
-
-    def cut(self, first: Cells, second: Cells, gamma: float, zone: cuts.OverlapZone) -> cuts.Cut:
-        """Cut two patches, given by the exemplar's cells (rows, columns) that they show."""
-        costs = compute_edge_costs(self.energy.terms(gamma), first, second)
-        if self.energy.kind == "none":
-            return cuts.price_cut(*costs, zone.straight)
-        return cuts.find_cut(*costs, zone.keep, zone.take)
+    def place(self, shown: Cells, place: Int[Array, "2"], size: tuple[int, int], zone: OverlapZone) -> PlacedPatch:
+        """Cut a patch from a place against the exemplar's cells (rows, columns) that are visible before the cut."""
+        y, x = np.mgrid[: size[1], : size[0]]
+        uncertainty = float(patches.patch_means(self.guide.uncertainty, place[None], size)[0])
+        gamma = self.energy.gamma(uncertainty)
+        costs = compute_edge_costs(self.energy.terms(gamma), shown, (y + place[1], x + place[0]))
+        straight = self.energy.kind == "none"
+        cut = price_cut(*costs, zone.straight) if straight else find_cut(*costs, zone.keep, zone.take)
+        return PlacedPatch(place, cut, gamma)
 
     def source_cells(self, labels: Array, shift: Int[Array, "k 2"]) -> Cells:
         """Rows and columns of the exemplar that a label map shows, clipped to the exemplar."""
         rows, columns = layout.source_cells(labels, shift)
         last = self.plan.exemplar - 1
         return np.clip(rows, 0, last), np.clip(columns, 0, last)
-
-
-@dataclass(frozen=True)
-class PlacedPatch:
-    """A patch in its place: where in the exemplar it comes from, its cut, and the weight that colour had in it."""
-
-    place: Int[Array, "2"]
-    seam: cuts.Cut
-    gamma: float
-
-
-@dataclass(frozen=True)
-class CutTile:
-    """A tile's centre and its label map."""
-
-    centre: PlacedPatch
-    labels: UInt8[Array, "n n"]
 
 
 @dataclass(frozen=True)
@@ -81,18 +73,16 @@ class SearchResult:
         places: of all patches.
         vertical, horizontal: by edge colour, the cells of a strip that show the corner patch.
         strips: vertical 0, 1, then horizontal 0, 1.
-        tiles: by number.
+        centres: of the tiles.
+        labels: of the tiles.
     """
 
     places: PatchPlaces
     vertical: Bool[Array, "2 n w"]
     horizontal: Bool[Array, "2 w n"]
     strips: list[PlacedPatch]
-    tiles: list[CutTile]
-
-    @property
-    def labels(self) -> UInt8[Array, "tiles n n"]:
-        return np.stack([tile.labels for tile in self.tiles])
+    centres: list[PlacedPatch]
+    labels: UInt8[Array, "tiles n n"]
 
 
 def search_patches(problem: SearchProblem, variants: int, rng: np.random.Generator) -> SearchResult:
@@ -103,9 +93,9 @@ def search_patches(problem: SearchProblem, variants: int, rng: np.random.Generat
     sides = [np.stack([strip.place for strip in pair]) for pair in (upright, flat)]
     masks = [np.stack([~strip.seam.labels for strip in pair]) for pair in (upright, flat)]
     places = PatchPlaces(corner, sides[0], sides[1], np.zeros((EDGES * variants, 2), int))
-    tiles = _search_centres(problem, places, masks, rng)
-    places = PatchPlaces(corner, sides[0], sides[1], np.stack([tile.centre.place for tile in tiles]))
-    return SearchResult(places, masks[0], masks[1], upright + flat, tiles)
+    centres, labels = _search_centres(problem, places, masks, rng)
+    places = PatchPlaces(corner, sides[0], sides[1], np.stack([centre.place for centre in centres]))
+    return SearchResult(places, masks[0], masks[1], upright + flat, centres, labels)
 
 
 def _search_strips(
@@ -123,15 +113,15 @@ def _search_strips(
     along = y if upright else x
     depth = np.minimum(along, n - 1 - along)
     straight = depth >= (a + b) // 2  # the strip where it is not cut
-    overlap = cuts.OverlapZone(depth < b, depth >= a, straight)
+    overlap = OverlapZone(depth < b, depth >= a, straight)
     ends = np.where(along < n // 2, 1, 2)
     shown = problem.source_cells(ends, layout.strip_shifts(plan, np.zeros(2, int), corner, upright))
     drawn = patches.keep_certain(problem.guide, patches.draw_candidates(plan, size, problem.candidates, rng), size)
     places, cost = _choose_strip_candidates(problem, shown, _end_lines(plan, upright), drawn, size)
-    overlay = repetition.start_overlay(problem.guide.features[..., :3], n, size, cover=(~straight, shown))
+    overlay = patches.start_overlay(problem.guide.features[..., :3], n, size, cover=(~straight, shown))
     pair_cost = REPETITION_COST * overlay.compute_pair_costs(places)
     pairs = patches.rank_pairs(places, cost, pair_cost, size, used)[: problem.tries]
-    placed = [[_place_patch(problem, shown, place, size, overlap) for place in pair] for pair in pairs]
+    placed = [[problem.place(shown, place, size, overlap) for place in pair] for pair in pairs]
     best = min(placed, key=lambda strips: sum(strip.seam.energy for strip in strips))
     used += [(strip.place, size) for strip in best]
     return best
@@ -156,32 +146,35 @@ def _choose_strip_candidates(
 
 def _search_centres(
     problem: SearchProblem, places: PatchPlaces, masks: list, rng: np.random.Generator
-) -> list[CutTile]:
+) -> tuple[list[PlacedPatch], UInt8[Array, "tiles n n"]]:
     """Find every tile's centre, no two of them the same, and cut it against the tile's frame."""
     plan = problem.plan
     n, b = plan.side, plan.strip
     y, x = np.mgrid[:n, :n]
     depth = np.minimum(np.minimum(x, n - 1 - x), np.minimum(y, n - 1 - y))
     frame = (plan.block + b) // 2  # its width where the cut is straight
-    overlap = cuts.OverlapZone(depth < plan.block, depth >= b, depth >= frame)
+    overlap = OverlapZone(depth < plan.block, depth >= b, depth >= frame)
     size = (n, n)
     drawn = patches.keep_certain(problem.guide, patches.draw_candidates(plan, size, problem.candidates, rng), size)
-    overlay = repetition.start_overlay(problem.guide.features[..., :3], n, size, (frame, frame))
-    tiles: list[CutTile] = []
+    overlay = patches.start_overlay(problem.guide.features[..., :3], n, size, (frame, frame))
+    centres: list[PlacedPatch] = []
+    found = []
     for tile in progress(range(len(places.centres)), "cut tiles"):
         frame_labels = layout.frame_labels(plan, masks[0], masks[1], tile)
         shift = layout.label_shifts(plan, places, tile)
         # a seam along the frame's inner rim is priced by what the strips would show beyond it
         shown = problem.source_cells(layout.extend_frame(frame_labels), shift)
-        order = _rank_centres(problem, places, shown, drawn, overlay, tiles)
-        centre = _place_best(problem, shown, order, size, overlap)
+        order = _rank_centres(problem, places, shown, drawn, overlay, centres)
+        placed = (problem.place(shown, place, size, overlap) for place in order[: problem.tries])
+        centre = min(placed, key=lambda patch: patch.seam.energy)
         labels = np.where(centre.seam.labels, CENTRE, frame_labels).astype(np.uint8)
         shift[CENTRE] = centre.place
         if problem.relabel is not None:
             labels = problem.relabel(problem, centre, labels, shift)
-        tiles.append(CutTile(centre, labels))
+        centres.append(centre)
+        found.append(labels)
         overlay = overlay.with_patch(centre.place)
-    return tiles
+    return centres, np.stack(found)
 
 
 def _rank_centres(
@@ -189,14 +182,14 @@ def _rank_centres(
     places: PatchPlaces,
     shown: Cells,
     drawn: Int[Array, "n 2"],
-    overlay: repetition.OverlaidPatches,
-    tiles: list[CutTile],
+    overlay: patches.OverlaidPatches,
+    centres: list[PlacedPatch],
 ) -> Int[Array, "k 2"]:
     """Candidate places of the next tile's centre from best to worst, without those of its other variants.
 
-    shown: the exemplar's cells that the tile's frame shows. tiles: those that are cut already.
+    shown: the exemplar's cells that the tile's frame shows. centres: of the tiles that are cut already.
     """
-    plan, tile = problem.plan, len(tiles)
+    plan, tile = problem.plan, len(centres)
     n, b = plan.side, plan.strip
     lines = _ring_lines(plan)
     cost = patches.compute_mismatch(problem.guide, lines, (shown[0][lines], shown[1][lines]), drawn)
@@ -205,9 +198,9 @@ def _rank_centres(
     west, north, east, south = layout.edge_colours(tile)
     adjacent = [(places.vertical[c], (2 * b, n)) for c in sorted({west, east})]
     adjacent += [(places.horizontal[c], (n, 2 * b)) for c in sorted({south, north})]
-    taken = np.array([other.centre.place for other in tiles], int).reshape(-1, 2)
+    taken = np.array([other.place for other in centres], int).reshape(-1, 2)
     order = patches.rank_places(drawn[fits], cost, (n, n), adjacent, taken)
-    variants = {tuple(other.centre.place) for other in tiles[tile % EDGES :: EDGES]}
+    variants = {tuple(other.place) for other in centres[tile % EDGES :: EDGES]}
     return np.array([place for place in order if tuple(place) not in variants] or order)
 
 
@@ -230,20 +223,3 @@ def _ring_lines(plan: Layout) -> tuple[Array, Array]:
     y = np.concatenate([along, along, depth, n - 1 - depth])
     x = np.concatenate([depth, n - 1 - depth, along, along])
     return y, x
-
-
-def _place_best(
-    problem: SearchProblem, shown: Cells, order: Int[Array, "n 2"], size: tuple[int, int], zone: cuts.OverlapZone
-) -> PlacedPatch:
-    """Cut a patch from each of the first `tries` places; returns the one whose seam is cheapest."""
-    placed = (_place_patch(problem, shown, place, size, zone) for place in order[: problem.tries])
-    return min(placed, key=lambda patch: patch.seam.energy)
-
-
-def _place_patch(
-    problem: SearchProblem, shown: Cells, place: Int[Array, "2"], size: tuple[int, int], zone: cuts.OverlapZone
-) -> PlacedPatch:
-    """Cut a patch from a place against the exemplar's cells that are visible there before the cut."""
-    y, x = np.mgrid[: size[1], : size[0]]
-    gamma = problem.gamma(place, size)
-    return PlacedPatch(place, problem.cut(shown, (y + place[1], x + place[0]), gamma, zone), gamma)

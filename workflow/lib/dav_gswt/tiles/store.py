@@ -4,7 +4,6 @@ seams.json is written last and holds the counts: where it exists, the set is who
 in the folders material1, material2, ... of the first one's, their tables in its seams.json under `materials`.
 """
 
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -16,23 +15,14 @@ from dav_gswt.files import UNREADABLE, atomic_folder, read_json, write_json
 from dav_gswt.lod.store import material_folder
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
-from dav_gswt.tiles.report import TileReport
-
-STAMP = (1980, 1, 1, 0, 0, 0)  # NumPy's own npz carries no better time either
+from dav_gswt.tiles.layout import Layout
 
 
 def tile_file_name(level: int, tile: int) -> str:
     return f"lod{level}_tile_{tile:02d}.ply"
 
 
-def write_tiles(tiles: TileSet, folder: Path | str, seams: Path | str, provenance: dict[str, Any]) -> None:
-    """Write a set; `folder` and `seams` appear whole or not at all, the folder first."""
-    write_material_tiles([tiles], folder, seams, provenance)
-
-
-def write_material_tiles(
-    sets: list[TileSet], folder: Path | str, seams: Path | str, provenance: dict[str, Any]
-) -> None:
+def write_tiles(sets: list[TileSet], folder: Path | str, seams: Path | str, provenance: dict[str, Any]) -> None:
     """Write the sets of several materials; `folder` and `seams` appear whole or not at all, the folder first."""
     folder, seams = Path(folder), Path(seams)
     seams.unlink(missing_ok=True)
@@ -40,16 +30,12 @@ def write_material_tiles(
         for number, tiles in enumerate(sets):
             own = material_folder(part, number)
             own.mkdir(exist_ok=True)
-            _write_folder(tiles, own)
+            for level, fields in enumerate(tiles.fields):
+                for tile, splats in enumerate(progress(fields, f"write tiles of level {level}")):
+                    write_field(splats, own / tile_file_name(level, tile))
+            np.savez_compressed(own / "labels.npz", labels=tiles.labels, shifts=tiles.shifts)
     first, *more = [_describe_tiles(tiles) for tiles in sets]
     write_json(seams, first | {"provenance": provenance} | ({"materials": more} if more else {}))
-
-
-def _write_folder(tiles: TileSet, folder: Path) -> None:
-    for level, fields in enumerate(tiles.fields):
-        for tile, splats in enumerate(progress(fields, f"write tiles of level {level}")):
-            write_field(splats, folder / tile_file_name(level, tile))
-    _write_npz(folder / "labels.npz", labels=tiles.labels, shifts=tiles.shifts)
 
 
 def _describe_tiles(tiles: TileSet) -> dict[str, Any]:
@@ -60,7 +46,7 @@ def _describe_tiles(tiles: TileSet) -> dict[str, Any]:
         "tiles": len(tiles.labels),
         "uncertainty": tiles.uncertainty.tolist(),
         "counts": [[len(f) for f in fields] for fields in tiles.fields],
-        "seams": tiles.report.to_dict(),
+        "seams": tiles.report,
     }
 
 
@@ -70,7 +56,7 @@ def read_tiles(folder: Path | str, seams: Path | str) -> TileSet:
 
 
 def read_material_tiles(folder: Path | str, seams: Path | str) -> list[TileSet]:
-    """Read what `write_material_tiles` wrote. Raises: InputError: as `read_tiles`."""
+    """Read what `write_tiles` wrote. Raises: InputError: as `read_tiles`."""
     table = read_json(seams)
     more = table.get("materials", []) if isinstance(table, dict) else []
     if not isinstance(more, list):
@@ -81,8 +67,8 @@ def read_material_tiles(folder: Path | str, seams: Path | str) -> list[TileSet]:
 def _read_folder(folder: Path, table: Any, seams: Path | str) -> TileSet:
     try:
         levels, count = table["levels"], table["tiles"]
-        side, spacing, counts = table["side"], table["spacing"], table["counts"]
-        uncertainty, report = np.array(table["uncertainty"]), TileReport.from_dict(table["seams"])
+        side, spacing, counts, report = table["side"], table["spacing"], table["counts"], table["seams"]
+        uncertainty, _ = np.array(table["uncertainty"]), Layout.from_dict(report["layout"])
         if not all(type(n) is int and n > 0 for n in (levels, count)) or not 0 < side < np.inf:
             raise ValueError("a size is out of range")
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -97,13 +83,3 @@ def _read_folder(folder: Path, table: Any, seams: Path | str) -> TileSet:
     except UNREADABLE as error:
         raise InputError(f"{folder / 'labels.npz'}: not readable ({error}); cut the tiles again") from error
     return TileSet(side, spacing, fields, labels, shifts, uncertainty, report)
-
-
-def _write_npz(path: Path, **arrays) -> None:
-    """Like np.savez_compressed, but the same arrays give the same bytes at any time of day."""
-    with zipfile.ZipFile(path, "w") as archive:
-        for key, value in arrays.items():
-            entry = zipfile.ZipInfo(f"{key}.npy", STAMP)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            with archive.open(entry, "w", force_zip64=True) as file:
-                np.lib.format.write_array(file, value, allow_pickle=False)
