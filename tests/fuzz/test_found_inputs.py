@@ -44,6 +44,7 @@ LENS = {"model": "PINHOLE", "width": 8, "height": 6, "params": [9, 9, 4, 3], "pi
 SELECTION = {"policy": "farthest", "k": 1, "poses": [asdict(POSE)]}
 SCORES = f"{','.join(FIELDS)}\na,{{}},1,1,{{}},,,,,,,{{}},1,,,,,,\n"
 
+
 def read_found(path: Path):
     """Read a file by its name, as the workflow does."""
     return {

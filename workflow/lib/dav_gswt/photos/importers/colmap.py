@@ -108,7 +108,7 @@ def _check_counts(path: Path, part: str) -> None:
             else:
                 rest = 8 * take("Q3d3BdQ")[-1]
             at += rest
-    except (struct.error, KeyError, ValueError):
+    except (struct.error, KeyError, ValueError, OverflowError):
         at = -1
     if at != len(data):
         raise InputError(f"{path}: cut short or damaged; copy or export it again")

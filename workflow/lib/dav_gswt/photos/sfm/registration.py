@@ -105,9 +105,8 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
     if len(paths) < LEAST_PHOTOS:
         names = " and ".join(p.name for p in paths)
         raise InputError(f"{folder}: only {names}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20")
-    photos = [
-        _describe_photo(p, key, options) for p, key in zip(paths, name_pictures([p.name for p in paths]), strict=True)
-    ]
+    keys = name_pictures([path.name for path in paths])
+    photos = [_describe_photo(path, key, options) for path, key in zip(paths, keys, strict=True)]
     positions = read_gps_positions(paths)
     with tempfile.TemporaryDirectory(prefix="sfm-") as scratch:
         database = Path(scratch) / "database.db"
@@ -204,17 +203,15 @@ def _finish_registration(
     """Bring cameras to the size of the pictures, and give each its pinhole."""
     best = solution.best
     by_key = {photo.key: photo for photo in photos}
-    found, pinholes = {}, {}
     limits = pycolmap.UndistortCameraOptions(blank_pixels=0, max_image_size=options.side)
-    for i in best.reg_image_ids():
-        image = best.images[i]
-        number = image.camera_id
+    numbers = {best.images[i].name: best.images[i].camera_id for i in best.reg_image_ids()}
+    found, pinholes = {}, {}
+    for name, number in numbers.items():
         if number not in found:
             lens = pycolmap.Camera(best.cameras[number].todict())
-            lens.rescale(*image_files.fit_size(*by_key[image.name].full, options.side))
+            lens.rescale(*image_files.fit_size(*by_key[name].full, options.side))
             found[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
     sparse = model_from_reconstruction(best, pinholes=pinholes)
-    numbers = {best.images[i].name: best.images[i].camera_id for i in best.reg_image_ids()}
     return Registration(
         sparse,
         tuple(by_key[name].path for name in sparse.names),
