@@ -1,7 +1,8 @@
 """Reader of COLMAP's sparse models, binary or text: cameras, images and points.
 
-pycolmap trusts the counts in a binary file, so they are compared with the size of the file first. Rigs and frames are
-not read, as they repeat what the images say. Formats: colmap.github.io/format.html.
+pycolmap trusts the counts in a binary file, so they are compared with the size of the file first.
+Rigs and frames are not read, as they repeat what the images say. Formats:
+colmap.github.io/format.html.
 """
 
 import struct

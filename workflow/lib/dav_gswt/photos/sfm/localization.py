@@ -38,8 +38,9 @@ WORST = 6.0  # pixels, of a point that agrees
 def localize_photos(photos: Path, paths: list[Path], seed: int = 0) -> list[Camera | None]:
     """The cameras of photos in the world of a photos/ folder; None for one that finds no place.
 
-    The photos must be taken with the scene's own camera: each is undistorted as the scene's pictures were. Images of
-    the database are numbered from 1: first the scene's pictures, then the new photos.
+    The photos must be taken with the scene's own camera: each is undistorted as the scene's
+    pictures were. Images of the database are numbered from 1: first the scene's pictures, then the
+    new photos.
     """
     if not paths:
         return []

@@ -1,8 +1,8 @@
 """Structure from motion: a folder of overlapping photos becomes cameras, sparse points and undistorted pictures.
 
-pycolmap does it on the CPU: SIFT features, matches of photos that look alike, incremental or global mapping. Features
-and matches may use several threads, since each photo and each pair is independent and its random numbers start from the
-seed. Mapping uses one thread. So a run repeats to the bit.
+pycolmap does it on the CPU: SIFT features, matches of photos that look alike, incremental or global
+mapping. Features and matches may use several threads, since each photo and each pair is independent
+and its random numbers start from the seed. Mapping uses one thread. So a run repeats to the bit.
 """
 
 import logging
@@ -45,8 +45,9 @@ PRESETS = {
 class SfmOptions:
     """How structure from motion is run.
 
-    size: longer side at which features are searched, pixels. features: most of them in a photo. neighbours: photos
-    that each is matched with. mapper: incremental (one photo after the other) or global (all at once).
+    size: longer side at which features are searched, pixels. features: most of them in a photo.
+    neighbours: photos that each is matched with. mapper: incremental (one photo after the other) or
+    global (all at once).
     cameras: auto (one for all photos of equal size and EXIF focal length), one (for all of equal size), or each (photo
     its own). focal: 35 mm equivalent where EXIF has none or is wrong. side: longer side of the undistorted pictures,
     pixels (photos are never enlarged). verdict: stop or warn where the model is refused. threads: for features and
