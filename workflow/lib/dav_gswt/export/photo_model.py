@@ -17,8 +17,8 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, require_file_name
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
-from dav_gswt.photos.colmap_model import ColmapModel, colour_points, triangulate_model, write_colmap_model
 from dav_gswt.photos.capture_record import TakenPhoto
+from dav_gswt.photos.colmap_model import ColmapModel, colour_points, triangulate_model, write_colmap_model
 from dav_gswt.photos.view_split import ViewSplit
 
 OPENGL = np.array([1.0, -1.0, -1.0])  # nerfstudio's camera looks along -z with y up
