@@ -23,7 +23,7 @@ def copr() -> dict[str, float]:
     start = time.perf_counter()
     found = register_photos(COPR, SfmOptions(threads=2))
     seconds = time.perf_counter() - start
-    print(f"copr_dunes: {len(found.model.names)} of 41 photos placed, focal length {found.focal_ratio:.3f} of EXIF's")
+    print(f"copr_dunes: {len(found.model.names)} of 41 photos placed, focal length {found.focal.ratio:.3f} of EXIF's")
     return {"sfm_copr_seconds": seconds}
 
 

@@ -70,7 +70,8 @@ def _parse_photo(row: dict) -> CapturedPhoto:
 class TakenPhoto:
     """A photo that a round's field was made of, by the name under which it is exported.
 
-    source: its undistorted file. camera: the pinhole that took it. round: when it was taken; 0 for start views.
+    source: its undistorted file. camera: the pinhole that took it. round: when it was taken; 0 for
+    start views.
     """
 
     name: str

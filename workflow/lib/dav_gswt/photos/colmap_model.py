@@ -156,7 +156,9 @@ def _intersect_rays(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Arra
     rays = np.empty((len(model.pixels), 3))
     for i, camera in enumerate(model.cameras):
         own = model.image_of == i
-        rays[own] = _directions(camera, model.pixels[own])
+        seen = np.ones((np.count_nonzero(own), 3))
+        seen[:, :2] = (model.pixels[own] - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
+        rays[own] = seen / np.linalg.norm(seen, axis=1, keepdims=True) @ camera.rotation
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
     n = len(model.points)
     matrix, side = np.zeros((n, 3, 3)), np.zeros((n, 3))
@@ -167,14 +169,6 @@ def _intersect_rays(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Arra
     points = np.full((n, 3), np.nan)
     points[solvable] = np.linalg.solve(matrix[solvable], side[solvable][..., None])[..., 0] + middle
     return points, spread
-
-
-def _directions(camera: Camera, pixels: Float[Array, "k 2"]) -> Float[Array, "k 3"]:
-    """Unit directions in the world of the rays through pixels."""
-    rays = np.ones((len(pixels), 3))
-    rays[:, :2] = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-    return rays @ camera.rotation
 
 
 def _with_images(model: ColmapModel, kept: list[int]) -> ColmapModel:
@@ -245,7 +239,8 @@ def model_from_reconstruction(
         image = stored.images[key]
         lens = stored.cameras[image.camera_id]
         target = pinholes[image.camera_id] if pinholes else lens
-        cameras.append(_camera(target, image.cam_from_world()))
+        pose, ((fx, _, cx), (_, fy, cy), _) = image.cam_from_world().matrix(), target.calibration_matrix().tolist()
+        cameras.append(Camera(pose[:, :3].copy(), pose[:, 3].copy(), fx, fy, cx, cy, target.width, target.height))
         seen = [(p.point3D_id, *p.xy) for p in image.get_observation_points2D()]
         seen = np.array(seen, float).reshape(-1, 3)
         if pinholes:
@@ -253,7 +248,8 @@ def model_from_reconstruction(
         numbers.append(np.searchsorted(ids, seen[:, 0].astype(np.int64)))
         owners.append(np.full(len(seen), i))
         pixels.append(seen[:, 1:])
-    point_of, image_of = np.concatenate(numbers or [np.zeros(0, int)]), np.concatenate(owners or [np.zeros(0, int)])
+    empty = np.zeros(0, int)
+    point_of, image_of = np.concatenate([empty, *numbers]), np.concatenate([empty, *owners])
     order = np.lexsort((image_of, point_of))
     points = [stored.points3D[i] for i in ids]
     return ColmapModel(
@@ -263,21 +259,7 @@ def model_from_reconstruction(
         (np.array([p.color for p in points]).reshape(-1, 3) / 255).astype(np.float32),
         point_of[order],
         image_of[order],
-        np.concatenate(pixels or [np.zeros((0, 2))])[order],
-    )
-
-
-def _camera(camera: pycolmap.Camera, pose: pycolmap.Rigid3d) -> Camera:
-    matrix = pose.matrix()
-    return Camera(
-        matrix[:, :3].copy(),
-        matrix[:, 3].copy(),
-        float(camera.focal_length_x),
-        float(camera.focal_length_y),
-        float(camera.principal_point_x),
-        float(camera.principal_point_y),
-        camera.width,
-        camera.height,
+        np.concatenate([np.zeros((0, 2)), *pixels])[order],
     )
 
 

@@ -40,11 +40,13 @@ def fit_plane(
 ) -> tuple[Float[Array, "3"], float, float]:
     """A robust plane through points: unit normal n and offset d of n . p = d, and the points' spread about it.
 
-    Least median of |n . p - d| over TRIALS planes through three points, then ten rounds of least squares under
-    Geman-McClure weights (1 + (r / s)^2)^-2. The scale s is 1.4826 times the median residual of the first plane, the
-    standard deviation of normal residuals, so hills and trees may be up to half of the points.
-    up: a rough direction upwards, if known. Then only planes within 45 degrees of level are tried, and n points upwards.
-    Sums have one order, since those of BLAS depend on the number of its threads.
+    Least median of |n . p - d| over TRIALS planes through three points, then ten rounds of least
+    squares under Geman-McClure weights (1 + (r / s)^2)^-2. The scale s is 1.4826 times the median
+    residual of the first plane, the standard deviation of normal residuals, so hills and trees may
+    be up to half of the points.
+    up: a rough direction upwards, if known. Then only planes within 45 degrees of level are tried,
+    and n points upwards. Sums have one order, since those of BLAS depend on the number of its
+    threads.
     Raises: InputError: fewer than three points, all on one line, or none in such a plane.
     """
     if len(points) < 3:
@@ -94,10 +96,11 @@ def fit_ground_frame(
 ) -> tuple[ColmapModel, SceneFrame]:
     """The model in its ground frame, and this frame.
 
-    z points from the robust plane through all points to the cameras' side. The unit of length is the flying height, the
-    median height of the cameras, or the metre if the model is in metres east, north and up of the place `about`.
-    x and y run so that the well-seen square is as large as can be; the origin lies in the middle of the ground that is
-    seen well. Ground is seen well if at least 3 photos see it (2 of a set below 9) and there is a point within NEAR.
+    z points from the robust plane through all points to the cameras' side. The unit of length is
+    the flying height, the median height of the cameras, or the metre if the model is in metres
+    east, north and up of the place `about`. x and y run so that the well-seen square is as large as
+    can be; the origin lies in the middle of the ground that is seen well. Ground is seen well if at
+    least 3 photos see it (2 of a set below 9) and there is a point within NEAR.
     Raises: InputError: cameras on both sides of the plane or on it, or no square of ground seen well enough.
     """
     flat, relief, height = _level_model(model, rng)
@@ -147,8 +150,8 @@ def _georeference(east_north_up: ColmapModel, flat: ColmapModel, about: Georefer
 def count_coverage(cameras: tuple[Camera, ...], points: Float[Array, "n 3"], cells: int = CELLS) -> Coverage:
     """Count the photos that see each cell's centre on the plane z = 0, at most REACH flying heights away.
 
-    The grid spans the points (their 1st to 99th percentile), since ground beyond the last point is guesswork. The unit
-    of length is the flying height.
+    The grid spans the points (their 1st to 99th percentile), since ground beyond the last point is
+    guesswork. The unit of length is the flying height.
     """
     low, high = np.percentile(points[:, :2], [1, 99], axis=0)
     low, high = low - NEAR, high + NEAR
@@ -172,11 +175,12 @@ def find_visible_points(camera: Camera, points: Float[Array, "n 3"]) -> Bool[Arr
 
 
 def find_largest_square(mask: Bool[Array, "rows columns"]) -> tuple[int, int, int]:
-    """First row, first column and side of the largest square of true cells; (0, 0, 0) if none is true.
+    """First row, first column and side of the largest square of true cells; (0, 0, 0) if none is
+    true.
 
-    The largest square that ends in a cell has the side 1 + the least of its three neighbours before it. The recurrence
-    runs along anti-diagonals, all cells of one at once. Of equal squares the one nearest to the middle of all true cells
-    is taken, then the first.
+    The largest square that ends in a cell has the side 1 + the least of its three neighbours before
+    it. The recurrence runs along anti-diagonals, all cells of one at once. Of equal squares the one
+    nearest to the middle of all true cells is taken, then the first.
     """
     rows, columns = mask.shape
     ends = np.zeros((rows + 1, columns + 1), int)
@@ -216,8 +220,8 @@ def find_extent(mask: Bool[Array, "rows columns"], west: float, south: float, ce
 
 
 def _level_model(model: ColmapModel, rng: np.random.Generator) -> tuple[ColmapModel, float, float]:
-    """The model with z up from its plane and the flying height as unit; the points' spread in it; the flying height in
-    the model's unit."""
+    """The model with z up from its plane and the flying height as unit; the points' spread in it;
+    the flying height in the model's unit."""
     normal, offset, spread = fit_plane(model.points, rng)
     heights = np.array([camera.centre @ normal for camera in model.cameras]) - offset
     if np.median(heights) < 0:

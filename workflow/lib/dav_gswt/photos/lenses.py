@@ -43,7 +43,7 @@ def find_main_camera(cameras: Sequence[Camera]) -> Camera:
     return cameras[kinds.index(Counter(kinds).most_common(1)[0][0])]
 
 
-def write_lenses(folder: Path | str, lenses: list[Lens]) -> None:
+def write_lenses(folder: Path | str, lenses: Sequence[Lens]) -> None:
     """Write lenses.json into a photos/ folder, the lens of most pictures first."""
     rows = [
         {

@@ -22,8 +22,9 @@ UNSAFE = re.compile(r"[\s#]+")  # COLMAP's lists of images end a name at a blank
 def read_focal_length(path: Path | str) -> float | None:
     """Focal length in pixels of the stored picture, or None where EXIF does not say.
 
-    The pixel pitch of the sensor is used if EXIF has it, else the 35 mm equivalent (`convert_equivalent`). If the
-    tagged width differs from the real width, the photo was resized and the pitch is scaled.
+    The pixel pitch of the sensor is used if EXIF has it, else the 35 mm equivalent
+    (`convert_equivalent`). If the tagged width differs from the real width, the photo was resized
+    and the pitch is scaled.
     """
     width, height = sorted(image_files.read_size(path), reverse=True)
     tags = _read_tags(path)
@@ -52,8 +53,8 @@ def read_focal_length(path: Path | str) -> float | None:
 def convert_equivalent(film: float, width: int, height: int) -> float:
     """Focal length in pixels of a picture of this size from its 35 mm equivalent.
 
-    The equivalent compares diagonals: f = film / 43.27 mm * sqrt(w^2 + h^2). Pictures wider than 3:2 are cropped, so
-    the height of the 4:3 sensor is used for them.
+    The equivalent compares diagonals: f = film / 43.27 mm * sqrt(w^2 + h^2). Pictures wider than
+    3:2 are cropped, so the height of the 4:3 sensor is used for them.
     """
     longer, shorter = max(width, height), min(width, height)
     across = max(shorter, 0.75 * longer) if longer > WIDEST * shorter else shorter
@@ -65,7 +66,9 @@ def read_gps_position(path: Path | str) -> tuple[float, float, float] | None:
     tags = _read_tags(path)
 
     def read(name: str) -> list[float]:
-        return np.float32(_read_numbers(tags, f"GPS GPS{name}")).tolist()  # single precision is enough: 0.1 mm
+        return np.array(
+            _read_numbers(tags, f"GPS GPS{name}"), np.float32
+        ).tolist()  # single precision is enough: 0.1 mm
 
     angles = []
     for name, negative, most in (("Latitude", "S", 90.0), ("Longitude", "W", 180.0)):
@@ -120,7 +123,8 @@ def split_name(name: str) -> tuple[str, str, str]:
 
 
 def name_pictures(names: Sequence[str]) -> list[str]:
-    """The PNG that is made of each photo: its stem, or its whole path if stems are equal, and a number if need be.
+    """The PNG that is made of each photo: its stem, or its whole path if stems are equal, and a
+    number if need be.
 
     Blanks and # become _, so that a name is one word in every list of images.
     """

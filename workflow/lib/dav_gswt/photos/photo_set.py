@@ -40,8 +40,8 @@ def prepare_photos(
 ) -> SceneFrame:
     """Register the photos in `source`, and write undistorted pictures, model and ground.json into the folder `out`.
 
-    given: a camera model of another program, used as it is. masks: a folder, see `undistort_masks`. Returns what
-    ground.json holds.
+    given: a camera model of another program, used as it is. masks: a folder, see `undistort_masks`.
+    Returns what ground.json holds.
     Raises: InputError: see `register_photos`, `import_model`, `undistort_masks` and `fit_ground_frame`.
     """
     found = import_model(given, source, options) if given else register_photos(source, options)
@@ -75,7 +75,8 @@ def write_photo_folder(
 ) -> None:
     """Write images/, sparse/, lenses.json and ground.json into the folder `path`, which is replaced.
 
-    pictures: by file name. covers: masks by the pictures' names, 0 where a pixel does not count; they become alpha.
+    pictures: by file name. covers: masks by the pictures' names, 0 where a pixel does not count;
+    they become alpha.
     """
     with atomic_folder(path) as part:
         (part / "images").mkdir()
@@ -92,9 +93,11 @@ def write_photo_folder(
 def undistort_masks(found: Registration, folder: Path | str) -> dict[str, Float32[Array, "h w"]]:
     """Masks of a registration's pictures, by name: 1 where a picture counts, 0 where it does not.
 
-    Masks are pictures named as their photos, black where the photo must not become ground, such as on cars, people or
-    the photographer's shadow. The fit finds objects that move between photos without masks.
-    Raises: InputError: no folder, a mask of another shape than its photo, or none that belongs to a photo.
+    Masks are pictures named as their photos, black where the photo must not become ground, such as
+    on cars, people or the photographer's shadow. The fit finds objects that move between photos
+    without masks.
+    Raises: InputError: no folder, a mask of another shape than its photo, or none that belongs to a
+    photo.
     """
     listed = {path.stem: path for path in image_files.list_photos(folder)}
     covers = {}
@@ -133,7 +136,8 @@ def import_field(
 ) -> SceneFrame:
     """Bring a finished 3DGS .ply into its ground frame: the field to `out`, ground.json to `ground`.
 
-    up: a rough direction upwards in the file. Raises: InputError: see `read_field` and `fit_field_frame`.
+    up: a rough direction upwards in the file. Raises: InputError: see `read_field` and
+    `fit_field_frame`.
     """
     given = read_field(source)
     try:

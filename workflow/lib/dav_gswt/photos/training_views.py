@@ -24,9 +24,9 @@ SEGMENT = 1 << 30  # bytes of a file of arrays; a larger array has a file of its
 class ArrayFile:
     """Stores arrays in unnamed files of a folder, so that photos need not fit into memory.
 
-    The files vanish when the process ends, however it ends. Stored arrays are read-only maps of them. What was read
-    stays in memory until it is released (`release_pages`) or the system needs the room. The room of an array that
-    nothing refers to any more is used again.
+    The files vanish when the process ends, however it ends. Stored arrays are read-only maps of
+    them. What was read stays in memory until it is released (`release_pages`) or the system needs
+    the room. The room of an array that nothing refers to any more is used again.
     """
 
     def __init__(self, folder: Path | str):

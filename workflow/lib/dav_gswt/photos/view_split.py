@@ -58,9 +58,9 @@ def split_views(
 ) -> ViewSplit:
     """Names of the start views, the pool and the test views.
 
-    Images that show too little of the exemplar, or with `whole` of all ground, take no part unless too few would remain.
-    Test views are those that ground.json names, else the same for every seed. `start` of the others start, if there are
-    so many.
+    Images that show too little of the exemplar, or with `whole` of all ground, take no part unless
+    too few would remain. Test views are those that ground.json names, else the same for every seed.
+    `start` of the others start, if there are so many.
     Raises: InputError: ground.json names a test view that is no image, or no view is left to start from.
     """
     if unknown := [name for name in frame.test or () if name not in model.names]:
@@ -85,10 +85,11 @@ def split_views(
 
 
 def choose_test_views(model: "ColmapModel", ground: Bounds, among: list[int]) -> list[int]:
-    """Test views that are spread over the inner half of the ground (by area), if enough images look there.
+    """Test views that are spread over the inner half of the ground (by area), if enough images look
+    there.
 
-    At the border few other images see the same ground, so a test there would measure the border. The first view looks
-    nearest to the middle, each next one is the farthest from those before.
+    At the border few other images see the same ground, so a test there would measure the border.
+    The first view looks nearest to the middle, each next one is the farthest from those before.
     """
     if not (count := count_tests(len(among))):
         return []
@@ -105,10 +106,11 @@ def choose_test_views(model: "ColmapModel", ground: Bounds, among: list[int]) ->
 
 
 def choose_start_views(model: "ColmapModel", among: list[int], count: int, rng: np.random.Generator) -> list[int]:
-    """A connected, spread set of images: a random first, then always the one farthest from those chosen.
+    """A connected, spread set of images: a random first, then always the one farthest from those
+    chosen.
 
-    Images that share at least LINK points with a chosen one are considered; if there is none, those that share most.
-    Distances are between the positions of the cameras.
+    Images that share at least LINK points with a chosen one are considered; if there is none, those
+    that share most. Distances are between the positions of the cameras.
     """
     from dav_gswt.photos.colmap_model import count_shared_points  # not above: it loads pycolmap
 

@@ -1,8 +1,9 @@
 """Import of camera models, which take the place of structure from motion.
 
-`import_model` takes a folder of COLMAP, a transforms.json (nerfstudio, instant-ngp) or a reconstruction.json (OpenSfM,
-OpenDroneMap), and returns a `Registration`. Positions stay in the world of the model. A further format needs a reader
-that returns an `ImportedModel`, and a line in `_read_model`.
+`import_model` takes a folder of COLMAP, a transforms.json (nerfstudio, instant-ngp) or a
+reconstruction.json (OpenSfM, OpenDroneMap), and returns a `Registration`. Positions stay in the
+world of the model. A further format needs a reader that returns an `ImportedModel`, and a line in
+`_read_model`.
 """
 
 import logging
@@ -34,9 +35,9 @@ _log = logging.getLogger(__name__)
 def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> Registration:
     """The photos of a folder with the cameras of a model.
 
-    A photo belongs to the image of the same name: the path below the folder, else the file name, else the stem. It may
-    be a scaled copy. The points are those of the model if it says which image sees them. Otherwise they are
-    triangulated from features under the given cameras.
+    A photo belongs to the image of the same name: the path below the folder, else the file name,
+    else the stem. It may be a scaled copy. The points are those of the model if it says which image
+    sees them. Otherwise they are triangulated from features under the given cameras.
     Raises: InputError: not a model, damaged, one that is not read, or fewer than three photos have a camera in it.
     """
     path, photos = Path(path), PhotoFolder(Path(folder))
@@ -50,7 +51,11 @@ def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> R
     for name, reason in left_out:
         _log.warning("%s is left out: %s", name, reason)
     seen = collect_observations(given, placed) if len(given.point_of) else triangulate_features(placed, options)
-    pairs = _make_pinholes(placed, options.side, path)
+    made: dict[tuple, tuple[pycolmap.Camera, pycolmap.Camera]] = {}  # lens and pinhole at picture size
+    for place in placed:
+        if (key := camera_key(place.lens)) not in made:
+            made[key] = undistort_camera(place.lens, options.side, f"{path}: {place.path.name}")
+    pairs = [made[camera_key(place.lens)] for place in placed]
     model = _make_sparse_model(placed, [pinhole for _, pinhole in pairs], seen)
     if not len(model.points):
         raise InputError(
@@ -87,17 +92,6 @@ def _read_model(path: Path, photos: PhotoFolder) -> ImportedModel:
         f"{path}: neither a transforms.json (an object with `frames`) nor a reconstruction.json (a list of objects "
         "with `shots`); name one of these, or a folder of COLMAP's"
     )
-
-
-def _make_pinholes(
-    placed: Sequence[MatchedPhoto], side: int, path: Path
-) -> list[tuple[pycolmap.Camera, pycolmap.Camera]]:
-    """Of each photo the lens at the size of its picture, and the pinhole camera of that; equal lenses share one."""
-    made = {}
-    for place in placed:
-        if (key := camera_key(place.lens)) not in made:
-            made[key] = undistort_camera(place.lens, side, f"{path}: {place.path.name}")
-    return [made[camera_key(place.lens)] for place in placed]
 
 
 def _make_sparse_model(

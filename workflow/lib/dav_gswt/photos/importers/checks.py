@@ -1,7 +1,7 @@
 """Imported models, and checks of the untrusted files that they come from.
 
-Sizes, finite numbers, proper rotations, and names that stay in their folder are checked. Errors name the file, and the
-key or image within it.
+Sizes, finite numbers, proper rotations, and names that stay in their folder are checked. Errors
+name the file, and the key or image within it.
 """
 
 import json
@@ -30,7 +30,8 @@ _DRIVE = re.compile(r"^[A-Za-z]:")
 
 @dataclass(frozen=True)
 class ImportedImage:
-    """One image of a model. A world point p has camera coordinates rotation @ p + translation (x right, y down).
+    """One image of a model. A world point p has camera coordinates rotation @ p + translation (x
+    right, y down).
 
     name: relative to the photos' folder, with slashes. lens: at the size that the model gives, of the picture as it is
     stored; None where no size is known because there is no such photo.
@@ -44,10 +45,13 @@ class ImportedImage:
 
 @dataclass(frozen=True)
 class ImportedModel:
-    """The images of a model. If the file has observations, image image_of[k] sees point point_of[k] at pixels[k].
+    """The images of a model. If the file has observations, image image_of[k] sees point point_of[k]
+    at pixels[k].
 
-    colours: sRGB in [0, 1]. reasons: of images that the file has, but that cannot be used with the others.
-    about: the place of the world's origin, if the world is known to be in metres east, north and up.
+    colours: sRGB in [0, 1]. reasons: of images that the file has, but that cannot be used with the
+    others.
+    about: the place of the world's origin, if the world is known to be in metres east, north and
+    up.
     """
 
     shots: tuple[ImportedImage, ...]

@@ -1,7 +1,8 @@
 """Reader of COLMAP's sparse models, binary or text: cameras, images and points.
 
-pycolmap trusts the counts in a binary file, so they are compared with the size of the file first. Rigs and frames are
-not read, as they repeat what the images say. Formats: colmap.github.io/format.html.
+pycolmap trusts the counts in a binary file, so they are compared with the size of the file first.
+Rigs and frames are not read, as they repeat what the images say. Formats:
+colmap.github.io/format.html.
 """
 
 import struct
@@ -108,7 +109,7 @@ def _check_counts(path: Path, part: str) -> None:
             else:
                 rest = 8 * take("Q3d3BdQ")[-1]
             at += rest
-    except (struct.error, KeyError, ValueError):
+    except (struct.error, KeyError, ValueError, OverflowError):
         at = -1
     if at != len(data):
         raise InputError(f"{path}: cut short or damaged; copy or export it again")

@@ -1,7 +1,7 @@
 """Reader of transforms.json of nerfstudio and instant-ngp: OpenGL camera axes, intrinsics for all frames or for each.
 
-Moves of the world (`applied_transform`, `applied_scale`) are not undone, as the ground frame does not depend on them.
-Pixel centres are at half integers, as in COLMAP.
+Moves of the world (`applied_transform`, `applied_scale`) are not undone, as the ground frame does
+not depend on them. Pixel centres are at half integers, as in COLMAP.
 """
 
 import math
@@ -38,7 +38,8 @@ NUMBERS = (
 def import_nerfstudio(
     path: Path, values: dict, photos: Path, size_of: Callable[[str], tuple[int, int] | None]
 ) -> ImportedModel:
-    """The frames of the file. Points of `ply_file_path` are not read, as photos under known cameras give points.
+    """The frames of the file. Points of `ply_file_path` are not read, as photos under known cameras
+    give points.
 
     size_of: of a photo by its name, for files that give no size. Raises: InputError: with file, frame and key.
     """

@@ -33,7 +33,8 @@ _ONE_FOCAL = ("perspective", "fisheye")
 
 
 def import_opensfm(path: Path, values: list, photos: Path) -> ImportedModel:
-    """The largest of the file's reconstructions. Its points are not read, as the file does not say who sees them.
+    """The largest of the file's reconstructions. Its points are not read, as the file does not say
+    who sees them.
 
     Raises: InputError: with file, camera or shot, and key.
     """

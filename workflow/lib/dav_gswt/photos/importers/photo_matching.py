@@ -13,7 +13,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos.importers import lens_models
-from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel
+from dav_gswt.photos.importers.checks import ImportedModel
 from dav_gswt.photos.importers.lens_models import fit_camera_to_photo
 from dav_gswt.photos.photo_files import name_pictures, split_name
 
@@ -99,17 +99,13 @@ def match_photos_to_images(
     for name in folder.photos:
         if name not in owners and PurePosixPath(name).parent in homes:
             left_out.append((name, reasons.get(name, "the model has no camera for it")))
+    out = []
     names = sorted(owners)
-    out = [
-        _match_photo(given.shots[owners[name]], owners[name], folder.photos[name], key, source)
-        for name, key in zip(names, name_pictures(names), strict=True)
-    ]
+    for name, key in zip(names, name_pictures(names), strict=True):
+        shot, path = given.shots[owners[name]], folder.photos[name]
+        width, height, orientation = image_files.read_stored_size(path)
+        assert shot.lens is not None  # its photo is there, so its size is known
+        lens, turns = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
+        turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
+        out.append(MatchedPhoto(path, key, owners[name], lens, turns, turn @ shot.rotation, turn @ shot.translation))
     return sorted(out, key=lambda p: p.key), tuple(left_out)
-
-
-def _match_photo(shot: ImportedImage, index: int, path: Path, key: str, source: Path) -> MatchedPhoto:
-    width, height, orientation = image_files.read_stored_size(path)
-    assert shot.lens is not None  # its photo is there, so its size is known
-    lens, turns = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
-    turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
-    return MatchedPhoto(path, key, index, lens, turns, turn @ shot.rotation, turn @ shot.translation)

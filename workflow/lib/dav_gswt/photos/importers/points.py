@@ -58,9 +58,11 @@ def collect_observations(given: ImportedModel, placed: Sequence[MatchedPhoto]) -
 def _unproject_views(
     points: Float[Array, "n 3"], colours: Float32[Array, "n 3"], views: Sequence[tuple], turns: Sequence[Array]
 ) -> Observations:
-    """Observations as rays. views: of each photo its lens, rotation, translation, and which points it sees where.
+    """Observations as rays. views: of each photo its lens, rotation, translation, and which points
+    it sees where.
 
-    turns: rotation of each photo's rays about its axis. Observations that the lens cannot have made are left out.
+    turns: rotation of each photo's rays about its axis. Observations that the lens cannot have made
+    are left out.
     """
     errors, rays, point_of = [], [], []
     for (lens, rotation, translation, which, pixels), turn in zip(views, turns, strict=True):

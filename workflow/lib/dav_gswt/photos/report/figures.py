@@ -30,7 +30,8 @@ MOST_COLOURS = 6
 def draw_map(found: "ReportFacts") -> str:
     """The coverage of the ground from above, with the exemplar and the cameras, as a data URI.
 
-    Arrows point to where a camera looks. Weakly placed photos have their names, test photos are hollow.
+    Arrows point to where a camera looks. Weakly placed photos have their names, test photos are
+    hollow.
     """
     frame, cover = found.frame, found.cover
     figure = figures.make_figure(8.0, 6.4)
@@ -50,12 +51,14 @@ def draw_map(found: "ReportFacts") -> str:
     for photo, camera in zip(found.photos, found.model.cameras, strict=True):
         _draw_camera(axes, camera, MARK if photo.weak else "k", photo.tests, frame.flying_height)
         if photo.weak:
-            axes.annotate(photo.name, camera.centre[:2], (4, 4), textcoords="offset points", fontsize=7, color=MARK)
+            axes.annotate(
+                photo.name, tuple(camera.centre[:2]), (4, 4), textcoords="offset points", fontsize=7, color=MARK
+            )
     if frame.georeference:
         turn = np.radians(frame.georeference.north)
         tip = np.array([0.93, 0.93]) + 0.07 * np.array([-np.sin(turn), np.cos(turn)])
         arrow = {"arrowstyle": "<-"}
-        axes.annotate("N", (0.93, 0.93), tip, "axes fraction", "axes fraction", arrow, ha="center", va="center")
+        axes.annotate("N", (0.93, 0.93), tuple(tip), "axes fraction", "axes fraction", arrow, ha="center", va="center")
     unit = "m" if frame.unit == "metre" else "flying heights"
     axes.set(xlabel=f"x, {unit}", ylabel=f"y, {unit}", aspect="equal")
     axes.autoscale()

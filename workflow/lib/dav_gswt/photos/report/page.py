@@ -1,6 +1,8 @@
-"""The report on a scene's photos: which were used, which were not and why, and what to photograph next.
+"""The report on a scene's photos: which were used, which were not and why, and what to photograph
+next.
 
-The page is one HTML file that loads nothing. The same photos/ folder and template give the same bytes.
+The page is one HTML file that loads nothing. The same photos/ folder and template give the same
+bytes.
 """
 
 from dataclasses import dataclass, replace
@@ -47,8 +49,8 @@ class PhotoFacts:
 class ReportFacts:
     """A scene's photos.
 
-    need: how many photos must see a place. cover: in world units, without test photos. error: mean reprojection error
-    in pixels; None where it is unknown.
+    need: how many photos must see a place. cover: in world units, without test photos. error: mean
+    reprojection error in pixels; None where it is unknown.
     """
 
     frame: SceneFrame
@@ -122,8 +124,8 @@ def _assess_photos(model: ColmapModel, off: Array, tests: set[str]) -> tuple[Pho
 def find_weaknesses(points: int, error: float, shared: int, usual: float) -> tuple[str, ...]:
     """What is weak about a photo, in words.
 
-    points: how many it sees; `usual` is the median over the set. error: their mean distance from where they should be,
-    pixels. shared: points in common with the photo that shares most.
+    points: how many it sees; `usual` is the median over the set. error: their mean distance from
+    where they should be, pixels. shared: points in common with the photo that shares most.
     """
     said = []
     if points < max(LEAST_POINTS, LEAST_SHARE * usual):

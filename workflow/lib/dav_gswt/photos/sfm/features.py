@@ -1,7 +1,7 @@
 """Features of photos, the pairs that look alike, and their matches, in a COLMAP database."""
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -29,7 +29,6 @@ EACH = 1200  # features of a photo that describe it
 NEXT = 2  # photos before and after a photo by name: flights are named in their order
 ALL = 20  # photos up to which every pair is matched
 
-Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
@@ -100,7 +99,7 @@ def match_image_pairs(some: list[tuple[str, str]], database: Path, threads: int,
         )
 
 
-def split_batches(items: Sequence[Item], size: int, what: str) -> Iterator[Sequence[Item]]:
+def split_batches(items: list, size: int, what: str) -> Iterator[list]:
     """Yield the items in batches, and report after each how many are done."""
     with progress(range(len(items)), what) as bar:
         for start in range(0, len(items), size):
@@ -123,10 +122,11 @@ def run_cancellable(work: Callable[[pycolmap.CancellationToken], Result]) -> Res
 
 
 def select_pairs(descriptors: list[UInt8[Array, "_ 128"]], neighbours: int, seed: int) -> list[tuple[int, int]]:
-    """Pairs i < j of photos to match. neighbours: of each photo; every pair is taken if there are few photos.
+    """Pairs i < j of photos to match. neighbours: of each photo; every pair is taken if there are
+    few photos.
 
-    A photo is matched with those whose descriptors are most similar, with those before and after it by name, and along
-    a spanning tree of all photos.
+    A photo is matched with those whose descriptors are most similar, with those before and after it
+    by name, and along a spanning tree of all photos.
     """
     count = len(descriptors)
     if count <= ALL or neighbours >= count - 1:
@@ -144,11 +144,17 @@ def select_pairs(descriptors: list[UInt8[Array, "_ 128"]], neighbours: int, seed
 def describe_photos(descriptors: list[UInt8[Array, "_ 128"]], seed: int) -> Float32[Array, "photos d"]:
     """A global descriptor for each photo: a unit vector, or zero for a photo without features.
 
-    It is VLAD of the SIFT features over a small vocabulary learned from the set itself (Jegou et al. 2010, with
-    RootSIFT and intra-normalisation: Arandjelovic and Zisserman 2013), so that nothing is downloaded.
+    It is VLAD of the SIFT features over a small vocabulary learned from the set itself (Jegou et
+    al. 2010, with RootSIFT and intra-normalisation: Arandjelovic and Zisserman 2013), so that
+    nothing is downloaded.
     """
     rng = np.random.default_rng(seed)
-    some = [_root_features(_thin_evenly(d, EACH)) for d in descriptors]
+    some = []
+    for rows in descriptors:
+        if len(rows) > EACH:
+            rows = rows[np.linspace(0, len(rows) - 1, EACH).astype(int)]
+        f = rows.astype(np.float32)
+        some.append(np.sqrt(f / np.maximum(f.sum(1, keepdims=True), 1e-12)))  # RootSIFT: distances are Hellinger's
     pooled = np.concatenate(some)
     if len(pooled) < WORDS:
         return np.zeros((len(some), WORDS * 128), np.float32)
@@ -170,13 +176,3 @@ def _aggregate_features(features: Float32[Array, "n 128"], words: Float[Array, "
         np.add.at(out, which, features - words[which])
     out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
     return (out / max(np.linalg.norm(out), 1e-12)).ravel().astype(np.float32)
-
-
-def _root_features(features: UInt8[Array, "n 128"]) -> Float32[Array, "n 128"]:
-    """Square roots of features that sum to 1: their distance is then Hellinger's."""
-    f = features.astype(np.float32)
-    return np.sqrt(f / np.maximum(f.sum(1, keepdims=True), 1e-12))
-
-
-def _thin_evenly(rows: Array, count: int) -> Array:
-    return rows if len(rows) <= count else rows[np.linspace(0, len(rows) - 1, count).astype(int)]

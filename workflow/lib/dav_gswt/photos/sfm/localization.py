@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pycolmap
-from jaxtyping import Float
-from numpy import ndarray as Array
 from scipy.spatial import cKDTree
 
 from dav_gswt.errors import InputError
@@ -40,100 +38,77 @@ WORST = 6.0  # pixels, of a point that agrees
 def localize_photos(photos: Path, paths: list[Path], seed: int = 0) -> list[Camera | None]:
     """The cameras of photos in the world of a photos/ folder; None for one that finds no place.
 
-    The photos must be taken with the scene's own camera: each is undistorted as its pictures were.
+    The photos must be taken with the scene's own camera: each is undistorted as the scene's
+    pictures were. Images of the database are numbered from 1: first the scene's pictures, then the
+    new photos.
     """
     if not paths:
         return []
     known = read_colmap_model(photos / "sparse")
+    pinhole, old = find_main_camera(known.cameras), len(known.names)
     with tempfile.TemporaryDirectory(prefix="locate-") as scratch:
-        return _localize_photos(known, photos, paths, Path(scratch), seed)
+        folder, database = Path(scratch), Path(scratch) / "database.db"
+        names = [f"old_{i:05d}.png" for i in range(old)]  # without blanks, as COLMAP's lists require
+        for name, copy in zip(progress(known.names, "read pictures"), names, strict=True):
+            image_files.write_png(folder / copy, image_files.read_photo(photos / "images" / name))
+        numbers: list[int | None] = []
+        for path in paths:
+            try:
+                picture = undistort_scene_photo(image_files.read_photo(path), photos, pinhole)
+            except (InputError, ValueError) as error:
+                _log.warning("%s: %s", path.name, error)
+                numbers.append(None)
+                continue
+            names.append(f"new_{len(names):05d}.png")
+            numbers.append(len(names))
+            image_files.write_png(folder / names[-1], picture)
+        with closing(pycolmap.Database.open(database)) as store:
+            for name, camera in zip(names, [*known.cameras, *[pinhole] * (len(names) - old)], strict=True):
+                enter_image(store, name, *enter_camera(store, _make_lens(camera)))
+        extract_features(folder, database, max(pinhole.width, pinhole.height), FEATURES, 1)
+        with closing(pycolmap.Database.open(database)) as store:
+            found = [store.read_descriptors(i + 1).data for i in range(len(names))]
+        alike = compare_descriptions(describe_photos(found, seed))
+        order = np.argsort(-alike[old:, :old], axis=1, kind="stable")[:, :NEIGHBOURS]
+        nearest = [(old + j, int(i)) for j, row in enumerate(order) for i in row]
+        match_image_pairs([(names[i], names[j]) for j, i in nearest], database, 1, seed)
+        with closing(pycolmap.Database.open(database)) as store:
+            seen = [_match_features_to_points(i, known, store) for i in range(old)]
+            return [_estimate_pose(i, seen, known, pinhole, store, seed) if i else None for i in numbers]
 
 
-def _localize_photos(
-    known: ColmapModel, photos: Path, paths: list[Path], scratch: Path, seed: int
-) -> list[Camera | None]:
-    pinhole = find_main_camera(known.cameras)
-    new = [_write_undistorted(path, photos, pinhole, scratch / f"new_{i:04d}.png") for i, path in enumerate(paths)]
-    old = [f"old_{i:05d}.png" for i in range(len(known.names))]  # without blanks, as COLMAP's lists want them
-    for name, copy in zip(progress(known.names, "read pictures"), old, strict=True):
-        image_files.write_png(scratch / copy, image_files.read_photo(photos / "images" / name))
-    database = scratch / "database.db"
-    names = old + [name for name in new if name]
-    size = max(pinhole.width, pinhole.height)
-    with closing(pycolmap.Database.open(database)) as store:
-        _enter_images(names, [*known.cameras, *[pinhole] * (len(names) - len(known.names))], store)
-    extract_features(scratch, database, size, FEATURES, 1)
-    _match_photos(names, len(known.names), database, seed)
-    with closing(pycolmap.Database.open(database)) as store:
-        seen = _match_features_to_points(known, store)
-        return [_estimate_pose(names.index(name), seen, known, pinhole, store, seed) if name else None for name in new]
+def _make_lens(camera: Camera) -> pycolmap.Camera:
+    params = [camera.fx, camera.fy, camera.cx, camera.cy]
+    return pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
 
 
-def _write_undistorted(path: Path, photos: Path, pinhole: Camera, out: Path) -> str | None:
-    """Write the photo as a picture of the scene's; None, with the reason in the log, where it is not of its camera."""
-    try:
-        image_files.write_png(out, undistort_scene_photo(image_files.read_photo(path), photos, pinhole))
-    except (InputError, ValueError) as error:
-        _log.warning("%s: %s", path.name, error)
-        return None
-    return out.name
-
-
-def _enter_images(names: list[str], cameras: list[Camera], store: pycolmap.Database) -> None:
-    """Images numbered from 1 in the order of their names' list, each with a pinhole of its own."""
-    for name, camera in zip(names, cameras, strict=True):
-        params = [camera.fx, camera.fy, camera.cx, camera.cy]
-        lens = pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
-        enter_image(store, name, *enter_camera(store, lens))
-
-
-def _match_photos(names: list[str], old: int, database: Path, seed: int) -> None:
-    """Match every new photo with the pictures that it looks like most."""
-    with closing(pycolmap.Database.open(database)) as store:
-        found = [store.read_descriptors(i + 1).data for i in range(len(names))]
-    alike = compare_descriptions(describe_photos(found, seed))
-    some = [
-        (j, int(i)) for j in range(old, len(names)) for i in np.argsort(-alike[j, :old], kind="stable")[:NEIGHBOURS]
-    ]
-    match_image_pairs([(names[i], names[j]) for j, i in some], database, 1, seed)
-
-
-def _match_features_to_points(known: ColmapModel, store: pycolmap.Database) -> list[dict[int, int]]:
-    """Per picture of the scene: which of its features shows which point."""
-    out = []
-    for i in range(len(known.names)):
-        own = np.flatnonzero(known.image_of == i)
-        places = _read_keypoints(store, i)
-        if not len(own) or not len(places):
-            out.append({})
-            continue
-        far, which = map(np.asarray, cKDTree(known.pixels[own]).query(places))
-        out.append({int(k): int(known.point_of[own[which[k]]]) for k in np.flatnonzero(far <= SAME)})
-    return out
-
-
-def _read_keypoints(store: pycolmap.Database, index: int) -> Float[Array, "n 2"]:
-    return store.read_keypoints(index + 1)[:, :2].astype(float)
+def _match_features_to_points(index: int, known: ColmapModel, store: pycolmap.Database) -> dict[int, int]:
+    """Which features of a picture of the scene show which points."""
+    own = np.flatnonzero(known.image_of == index)
+    places = store.read_keypoints(index + 1)[:, :2].astype(float)
+    if not len(own) or not len(places):
+        return {}
+    far, which = map(np.asarray, cKDTree(known.pixels[own]).query(places))
+    return {int(k): int(known.point_of[own[which[k]]]) for k in np.flatnonzero(far <= SAME)}
 
 
 def _estimate_pose(
-    index: int, seen: list[dict[int, int]], known: ColmapModel, pinhole: Camera, store: pycolmap.Database, seed: int
+    number: int, seen: list[dict[int, int]], known: ColmapModel, pinhole: Camera, store: pycolmap.Database, seed: int
 ) -> Camera | None:
-    """The camera whose view of the matched points fits best, if enough of them agree."""
-    own, at = _read_keypoints(store, index), {}
-    for i, points in enumerate(seen):
-        if not store.exists_two_view_geometry(i + 1, index + 1):
-            continue
-        for a, b in store.read_two_view_geometry(i + 1, index + 1).inlier_matches:
-            if int(a) in points:
-                at[int(b), points[int(a)]] = None
+    """The camera whose view of the matched points fits best, if enough of them agree. number: of the image."""
+    at = {}
+    for i, points in enumerate(seen, 1):
+        if store.exists_two_view_geometry(i, number):
+            for a, b in store.read_two_view_geometry(i, number).inlier_matches:
+                if int(a) in points:
+                    at[int(b), points[int(a)]] = None
     if len(at) < LEAST:
         return None
     rows, columns = (np.array(v) for v in zip(*at, strict=True))
-    params = [pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy]
-    lens = pycolmap.Camera(model="PINHOLE", width=pinhole.width, height=pinhole.height, params=params)
+    own = store.read_keypoints(number)[:, :2].astype(float)
     options = pycolmap.AbsolutePoseEstimationOptions()
     options.ransac.max_error, options.ransac.random_seed = WORST, seed
+    lens = _make_lens(pinhole)
     found = pycolmap.estimate_and_refine_absolute_pose(own[rows], known.points[columns], lens, options)
     if not found or found["num_inliers"] < max(LEAST, LEAST_SHARE * len(rows)):
         return None

@@ -1,10 +1,11 @@
 """Mapping: features and matches become cameras and points, by COLMAP in one thread.
 
-Photos are mapped in one way. If that fails, or if signs contradict the model (see `verdict`), they are mapped in other
-ways too, and the best model is taken.
+Photos are mapped in one way. If that fails, or if signs contradict the model (see `verdict`), they
+are mapped in other ways too, and the best model is taken.
 
-Photos of flat ground from straight above hardly determine the focal length: a longer lens higher up gives the same
-pictures. So EXIF's focal length is held there. Oblique photos determine it, and then the adjusted one is used.
+Photos of flat ground from straight above hardly determine the focal length: a longer lens higher up
+gives the same pictures. So EXIF's focal length is held there. Oblique photos determine it, and then
+the adjusted one is used.
 """
 
 import logging
@@ -63,8 +64,8 @@ class Approach:
 class SfmPhoto:
     """A photo that structure from motion is given.
 
-    key: name of the picture that is made of it. full: its size. width, height, focal: at the size at which features are
-    searched; focal is EXIF's.
+    key: name of the picture that is made of it. full: its size. width, height, focal: at the size
+    at which features are searched; focal is EXIF's.
     """
 
     path: Path
@@ -108,8 +109,9 @@ class SfmSolution:
 
 
 def find_solution(scene: SfmScene, mapper: Mapper, seed: int) -> SfmSolution:
-    """Map the photos, in several ways if the first one fails, if signs contradict its model, or if it leaves out many
-    photos that match others. The best by the signs is taken, then by the number of placed photos.
+    """Map the photos, in several ways if the first one fails, if signs contradict its model, or if
+    it leaves out many photos that match others. The best by the signs is taken, then by the number
+    of placed photos.
 
     Raises: InputError: of the first way, if none gives a model.
     """
@@ -292,7 +294,9 @@ def settle_focal_length(
 
     Raises: InputError: a solution that no lens gives.
     """
-    tilts = _measure_tilts(best, rng)
+    normal, _, _ = fit_plane(np.array([p.xyz for p in best.points3D.values()]), rng)
+    forward = np.stack([best.images[i].cam_from_world().rotation.matrix()[2] for i in best.reg_image_ids()])
+    tilts = np.degrees(np.arccos(np.clip(np.abs(forward @ normal), 0, 1)))  # of the views off the ground's normal
     oblique = int((tilts > OBLIQUE).sum())
     fixes = oblique >= LEAST_OBLIQUE and oblique >= LEAST_SHARE * len(tilts)
     used = [c for c in best.cameras if any(best.images[i].camera_id == c for i in best.reg_image_ids())]
@@ -331,13 +335,6 @@ def settle_focal_length(
         float(np.percentile(tilts, 95)),
         decision,
     )
-
-
-def _measure_tilts(best: pycolmap.Reconstruction, rng: np.random.Generator) -> Float[Array, "n"]:
-    """Degrees between each view and the normal of the points' plane."""
-    normal, _, _ = fit_plane(np.array([p.xyz for p in best.points3D.values()]), rng)
-    forward = np.stack([best.images[i].cam_from_world().rotation.matrix()[2] for i in best.reg_image_ids()])
-    return np.degrees(np.arccos(np.clip(np.abs(forward @ normal), 0, 1)))
 
 
 def _take_over(best: pycolmap.Reconstruction, free: pycolmap.Reconstruction) -> None:

@@ -1,8 +1,8 @@
 """Structure from motion: a folder of overlapping photos becomes cameras, sparse points and undistorted pictures.
 
-pycolmap does it on the CPU: SIFT features, matches of photos that look alike, incremental or global mapping. Features
-and matches may use several threads, since each photo and each pair is independent and its random numbers start from the
-seed. Mapping uses one thread. So a run repeats to the bit.
+pycolmap does it on the CPU: SIFT features, matches of photos that look alike, incremental or global
+mapping. Features and matches may use several threads, since each photo and each pair is independent
+and its random numbers start from the seed. Mapping uses one thread. So a run repeats to the bit.
 """
 
 import logging
@@ -45,8 +45,9 @@ PRESETS = {
 class SfmOptions:
     """How structure from motion is run.
 
-    size: longer side at which features are searched, pixels. features: most of them in a photo. neighbours: photos
-    that each is matched with. mapper: incremental (one photo after the other) or global (all at once).
+    size: longer side at which features are searched, pixels. features: most of them in a photo.
+    neighbours: photos that each is matched with. mapper: incremental (one photo after the other) or
+    global (all at once).
     cameras: auto (one for all photos of equal size and EXIF focal length), one (for all of equal size), or each (photo
     its own). focal: 35 mm equivalent where EXIF has none or is wrong. side: longer side of the undistorted pictures,
     pixels (photos are never enlarged). verdict: stop or warn where the model is refused. threads: for features and
@@ -105,9 +106,8 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
     if len(paths) < LEAST_PHOTOS:
         names = " and ".join(p.name for p in paths)
         raise InputError(f"{folder}: only {names}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20")
-    photos = [
-        _describe_photo(p, key, options) for p, key in zip(paths, name_pictures([p.name for p in paths]), strict=True)
-    ]
+    keys = name_pictures([path.name for path in paths])
+    photos = [_describe_photo(path, key, options) for path, key in zip(paths, keys, strict=True)]
     positions = read_gps_positions(paths)
     with tempfile.TemporaryDirectory(prefix="sfm-") as scratch:
         database = Path(scratch) / "database.db"
@@ -204,17 +204,15 @@ def _finish_registration(
     """Bring cameras to the size of the pictures, and give each its pinhole."""
     best = solution.best
     by_key = {photo.key: photo for photo in photos}
-    found, pinholes = {}, {}
     limits = pycolmap.UndistortCameraOptions(blank_pixels=0, max_image_size=options.side)
-    for i in best.reg_image_ids():
-        image = best.images[i]
-        number = image.camera_id
+    numbers = {best.images[i].name: best.images[i].camera_id for i in best.reg_image_ids()}
+    found, pinholes = {}, {}
+    for name, number in numbers.items():
         if number not in found:
             lens = pycolmap.Camera(best.cameras[number].todict())
-            lens.rescale(*image_files.fit_size(*by_key[image.name].full, options.side))
+            lens.rescale(*image_files.fit_size(*by_key[name].full, options.side))
             found[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
     sparse = model_from_reconstruction(best, pinholes=pinholes)
-    numbers = {best.images[i].name: best.images[i].camera_id for i in best.reg_image_ids()}
     return Registration(
         sparse,
         tuple(by_key[name].path for name in sparse.names),

@@ -72,19 +72,27 @@ class SfmEvidence:
 def judge_model(model: ColmapModel, evidence: SfmEvidence, rng: np.random.Generator) -> SfmVerdict:
     """The verdict on a model, its world frame being any."""
     normal, offset, spread = fit_plane(model.points, rng)
-    turn, gps = _judge_gps(model, evidence.positions, normal)
-    signs = [
-        _grade("reprojection error", evidence.error, f"points lie {evidence.error:.2f} px off on average"),
-        _judge_tracks(model),
-        gps,
-        *_judge_directions(model, normal, turn),
-        _judge_climb(model, evidence.positions, normal),
-        _judge_focal_length(evidence.focal_ratio),
-        _judge_roughness(model),
-        _judge_relief(model, normal, offset, spread),
-        _judge_share(len(model.names), evidence.images),
-        _judge_groups(evidence.groups),
+    signs: list[SfmSign | None] = [
+        _grade("reprojection error", evidence.error, f"points lie {evidence.error:.2f} px off on average")
     ]
+    if len(model.names) >= FEW and len(model.points):
+        length = len(model.pixels) / len(model.points)
+        signs.append(_grade("track length", 1 / length, f"a point is seen by {length:.1f} photos on average"))
+    turn, gps = _judge_gps(model, evidence.positions, normal)
+    signs += [gps, *_judge_directions(model, normal, turn), _judge_climb(model, evidence.positions, normal)]
+    if ratio := evidence.focal_ratio:
+        reason = f"the photos alone say {ratio:.2f} times the focal length of EXIF"
+        signs.append(_grade("focal length", max(ratio, 1 / ratio), reason))
+    signs.append(_judge_roughness(model))
+    heights = np.array([camera.centre @ normal for camera in model.cameras]) - offset
+    relief = spread / max(abs(float(np.median(heights))), 1e-12)
+    signs.append(_grade("relief", relief, f"points lie {relief:.2f} flying heights off their plane"))
+    placed, images = len(model.names), evidence.images
+    signs.append(_grade("placed", 1 - placed / images, f"{placed} of {images} photos found a place"))
+    if (groups := evidence.groups)[1:]:
+        said = " | ".join(f"{group[0]} ... {group[-1]}" for group in groups)
+        reason = f"groups ({said}) that share no ground: only one of them can be used"
+        signs.append(SfmSign("groups", "doubtful", f"your photos fall into {len(groups)} {reason}"))
     known = tuple(sign for sign in signs if sign)
     return SfmVerdict(combine_grades(known), known)
 
@@ -120,13 +128,6 @@ def _grade(name: str, value: float, reason: str) -> SfmSign:
     limit = THRESHOLDS[name]
     grade = "refused" if value > limit.refused else "doubtful" if not value <= limit.doubtful else "good"
     return SfmSign(name, grade, reason)
-
-
-def _judge_tracks(model: ColmapModel) -> SfmSign | None:
-    if len(model.names) < FEW or not len(model.points):
-        return None
-    length = len(model.pixels) / len(model.points)
-    return _grade("track length", 1 / length, f"a point is seen by {length:.1f} photos on average")
 
 
 def _judge_gps(
@@ -216,14 +217,6 @@ def _measure_angles(lines: Float[Array, "n 3"], line: Float[Array, "3"]) -> Floa
     return np.degrees(np.arccos(np.clip(np.abs(lines @ line), 0, 1)))
 
 
-def _judge_focal_length(ratio: float | None) -> SfmSign | None:
-    if ratio is None:
-        return None
-    return _grade(
-        "focal length", max(ratio, 1 / ratio), f"the photos alone say {ratio:.2f} times the focal length of EXIF"
-    )
-
-
 def _judge_roughness(model: ColmapModel) -> SfmSign | None:
     """How much the distance changes between points that are neighbours in a photo, over the distance; median."""
     found = []
@@ -241,24 +234,6 @@ def _judge_roughness(model: ColmapModel) -> SfmSign | None:
     return _grade(
         "roughness", value, f"points side by side in a photo differ by {value:.1%} of their distance (median)"
     )
-
-
-def _judge_relief(model: ColmapModel, normal: Float[Array, "3"], offset: float, spread: float) -> SfmSign:
-    heights = np.array([camera.centre @ normal for camera in model.cameras]) - offset
-    relief = spread / max(abs(float(np.median(heights))), 1e-12)
-    return _grade("relief", relief, f"points lie {relief:.2f} flying heights off their plane")
-
-
-def _judge_share(placed: int, images: int) -> SfmSign:
-    return _grade("placed", 1 - placed / images, f"{placed} of {images} photos found a place")
-
-
-def _judge_groups(groups: tuple[tuple[str, ...], ...]) -> SfmSign | None:
-    if len(groups) < 2:
-        return None
-    said = " | ".join(f"{group[0]} ... {group[-1]}" for group in groups)
-    reason = f"your photos fall into {len(groups)} groups ({said}) that share no ground: only one of them can be used"
-    return SfmSign("groups", "doubtful", reason)
 
 
 def require_trust(verdict: SfmVerdict) -> None:
