@@ -15,7 +15,7 @@ with logging_to(snakemake.log[0]):
     taken = candidates.read_captured_cameras(paths.model, split, paths.captures)
     state = stopping.read_state(paths, len(split.start), len(taken), len(scored))
     k, chosen = selection.poses_per_round(policy, params.k, len(scored)), []
-    decided = stopping.decide_poses(params.stop, k, params.scene.get("burst", 1), state)
+    decided = stopping.decide_poses(params.stop, k, 1, state)
     if not decided.stopped:
         remaining = candidates.list_remaining(params.scene, frame, paths.model, split, paths.captures)
         places, rng = candidates.camera_positions(taken, frame), np.random.default_rng([params.seed, params.t])

@@ -212,8 +212,13 @@ def test_an_agent_knows_the_poses_of_this_round_and_the_earlier_ones(site, tmp_p
     write_capture_record(tmp_path / "before", "handheld", [record])
     now, seen = requested(0.0, 1.0), []
     monkeypatch.setattr(capturing.pools, "list_remaining", lambda *_: now)
-    listen = replace(AGENTS["handheld"], take=lambda site, _: seen.extend(site.requested))
-    monkeypatch.setitem(AGENTS, "handheld", listen)
+
+    def listen(site, _):
+        seen.extend(site.requested)
+        raise InputError("photos are missing")
+
+    monkeypatch.setitem(AGENTS, "handheld", replace(AGENTS["handheld"], take=listen))
     chosen = [pose for pose, _ in now]
-    capturing.capture_views(site, ViewSplit((), (), ()), [tmp_path / "before"], chosen, tmp_path / "capture")
+    with pytest.raises(InputError, match="photos are missing"):
+        capturing.capture_views(site, ViewSplit((), (), ()), [tmp_path / "before"], chosen, tmp_path / "capture")
     assert [pose_key(camera) for camera in seen] == [pose_key(at(x)) for x in (3.0, 0.0, 1.0)]

@@ -48,10 +48,9 @@ class FlightRules:
 
 @dataclass(frozen=True)
 class Flight:
-    """A plan: content of its file, length in metres, duration in seconds, and a description."""
+    """A plan: content of its file, duration in seconds, and a description."""
 
     content: dict
-    length: float
     duration: float
     description: str
 
@@ -157,7 +156,7 @@ def plan_flight(views: list[NamedCamera], place: Georeference, home: Float[Array
         f"a flight of {length:.0f} m, about {np.ceil(duration / 60):.0f} min, up to {at[:, 2].max():.0f} m above the "
         f"ground; take off from the ground near {latitude:.6f}, {longitude:.6f}"
     )
-    return Flight(mission.to_plan(rules.speed), length, duration, description)
+    return Flight(mission.to_plan(rules.speed), duration, description)
 
 
 def plan_detour(a: Float[Array, "3"], b: Float[Array, "3"], clearance: float) -> list[Float[Array, "3"]]:

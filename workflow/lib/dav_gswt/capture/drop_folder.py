@@ -37,21 +37,22 @@ def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str
     found = [(p, camera) for p, camera in zip(paths, localize_photos(site.photos, paths), strict=True) if camera]
     for path in sorted(set(paths) - {p for p, _ in found}):
         _log.warning("%s: it could not be localised; it must overlap photos of the scene", path.name)
+    open_poses = [(pose, camera) for pose, camera in requested if site.lacks_photo(camera)]
     pairs = [
         (view_distance(camera, got, site.unit), pose.name, path.name, path)
         for path, got in found
-        for pose, camera in requested
+        for pose, camera in open_poses
     ]
     places, assigned = dict(found), {}
     for distance, name, _, path in sorted(pairs):
         if distance <= NEAR and name not in assigned and path not in assigned.values():
             assigned[name] = path
-    for pose, camera in requested:
+    for pose, camera in open_poses:
         if path := assigned.get(pose.name):
             site.store.add(path, agent, (pose, camera), places[path], _read_time(path))
     for path in sorted(set(places) - set(assigned.values())):
         _log.warning("%s: it is near no requested pose; it is not used", path.name)
-    return [(pose, camera) for pose, camera in requested if pose.name not in assigned]
+    return [(pose, camera) for pose, camera in open_poses if pose.name not in assigned]
 
 
 def _list_new_photos(site: Site, requested: list[RequestedPose]) -> list[Path]:

@@ -19,7 +19,6 @@ import time
 from binascii import crc_hqx
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 import serial
@@ -40,14 +39,6 @@ STOPPED = "the rig's stop button is pressed; release it when the way is clear, t
 RESTARTED = "the rig restarted and lost its position; run the same again: photos taken until now are kept"
 _NUMBER = re.compile(r"[+-]?[0-9]{1,7}(\.[0-9]{1,6})?")
 _LINE = re.compile(rb"([\x20-\x7e]+)\*([0-9A-Fa-f]{4})\r?\n")
-
-
-@dataclass(frozen=True)
-class RigDescription:
-    """Properties that a rig reports: degrees, degrees, millimetres. limits: of each axis. home: position after HOME."""
-
-    limits: Float[Array, "3 2"]
-    home: Float[Array, "3"]
 
 
 def frame_line(text: str) -> bytes:
@@ -109,13 +100,16 @@ class SerialLine:
         self._seq = FIRST + secrets.randbelow(LAST - FIRST)
         self._rest = b""
 
-    def hello(self) -> RigDescription:
-        """Ask for the rig's properties. The rig forgets the numbers that it acted on."""
+    def hello(self) -> tuple[Float[Array, "3 2"], Float[Array, "3"]]:
+        """Ask for the limits of the axes and the position after HOME: degrees, degrees, millimetres.
+
+        The rig forgets the numbers that it acted on.
+        """
         words = self._request("HELLO", VERSION)
         if words[:1] != [VERSION]:
             raise InputError(f"{self._name}: the rig speaks version {' '.join(words[:1])}, not {VERSION}: update it")
         numbers = self._parse_numbers("HELLO", words[1:], 9)
-        return RigDescription(numbers[:6].reshape(3, 2), numbers[6:])
+        return numbers[:6].reshape(3, 2), numbers[6:]
 
     def home(self) -> None:
         """Begin homing."""

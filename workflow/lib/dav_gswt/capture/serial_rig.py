@@ -44,14 +44,14 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     list_photos(Path(rig["inbox"]))  # raises if the folder does not exist
     mount = build_mount(rig, site.frame)
     with serial_protocol.open_line(rig["port"], rig["baud"], float(rig["timeout"]), rig["retries"]) as line:
-        device = line.hello()
-        limits = rig_limits.combine_limits(rig["limits"], rig["no_go"], device.limits)
-        stops = _plan_stops(limits, device.home, mount, requested)
+        reported, home = line.hello()
+        limits = rig_limits.combine_limits(rig["limits"], rig["no_go"], reported)
+        stops = _plan_stops(limits, home, mount, requested)
         if rig["dry_run"]:
             for name, path in stops:
                 _log.info("%s: %s", name, "; then ".join(describe_axes(place) for place in path) or "no move")
         else:
-            _photograph_poses(site, SerialRig(rig, line, limits, device.home), mount, requested)
+            _photograph_poses(site, SerialRig(rig, line, limits, home), mount, requested)
     if rig["dry_run"]:
         raise InputError(
             f"a dry run: the rig can reach all {len(stops)} poses, nothing was moved and no photo was taken; with "
