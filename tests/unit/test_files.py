@@ -92,42 +92,27 @@ def test_a_path_of_the_config_may_lie_below_the_home_or_the_repository(tmp_path,
     assert [files.locate_path(name, tmp_path) for name in ("photos", "config")] == [Path("photos"), Path("config")]
 
 
-@pytest.fixture
-def photos(tmp_path):
+def test_the_provenance_of_a_folder_is_the_digest_of_its_files_by_name(tmp_path):
+    def told(given):
+        return record_provenance({"photos": given}, {})["inputs"]["photos"]
+
     for name in ("b.png", "a.png", ".hidden"):
         (tmp_path / name).write_text(name)
-    return tmp_path
+    assert told(tmp_path) == digest_files(tmp_path / "a.png", tmp_path / "b.png")
+    assert told([tmp_path / "b.png", tmp_path]) == digest_files(*(tmp_path / f"{n}.png" for n in "bab"))
 
 
-def test_the_provenance_of_a_folder_is_the_digest_of_its_files_by_name(photos):
-    def told(*given):
-        return record_provenance({"photos": given[0] if len(given) == 1 else list(given)}, {})["inputs"]["photos"]
-
-    before = told(photos)
-    assert before == digest_files(photos / "a.png", photos / "b.png")
-    assert told(photos / "b.png", photos) == digest_files(*(photos / f"{n}.png" for n in "bab"))
-    (photos / "b.png").write_text("another")
-    assert told(photos) != before
+def test_results_come_in_the_order_of_the_items_and_an_error_where_its_result_is_taken():
+    for threads in (1, 2, 5):
+        results = map_ahead(lambda item: 6 // item, [1, 3, 2, 0], threads)
+        assert [next(results) for _ in range(3)] == [6, 2, 3]
+        with pytest.raises(ZeroDivisionError):
+            next(results)
 
 
-@pytest.mark.parametrize("threads", [1, 2, 5])
-def test_results_come_in_the_order_of_the_items(threads):
-    assert list(map_ahead(lambda item: item * item, range(7), threads)) == [0, 1, 4, 9, 16, 25, 36]
-
-
-def test_the_next_items_are_worked_on_while_one_is_taken():
+def test_the_next_items_are_worked_on_while_one_is_taken_but_no_more_than_there_are_threads():
     both = threading.Barrier(2, timeout=10)  # broken unless two threads meet here
     assert list(map_ahead(lambda item: both.wait() >= 0, range(4), 2)) == [True] * 4
-
-
-def test_no_more_results_wait_than_there_are_threads():
     begun = []
     for taken, _ in enumerate(map_ahead(begun.append, range(20), 3), start=1):
         assert len(begun) <= taken + 3
-
-
-def test_an_error_arises_where_its_result_is_taken():
-    results = map_ahead(lambda item: 1 // item, [1, 0], 1)
-    assert next(results) == 1
-    with pytest.raises(ZeroDivisionError):
-        next(results)

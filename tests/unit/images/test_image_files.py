@@ -89,10 +89,8 @@ def test_more_pixels_than_allowed_are_refused_with_their_number(tmp_path, monkey
 
 
 def test_a_float_image_with_nan_is_refused(tmp_path):
-    pixels = np.full((4, 4, 3), 0.5, np.float32)
-    pixels[1, 2] = np.nan
     with pytest.raises(InputError, match="finite"):
-        image_files.read_photo(stored(tmp_path / "a.tif", pixels))
+        image_files.read_photo(stored(tmp_path / "a.tif", np.full((4, 4, 3), np.nan, np.float32)))
 
 
 def test_photos_are_listed_by_name_without_hidden_and_other_files(tmp_path):
@@ -107,17 +105,14 @@ def test_photos_are_listed_by_name_without_hidden_and_other_files(tmp_path):
         image_files.list_photos(tmp_path / "nowhere")
 
 
-def test_shrinking_averages_areas_by_hand():
+def test_shrinking_averages_areas():
     row = np.array([[0.0, 3.0, 6.0]], np.float32)[..., None]
-    # Two pixels of 1.5 old ones each: (0 + 3/2) / 1.5 = 1 and (3/2 + 6) / 1.5 = 5.
+    # two pixels of 1.5 old ones each: (0 + 3/2) / 1.5 = 1 and (3/2 + 6) / 1.5 = 5
     assert image_files.shrink_image(row, 2, 1)[0, :, 0] == pytest.approx([1, 5])
     with pytest.raises(ValueError, match="does not shrink"):
         image_files.shrink_image(row, 4, 1)
-
-
-def test_shrinking_equals_blocks_of_the_finest_common_grid():
     image = GENERATOR.random((6, 10, 3)).astype(np.float32)
-    fine = image.repeat(2, 0).repeat(4 // 2, 1)  # 12 x 20: multiples of 4 x 5
+    fine = image.repeat(2, 0).repeat(2, 1)  # 12 x 20: multiples of 4 x 5
     slow = fine.reshape(4, 3, 5, 4, 3).mean((1, 3))
     assert image_files.shrink_image(image, 5, 4) == pytest.approx(slow, abs=1e-6)  # one rounding to float32
     assert image_files.shrink_to(image, 5).shape == (3, 5, 3)

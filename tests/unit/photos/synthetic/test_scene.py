@@ -60,7 +60,7 @@ def test_a_stone_a_plant_and_shadows_are_where_the_land_says():
     corners = np.array([[-40, -40, 0], [40, -40, 0], [40, 40, 0], [-40, 40, 0]], np.float32)
     ground = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), None, smooth=True)
     albedo = np.tile(np.float32([0.8, 0.1, 0.1]), (2, 2, 1))
-    light = Light(40.0, 0.0, (2.0, 2.0, 2.0), (0.1, 0.1, 0.1), (0.1, 0.1, 0.1), np.full(3, 0.1))
+    light = Light(40.0, 0.0, (2.0, 2.0, 2.0), (0.05, 0.05, 0.2), (0.3, 0.1, 0.1), np.full(3, 0.1))
     size, yaw, slope = 0.8, 0.6, np.array([0.2, -0.3])
     places = np.array([[0, 1.5, 0.5, 0.25, size, yaw, *slope]])
     stone = box((0.1, 0.8, 0.1), (-1.5, 0.0, 0.0))
@@ -79,7 +79,10 @@ def test_a_stone_a_plant_and_shadows_are_where_the_land_says():
     column, row = camera.project(at)[0].astype(int).T
     colours = seen[row, column]
     assert colours[:3].argmax(axis=1).tolist() == [1, 2, 0]
-    assert colours[2:].max(axis=1) == pytest.approx([0.46, 0.07, 0.46], abs=0.1)  # lit, in the stone's shadow, lit
+    assert colours[2:].max(axis=1) == pytest.approx([0.37, 0.05, 0.37], abs=0.1)  # lit, in the stone's shadow, lit
+    for target, colour in (((0.0, 0.0, 9.0), light.zenith), ((0.0, 9.0, 3.05), light.horizon)):
+        sky = mitsuba_scene.render_light(world, pinhole((0.0, 0.0, 3.0), target, 16, 16, 1.0), 16, 0)
+        assert sky[:7].mean(axis=(0, 1)) == pytest.approx(colour, rel=0.15)
 
 
 def test_a_picture_repeats_to_the_byte_whatever_the_threads_and_another_differs_in_its_noise():
