@@ -302,12 +302,6 @@ def make_surface(grid: Ground, step: int) -> pv.PolyData:
     return pv.PolyData.from_regular_faces(points.astype(np.float32), cells)
 
 
-def outline(west: float, south: float, east: float, north: float) -> pv.PolyData:
-    """The border of a level rectangle at height 0."""
-    corners = [[west, south, 0.0], [east, south, 0.0], [east, north, 0.0], [west, north, 0.0]]
-    return pv.lines_from_points(np.array(corners, np.float32), close=True)
-
-
 @reader("ground.json")
 def read_photos(path: Path, *, most: int) -> Scene:
     """photos/: its model and photos, by what each is for if one seed alone says so."""
@@ -372,7 +366,9 @@ def _add_ground(scene: Scene, frame: SceneFrame, eyes: Float[Array, "n 3"]) -> N
     """Add the borders of the exemplar and of all visible ground. The first view shows the exemplar and the eyes."""
     square = frame.exemplar
     for area, colour in zip((square, frame.extent), GROUND_NAMES.values(), strict=True):
-        scene.add(outline(area.west, area.south, area.east, area.north), colour, line_width=3.0)
+        corners = [[area.west, area.south, 0.0], [area.east, area.south, 0.0], [area.east, area.north, 0.0]]
+        corners = np.array([*corners, [area.west, area.north, 0.0]], np.float32)
+        scene.add(pv.lines_from_points(corners, close=True), colour, line_width=3.0)
     points = np.concatenate([eyes, [[square.west, square.south, 0.0], [square.east, square.north, 0.0]]])
     scene.box = np.array([points.min(0), points.max(0)])
     scene.names |= GROUND_NAMES
@@ -424,7 +420,9 @@ def _arrange_poses(path: Path, poses: Path | None, colour: str | None, most: int
     rest = np.setdiff1d(np.arange(len(table)), chosen)
     for rows, size in ((rest, BALL), (np.array(chosen, int), CHOSEN_BALL)):
         if len(rows):
-            scene.add(*make_balls(at[rows], size * radius, tint[rows]))
+            ball = pv.Icosphere(radius=size * radius, nsub=2)
+            balls = pv.PolyData(at[rows].astype(np.float32)).glyph(geom=ball, scale=False, orient=False)
+            scene.add(balls, np.repeat(tint[rows], ball.n_points, 0))
     for number, k in enumerate(chosen, 1):
         scene.add(pv.Line(middle, at[k]), BLACK, line_width=2.0)
         scene.add_label(f"{number}", at[k] + [0, 0, (CHOSEN_BALL + NUMBER) * radius], NUMBER * radius, upright=True)
@@ -435,22 +433,11 @@ def _arrange_poses(path: Path, poses: Path | None, colour: str | None, most: int
     return scene
 
 
-def make_balls(
-    centres: Float[Array, "n 3"], radius: float, colours: UInt8[Array, "n 3"]
-) -> tuple[pv.DataSet, UInt8[Array, "m 3"]]:
-    """A ball at each place, and the colours of its points."""
-    ball = pv.Icosphere(radius=radius, nsub=2)
-    balls = pv.PolyData(centres.astype(np.float32)).glyph(geom=ball, scale=False, orient=False)
-    return balls, np.repeat(colours, ball.n_points, 0)
-
-
 def _read_marked(table: Scores, poses: Path | None) -> list[int]:
     """The rows of a poses.json among the candidates, in order."""
     if poses is None:
         return []
-    content = read_json(poses)
-    with wrap_errors(poses):
-        names = [str(pose["name"]) for pose in content["poses"]]
+    names = [pose.name for pose in read_pose_selection(poses).poses]
     index = {name: i for i, name in enumerate(table.names)}
     if unknown := [name for name in names if name not in index]:
         raise InputError(f"{poses}: {unknown[0]} is not among the scored poses; give the poses of the round after")
