@@ -15,7 +15,7 @@ from dav_gswt.files import read_json, write_json
 from dav_gswt.geometry.cameras import camera_to_json
 from dav_gswt.geometry.poses import pose_offset
 from dav_gswt.images import image_files
-from dav_gswt.inspect import camera_readers, map_readers, plot, readers
+from dav_gswt.inspect import plot, readers
 from dav_gswt.inspect.plot import Bar, Scene
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import store
@@ -143,7 +143,7 @@ def test_parts_channels_grounds_and_headers_that_do_not_fit_are_refused(tree, tm
 def test_a_folder_of_materials_shows_its_map_whose_holes_are_grey(tmp_path):
     layers = {"material": np.array([[np.inf, 1], [2, 3]], np.float32), "object": np.eye(2, dtype=np.float32)}
     image_files.write_exr(tmp_path / "materials.exr", layers, {"west": "0.0"})
-    shown = map_readers.read_materials(tmp_path / "materials.json", most=MOST)
+    shown = readers.read_materials(tmp_path / "materials.json", most=MOST)
     assert shown.notes == ["parts: 1; pictures: 2 of 2; grey: not a number"]
     np.testing.assert_array_equal(shown.meshes[0][1]["texture"].to_array()[0, 0], [150, 150, 150])
 
@@ -178,12 +178,12 @@ def test_poses_of_other_scores_or_outside_the_result_tree_are_refused(tree, tmp_
     for content, said in ((mine.read_text().replace("pose_0", "pose_9"), "is not among"), ('{"poses": 3}', "not as")):
         mine.write_text(content)
         with pytest.raises(InputError, match=f"poses.json: .*{said}"):
-            camera_readers._arrange_poses(scores, mine, None, MOST)
+            readers._arrange_poses(scores, mine, None, MOST)
 
 
 def test_a_camera_is_a_pyramid_whose_base_fills_its_picture():
     camera, scene = result_tree.camera(POSES[3]), Scene("", [])
-    camera_readers.add_frustum(scene, camera, 0.5, (1, 2, 3))
+    readers.add_frustum(scene, camera, 0.5, (1, 2, 3))
     ((mesh, _),) = scene.meshes
     assert mesh.n_cells == 8
     points = mesh.points.astype(float)
@@ -205,7 +205,7 @@ def test_names_that_lead_out_of_the_folder_are_refused(tmp_path):
     for got, said in (({}, "not as the workflow writes it"), (camera, "is no file's name")):
         write_json(tmp_path / "capture.json", {"shots": [{"name": "../../secret.png", "got": got}]})
         with pytest.raises(InputError, match=said):
-            camera_readers.read_shots(tmp_path / "capture.json")
+            readers.read_shots(tmp_path / "capture.json")
 
 
 @pytest.fixture(scope="module")

@@ -1,1 +1,18 @@
 """The command line: `dav-gswt`, and what `make run` and `make view` call."""
+
+import argparse
+import sys
+
+from dav_gswt.errors import InputError
+from dav_gswt.logs import describe_os_error
+
+
+def run_safely(options: argparse.Namespace) -> int:
+    """Call `options.run`. Returns its exit status, or that of an error, whose message is printed."""
+    try:
+        return options.run(options) or 0
+    except (InputError, OSError) as error:
+        print(describe_os_error(error) if isinstance(error, OSError) else error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130

@@ -4,14 +4,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from dav_gswt.cli import export
-from dav_gswt.errors import InputError
+from dav_gswt.cli import export, run_safely
 from dav_gswt.inspect import command as inspect
-from dav_gswt.logs import describe_os_error
 from dav_gswt.paths import RESULTS
 from dav_gswt.terrain import serve
-from dav_gswt.terrain.gallery import write_gallery
-from dav_gswt.terrain.page_front import FRONT
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -33,19 +29,10 @@ def main(arguments: list[str] | None = None) -> int:
     return run_safely(parser.parse_args(arguments))
 
 
-def run_safely(options: argparse.Namespace) -> int:
-    """Call `options.run`. Returns its exit status, or that of an error, whose message is printed."""
-    try:
-        return options.run(options) or 0
-    except (InputError, OSError) as error:
-        print(describe_os_error(error) if isinstance(error, OSError) else error, file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
-
-
 def find_pages(results: Path) -> list[Path]:
     """The newest page with a front of each scene, by the scenes' names."""
+    from dav_gswt.terrain.page_front import FRONT  # here, not above: it is slow to load
+
     newest: dict[str, Path] = {}
     for front in sorted(results.glob(f"*/seed*/**/terrain/page/{FRONT}"), key=lambda path: path.stat().st_mtime):
         newest[front.relative_to(results).parts[0]] = front.parent
@@ -53,6 +40,8 @@ def find_pages(results: Path) -> list[Path]:
 
 
 def _run_gallery(options: argparse.Namespace) -> None:
+    from dav_gswt.terrain.gallery import write_gallery  # here, not above: it is slow to load
+
     entries = write_gallery(options.pages or find_pages(Path(RESULTS)), Path("workflow/gallery"), options.out)
     print(f"{options.out / 'index.html'}: {', '.join(entry.name for entry in entries)}")
     print(f"Any static host takes the folder {options.out} as it is.")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import psutil
 
-from dav_gswt.cli.main import run_safely
+from dav_gswt.cli import run_safely
 from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.errors import InputError
 from dav_gswt.paths import encode_branch, stage_folder

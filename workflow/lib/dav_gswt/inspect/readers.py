@@ -7,7 +7,8 @@ line that it accepts. A folder is searched for the names in the order in which t
 import inspect
 from collections.abc import Callable
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +25,23 @@ from dav_gswt.bundle import store as bundles
 from dav_gswt.errors import InputError
 from dav_gswt.export.splats import TILES_PER_ROW
 from dav_gswt.field import GaussianField, read_field
-from dav_gswt.inspect.plot import Bar, Scene, to_bytes
+from dav_gswt.files import read_json
+from dav_gswt.geometry.cameras import Camera, camera_from_json
+from dav_gswt.geometry.poses import pose_offset
+from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
+from dav_gswt.images import image_files
+from dav_gswt.inspect.plot import BLACK, UNCERTAINTY_MAP, Bar, Colour, Scene, to_bytes
 from dav_gswt.lod import store as levels
-from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.paths import decode_path, related_folder
+from dav_gswt.photos.view_split import read_view_split
+from dav_gswt.reconstruction.ground import Ground, read_ground
 from dav_gswt.tiles import store as tiles
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import EDGES, LABELS, arrange_torus
+from dav_gswt.views import pose_maps
+from dav_gswt.views.score_colours import HIGHEST, candidate_values
+from dav_gswt.views.scores import Scores, read_scores
+from dav_gswt.views.selection import read_pose_selection
 
 Reader = Callable[..., Scene]
 READERS: dict[str, Reader] = {}
@@ -43,6 +55,12 @@ CUT_COLOUR, CUT_WIDTH = (255, 214, 10), 0.012  # least width of a cut, in tile s
 HEXAGON = np.stack([np.cos(np.arange(6) * np.pi / 3), np.sin(np.arange(6) * np.pi / 3), np.zeros(6)], -1)
 OCTAHEDRON = np.concatenate([np.eye(3), -np.eye(3)])
 SIDES = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+DEPTH = 0.12  # flying heights from a camera to its picture
+PHOTO_SIDE = 160  # pixels of a photo's longer side
+BALL, CHOSEN_BALL, NUMBER = 0.018, 0.03, 0.07  # radii and height, in radii of the hemisphere
+ROLES = {"start": (34, 136, 51), "pool": (68, 119, 170), "test": (238, 102, 119), "photo": (90, 90, 90)}
+CAPTURED = (170, 51, 119)
+GROUND_NAMES = {"exemplar": (230, 140, 0), "seen by a photo": (120, 120, 120)}
 ASPECT, LETTER = 1.6, 0.05  # of all pictures side by side, width over height; height of letters, in picture widths
 MAX_PICTURES, MAX_SIDE = 60, 1024  # pictures of a scene, and pixels of a picture's longer side
 
@@ -62,8 +80,6 @@ def read_scene(path: Path, most: int, **given: Any) -> Scene:
 
     Raises: InputError: there is no such file, its kind is unknown, or it is damaged.
     """
-    from dav_gswt.inspect import camera_readers, map_readers  # noqa: F401 (they register their readers)
-
     inside = [path / name for name in READERS if (path / name).is_file()]
     file = inside[0] if inside else path
     read = READERS.get(file.name) or READERS.get(file.suffix.lower())
@@ -109,13 +125,13 @@ def choose(option: str, value: str | None, names: tuple[str, ...], path: Path) -
 def read_levels(path: Path, *, most: int, colour: str | None = None, level: int | None = None) -> Scene:
     """All levels of detail side by side, the finest in the west, or one of them."""
     fields = levels.read_levels(path.parent).fields
-    return arrange_fields(path, fields, _choose_levels(level, len(fields), path), colour, most)
+    return _arrange_fields(path, fields, _choose_levels(level, len(fields), path), colour, most)
 
 
 @reader("field.ply", ".ply")
 def read_one_field(path: Path, *, most: int, colour: str | None = None) -> Scene:
     """A field of the workflow, or of another program."""
-    return arrange_fields(path, [read_field(path)], None, colour, most)
+    return _arrange_fields(path, [read_field(path)], None, colour, most)
 
 
 def _choose_levels(level: int | None, count: int, path: Path) -> list[int]:
@@ -124,7 +140,7 @@ def _choose_levels(level: int | None, count: int, path: Path) -> list[int]:
     return list(range(count)) if level is None else [level]
 
 
-def arrange_fields(
+def _arrange_fields(
     path: Path, fields: list[GaussianField], numbers: list[int] | None, colour: str | None, most: int
 ) -> Scene:
     """Fields side by side. numbers: the levels that are shown; None: the fields are no levels."""
@@ -234,7 +250,7 @@ def _arrange_tiles(
             placed = replace(field, means=field.means + corner.astype(np.float32))
             named = _shade(np.array(PATCH_COLOURS)[patches], field)
             add_solids(scene, placed, named if by == "patch" else compute_colours(field, by))
-        if cut and by != "patch":
+        if cut and by != "patch" and len(field):
             scene.add(make_cuts(cut, tile, level).translate(corner, inplace=False), CUT_COLOUR)
         middle = float(np.median(field.means[:, 2])) if len(field) else 0.0
         scene.add_label(f"{tile}", corner + [0.5 * side, -0.6 * GAP * side, middle], 0.1 * side)
@@ -285,7 +301,243 @@ def make_surface(grid: Ground, step: int) -> pv.PolyData:
     return pv.PolyData.from_regular_faces(points.astype(np.float32), cells)
 
 
-def outline(west: float, south: float, east: float, north: float) -> pv.PolyData:
-    """The border of a level rectangle at height 0."""
-    corners = [[west, south, 0.0], [east, south, 0.0], [east, north, 0.0], [west, north, 0.0]]
-    return pv.lines_from_points(np.array(corners, np.float32), close=True)
+@reader("ground.json")
+def read_photos(path: Path, *, most: int) -> Scene:
+    """photos/: its model and photos, by what each is for if one seed alone says so."""
+    splits = sorted(path.parents[1].glob("seed*/views.json"))
+    return _arrange_photos(path, path.parent, splits[0] if len(splits) == 1 else None, [])
+
+
+@reader("capture.json")
+def read_capture(path: Path, *, most: int) -> Scene:
+    """The photos of a round among those of the scene."""
+    return _arrange_photos(path, find_photos(path), None, read_shots(path))
+
+
+@reader("views.json")
+def read_split(path: Path, *, most: int) -> Scene:
+    """The photos by what they are for."""
+    return _arrange_photos(path, find_photos(path), path, [])
+
+
+def read_shots(path: Path) -> list[tuple[Camera, Path]]:
+    """The cameras and photos of a capture.json. Raises: InputError: damaged, or a name leads out of its folder."""
+    content = read_json(path)
+    with wrap_errors(path):
+        shots = [(str(shot["name"]), camera_from_json(shot["got"])) for shot in content["shots"]]
+    for name, _ in shots:
+        if Path(name).name != name:
+            raise InputError(f"{path}: {name!r} is no file's name; take the photos again")
+    return [(camera, path.parent / name) for name, camera in shots]
+
+
+def find_photos(path: Path) -> Path:
+    """The folder photos/ of the scene that a file belongs to. Raises: InputError: there is none."""
+    frame = find_above(path, "photos/ground.json")
+    if frame is None:
+        raise InputError(f"{path}: photos/ground.json is in no folder above it; leave it in its result tree")
+    return frame.parent
+
+
+def _arrange_photos(path: Path, folder: Path, split: Path | None, captured: list[tuple[Camera, Path]]) -> Scene:
+    """A photos/ folder. split: views.json. captured: further cameras, and their photos."""
+    from dav_gswt.photos.colmap_model import read_colmap_model  # here, not above: it loads pycolmap
+
+    frame, model = read_scene_frame(folder / "ground.json"), read_colmap_model(folder / "sparse")
+    roles = {name: role for role, names in asdict(read_view_split(split)).items() for name in names} if split else {}
+    scene, depth = Scene(str(path), []), DEPTH * frame.flying_height
+    for name, camera in zip(model.names, model.cameras, strict=True):
+        role = roles.get(name, "photo")
+        scene.names[role] = ROLES[role]
+        add_frustum(scene, camera, depth, ROLES[role], folder / "images" / name)
+    for camera, file in captured:
+        scene.names["taken for a round"] = CAPTURED
+        add_frustum(scene, camera, depth, CAPTURED, file)
+    if len(model.points):
+        scene.add(pv.PolyData(model.points.astype(np.float32)), to_bytes(model.colours), style="points", point_size=3.0)
+    eyes = np.array([camera.centre for camera in [*model.cameras, *(each for each, _ in captured)]]).reshape(-1, 3)
+    _add_ground(scene, frame, eyes)
+    scene.notes = [f"{len(eyes)} cameras, {len(model.points)} points; unit: {frame.unit[:40]}"]
+    return scene
+
+
+def _add_ground(scene: Scene, frame: SceneFrame, eyes: Float[Array, "n 3"]) -> None:
+    """Add the borders of the exemplar and of all visible ground. The first view shows the exemplar and the eyes."""
+    square = frame.exemplar
+    for area, colour in zip((square, frame.extent), GROUND_NAMES.values(), strict=True):
+        corners = [[area.west, area.south, 0.0], [area.east, area.south, 0.0], [area.east, area.north, 0.0]]
+        corners = np.array([*corners, [area.west, area.north, 0.0]], np.float32)
+        scene.add(pv.lines_from_points(corners, close=True), colour, line_width=3.0)
+    points = np.concatenate([eyes, [[square.west, square.south, 0.0], [square.east, square.north, 0.0]]])
+    scene.box = np.array([points.min(0), points.max(0)])
+    scene.names |= GROUND_NAMES
+
+
+def add_frustum(scene: Scene, camera: Camera, depth: float, colour: Colour, photo: Path | None = None) -> None:
+    """Add a camera as the pyramid of its view, `depth` deep, with its photo as the base, if the file exists."""
+    w, h = camera.width, camera.height
+    pixels = np.array([[0, 0], [w, 0], [w, h], [0, h]])
+    rays = np.c_[(pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy], np.ones(4)] @ camera.rotation
+    corners = camera.centre + depth * rays
+    points = np.concatenate([corners, camera.centre[None]])
+    scene.add(pv.Pyramid(points).extract_all_edges(), colour, line_width=2.0)
+    if photo is not None and photo.is_file():
+        small = image_files.shrink_to(image_files.read_photo(photo), PHOTO_SIDE)
+        scene.add_picture(to_bytes(small), corners[0], corners[1] - corners[0], corners[3] - corners[0])
+
+
+@reader("scores.csv")
+def read_candidates(path: Path, *, most: int, colour: str | None = None) -> Scene:
+    """The candidates by their scores."""
+    return _arrange_poses(path, None, colour, most)
+
+
+@reader("poses.json")
+def read_chosen(path: Path, *, most: int, colour: str | None = None) -> Scene:
+    """A round's poses among the candidates, by the scores by which they were chosen."""
+    return _arrange_poses(find_scores(path), path, colour, most)
+
+
+def _arrange_poses(path: Path, poses: Path | None, colour: str | None, most: int) -> Scene:
+    """path: scores.csv. poses: the poses.json whose poses are marked."""
+    photos, table = find_photos(path), read_scores(path)
+    frame = read_scene_frame(photos / "ground.json")
+    if not len(table):
+        raise InputError(f"{path}: no candidate is in it: none was left to choose from")
+    label, values = candidate_values(table, float(decode_path((poses or path).resolve()).get("lam", 0.0)))
+    if colour is not None:
+        label = choose("colour", colour, tuple(table.terms), path)
+        values = table.terms[label]
+    title, _, unit = label.partition(", ")
+    bar = Bar.of_values(title, values, most=HIGHEST)
+    tint, middle = bar.map(values), frame.exemplar.centre
+    at = middle + np.array([pose_offset(pose) for pose in table.poses])
+    radius = float(np.median(np.linalg.norm(at - middle, axis=1)))
+    chosen = _read_marked(table, poses)
+    scene = Scene(str(poses or path), [f"{len(table)} candidates; {len(chosen)} chosen, numbered in order"], bars=[bar])
+    scene.notes += [f"{title}: {unit}"] if unit else []
+    rest = np.setdiff1d(np.arange(len(table)), chosen)
+    for rows, size in ((rest, BALL), (np.array(chosen, int), CHOSEN_BALL)):
+        if len(rows):
+            ball = pv.Icosphere(radius=size * radius, nsub=2)
+            balls = pv.PolyData(at[rows].astype(np.float32)).glyph(geom=ball, scale=False, orient=False)
+            scene.add(balls, np.repeat(tint[rows], ball.n_points, 0))
+    for number, k in enumerate(chosen, 1):
+        scene.add(pv.Line(middle, at[k]), BLACK, line_width=2.0)
+        scene.add_label(f"{number}", at[k] + [0, 0, (CHOSEN_BALL + NUMBER) * radius], NUMBER * radius, upright=True)
+    field = find_above(path, "field.ply", folders=2)
+    if field and len(kept := thin_field(read_field(field), most)):
+        add_solids(scene, kept, compute_colours(kept, "colour"))
+    _add_ground(scene, frame, at)
+    return scene
+
+
+def _read_marked(table: Scores, poses: Path | None) -> list[int]:
+    """The rows of a poses.json among the candidates, in order."""
+    if poses is None:
+        return []
+    names = [pose.name for pose in read_pose_selection(poses).poses]
+    index = {name: i for i, name in enumerate(table.names)}
+    if unknown := [name for name in names if name not in index]:
+        raise InputError(f"{poses}: {unknown[0]} is not among the scored poses; give the poses of the round after")
+    return [index[name] for name in names]
+
+
+def find_scores(poses: Path) -> Path:
+    """The scores that a round's poses were chosen by, of another preset if that chose them.
+
+    Raises: InputError: they are not where the workflow puts them.
+    """
+    poses = poses.resolve()
+    number = int(decode_path(poses).get("t", 0))
+    if not number:
+        raise InputError(f"{poses}: lies in no round of the result tree; give its scores.csv")
+    by = read_pose_selection(poses).chosen_with
+    of = ({"preset": by} if by else {}) | ({} if number == 1 else {"t": number - 1})
+    scores = related_folder(poses, "scored" if number == 1 else "round", **of) / "scores.csv"
+    if not scores.is_file():
+        raise InputError(f"{poses}: the scores by which they were chosen are missing ({scores}); make them again")
+    return scores
+
+
+@reader("materials.json")
+def read_materials(path: Path, *, most: int, part: str | None = None, channel: str | None = None) -> Scene:
+    """Which material, object and excluded ground each cell of the exemplar belongs to."""
+    return read_exr(path.with_name("materials.exr"), most=most, part=part, channel=channel)
+
+
+@reader("maps.npz")
+def read_pose_maps(
+    path: Path, *, most: int, colour: str | None = None, part: str | None = None, channel: str | None = None
+) -> Scene:
+    """The field by the uncertainty that its maps gave it; with --part or --channel the maps themselves."""
+    maps, uncertainty = pose_maps.read_pose_maps(path)
+    if part is not None or channel is not None:
+        with wrap_errors(path):
+            known = {"opacity": maps.opacity} | ({} if maps.w2_sq is None else {"w2_sq": maps.w2_sq})
+            parts = {name: {key: values[i] for key, values in known.items()} for i, name in enumerate(maps.names)}
+        return _arrange_pictures(path, parts, part, channel)
+    file = find_above(path, "field.ply", folders=2)
+    if file is None:
+        raise InputError(f"{path}: there is no field.ply beside it, whose Gaussians it describes")
+    field = read_field(file)
+    if uncertainty.ndim != 1 or len(uncertainty) > len(field) or not np.isfinite(uncertainty).all():
+        raise InputError(f"{path}: describes other Gaussians than {file} has; score the poses again")
+    field = pose_maps.apply_uncertainty(field, uncertainty.astype(np.float32))
+    return _arrange_fields(path, [field], None, colour or "uncertainty", most)
+
+
+@reader(".exr")
+def read_exr(path: Path, *, most: int, part: str | None = None, channel: str | None = None) -> Scene:
+    """A ground grid, or the part `above` if it is named, as a surface; anything else as pictures."""
+    parts = image_files.read_exr_parts(path)
+    first, facts = next(iter(parts.values()))
+    if len(parts) == 1 and "ground_west" in facts:
+        return _show_surface(path, read_ground(path), first, channel, most)
+    if part == "above" and part in parts:
+        file = find_above(path, "ground.exr", folders=2)
+        if file is None:
+            raise InputError(f"{path}: there is no ground.exr beside it, on which its part {part} is drawn")
+        return _show_surface(path, read_ground(file), parts[part][0], channel, most)
+    return _arrange_pictures(path, {name: channels for name, (channels, _) in parts.items()}, part, channel)
+
+
+def _arrange_pictures(path: Path, parts: dict[str, dict[str, Array]], part: str | None, channel: str | None) -> Scene:
+    """Each selected channel of each selected part, in rows from the top left, with one scale for each channel."""
+    selected = parts if part is None else {part: parts[choose("part", part, tuple(parts), path)]}
+    if channel is not None:
+        choose("channel", channel, tuple(sorted({name for each in selected.values() for name in each})), path)
+    found = [(name, key, values) for name, channels in selected.items() for key, values in channels.items()]
+    shown = [each for each in found if channel in (None, each[1]) and each[2].ndim == 2][:MAX_PICTURES]
+    if not shown:
+        raise InputError(f"{path}: has no pictures")
+    bars = {key: np.concatenate([v.ravel() for _, other, v in shown if other == key]) for _, key, _ in shown}
+    bars = {key: Bar.of_values(key, values, _choose_map(key), HIGHEST) for key, values in bars.items()}
+    notes = [f"parts: {len(parts)}; pictures: {len(shown)} of {len(found)}; grey: not a number"]
+    scene = Scene(str(path), notes, bars=list(bars.values()), viewer=(0.0, 0.0, 1.0))
+    aspect = max(values.shape[0] / values.shape[1] for _, _, values in shown)
+    columns = min(len(shown), ceil((len(shown) * ASPECT * aspect) ** 0.5))
+    for i, (name, key, values) in enumerate(shown):
+        at = np.array([(i % columns) * 1.12, -(i // columns) * (aspect + 0.12 + LETTER), 0.0])
+        height, step = values.shape[0] / values.shape[1], ceil(max(values.shape) / MAX_SIDE)
+        scene.add_picture(bars[key].map(values[::step, ::step]), at, np.array([1.0, 0, 0]), np.array([0.0, -height, 0]))
+        scene.add_label(f"{name} {key}".strip(), at + [0.5, -height - LETTER, 0.0], LETTER)
+    return scene
+
+
+def _choose_map(channel: str) -> str:
+    return UNCERTAINTY_MAP if channel in ("opacity", "w2_sq", "uncertainty") else "viridis"
+
+
+def _show_surface(path: Path, grid: Ground, channels: dict[str, Array], channel: str | None, most: int) -> Scene:
+    """The ground's surface, coloured by a channel. Rows of a channel run from the north, as in the file."""
+    first = next((name for name in ("Z", "uncertainty") if name in channels), next(iter(channels)))
+    name = choose("channel", channel, (first, *sorted(set(channels) - {first})), path)
+    values = channels[name]
+    if values.shape != grid.shape:
+        raise InputError(f"{path}: has {values.shape} cells and the ground beside it {grid.shape}; score again")
+    bar = Bar(name) if name in ("uncertainty", "seen") else Bar.of_values(name, values, _choose_map(name))
+    step = ceil((values.size / most) ** 0.5) if values.size > most else 1
+    scene = Scene(str(path), [f"{grid.shape[1]} x {grid.shape[0]} cells of {grid.spacing:.4g}, by {name}"], bars=[bar])
+    scene.add(make_surface(grid, step), bar.map(values[::-1].astype(float)[::step, ::step].ravel()))
+    return scene
