@@ -7,14 +7,14 @@ from dav_gswt.photos.colmap_model import read_colmap_model, triangulate_points
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground
-from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings, select_settings
+from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.study import csv_tables
 from dav_gswt.study.views import gain_bound
 
 with logging_to(snakemake.log[0]):
     paths, asked = snakemake.input, snakemake.params.bound
     weights = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
-    coarse, update = select_settings(CoarseSettings, asked), select_settings(UpdateSettings, asked)
+    coarse = update = FitSettings.from_preset(asked)
     settings = gain_bound.BoundSettings(coarse, update, asked["k"], asked["rounds"], weights)
     split, model = read_view_split(paths.views), read_colmap_model(paths.model)
     start, photos, tests = (

@@ -9,7 +9,7 @@ from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import describe_machine, record_provenance
 from dav_gswt.reconstruction import ground
-from dav_gswt.reconstruction.fit_settings import CoarseSettings, select_settings
+from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.study.scale import costs
 
 with logging_to(snakemake.log[0]):
@@ -19,7 +19,7 @@ with logging_to(snakemake.log[0]):
     if threads:
         os.environ["DAV_GSWT_THREADS"] = str(amount)
     if params.photos:
-        settings = select_settings(CoarseSettings, params.preset | params.changed)
+        settings = FitSettings.from_preset(params.preset | params.changed)
         found = costs.measure_fit(field, frame, paths.images[0], params.photos[0], settings, Path(params.keep))
     elif what in ("gaussians", "tiles"):
         found = (costs.measure_render if what == "gaussians" else costs.measure_view)(field, amount)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from dav_gswt.capture import serial_rig
-from dav_gswt.config import rule_keys
 from dav_gswt.config.load import check_model
 from dav_gswt.config.rule_keys import EntryKeys, select_preset_keys, select_scene_keys
 from dav_gswt.config.scenes import PhotoScene, SyntheticScene
@@ -15,7 +14,7 @@ from dav_gswt.config.settings import Preset
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.photos.synthetic import scene as synthetic
-from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings, select_settings
+from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.views import candidates
 
 RIG = {"port": "p", "inbox": "in", "millimetres": 250.0, "limits": dict.fromkeys(("pan", "tilt", "radius"), (0, 1000))}
@@ -53,12 +52,11 @@ def test_jobs_receive_keys_with_their_guard():
         sent["rig"].get("port")
 
 
-@pytest.mark.parametrize("rule, settings", [("fit_coarse", CoarseSettings), ("update_field", UpdateSettings)])
-def test_a_fit_is_given_all_keys_of_its_settings(rule, settings):
-    read = {field.name for field in fields(settings) if field.metadata.get("of_preset", True)}
-    assert read <= set(rule_keys.PRESET_KEYS[rule])
-    preset = {key: 1.0 if key in ("spacing", "pose_rate") else 1 for key in Preset.model_fields}
-    assert select_settings(settings, select_preset_keys(rule, preset)) == select_settings(settings, preset)
+@pytest.mark.parametrize("rule", ["fit_coarse", "update_field", "fit_chosen_photos"])
+def test_a_fit_is_given_all_keys_of_its_settings(rule):
+    preset = {key: 1.0 if key == "spacing" else 2 for key in Preset.model_fields}
+    found = FitSettings.from_preset(select_preset_keys(rule, preset))
+    assert found == FitSettings.from_preset(preset) and found.sh_degree == 2
 
 
 def test_scores_are_given_all_keys_of_a_rig_s_reach():

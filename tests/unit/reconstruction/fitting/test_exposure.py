@@ -7,7 +7,7 @@ from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.fitting import exposure
-from dav_gswt.reconstruction.fitting.photo_colours import median_colours
+from dav_gswt.reconstruction.photo_colours import median_colours
 
 FRAME = scene_frame(exemplar=(0.0, 0.0, 4.0), extent=(0.0, 0.0, 4.0, 4.0))
 

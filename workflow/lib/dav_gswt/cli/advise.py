@@ -130,10 +130,8 @@ def _estimate_run(config: Mapping[str, Any], preset: str, speed: MachineSpeed) -
 
 
 def _estimate_mb(config: Mapping[str, Any], front: list[Measured], preset: str) -> float:
-    """Megabytes of a bundle: the table's for each Gaussian, times the Gaussians expected; for `auto` the table's."""
+    """Megabytes of a bundle: the table's for each Gaussian, times the Gaussians expected."""
     rows = [row for row in front if row.preset == preset]
-    if config["presets"][preset]["max_gaussians"] == "auto":
-        return sum(row.bundle_mb for row in rows) / len(rows)
     each = sum(row.bundle_mb / row.gaussians for row in rows) / len(rows)
     return each * describe_work(config, preset).gaussians
 

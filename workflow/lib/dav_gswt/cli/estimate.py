@@ -22,7 +22,7 @@ from dav_gswt.views.policy_names import PRIOR_POLICIES
 LONG = 600.0  # seconds: a run that takes longer is told of a faster preset
 PER_JOB = 1.6  # seconds to start a job: Snakemake, Python, imports
 PHOTO_SHAPE = 0.75  # shorter over longer side, of photos that cannot be read
-SH_COST = {0: 1.0, 1: 1.6, 2: 2.2, 3: 3.0, "auto": 1.15}  # of a step, by the degree of the spherical harmonics
+SH_COST = {0: 1.0, 1: 1.6, 2: 2.2, 3: 3.0}  # of a step, by the degree of the spherical harmonics
 FAMILY_COST = {"flowers": 3.5, "grass": 4.0, "meadow": 1.5, "oasis": 1.8}  # of rendering a photo: of many plants
 PER_PIXEL = 2.5  # Gaussians that a fit ends with, at most, for each pixel of a photo
 
@@ -196,7 +196,7 @@ def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
     photos, (longest, shape) = count_photos(scene), measure_photos(scene)
     size = min(scene.get("size", entry["size"]), longest)
     seen = min(size, entry["size"])
-    most = plan.MAX_GAUSSIANS if entry["max_gaussians"] == "auto" else entry["max_gaussians"]
+    most = entry["max_gaussians"]
     tests, start, new = _count_parts(config, scene, photos)
     settings = config["priors"][config["prior"]] if config["policy"] in PRIOR_POLICIES else None
     replayed = max(0, photos - start)
@@ -211,9 +211,9 @@ def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
         gaussians=float(min(most, PER_PIXEL * seen**2) if photographed else most / 2),
         step_cost=SH_COST[entry["sh_degree"]],
         steps=plan.count_first_steps(entry["steps"], entry["steps_per_photo"], start),
-        steps_per_photo=plan.STEPS_PER_NEW_PHOTO if entry["steps_per_photo"] == "auto" else entry["steps_per_photo"],
+        steps_per_photo=entry["steps_per_photo"],
         level_steps=entry["level_steps"],
-        scratch=entry["refit"] == "scratch",
+        scratch=entry["update"] == "scratch",
         candidates=replayed if scene.get("agent") == "replay" else scene.get("candidates", 0),
         samples=settings["samples"] * settings["steps"] if settings else 0,
         still_pixels=3.0 * config["stills"]["width"] * config["stills"]["height"],

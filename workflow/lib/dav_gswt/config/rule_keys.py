@@ -79,15 +79,15 @@ SCENE_KEYS: dict[str, tuple[str, ...] | dict[str, tuple[str, ...]]] = {
     "calibrate_round": _CANDIDATES,
 }
 
-_COARSE = ("size", "spacing", "max_gaussians", "steps", "steps_per_photo", "sh_degree", "pose_rate")
-_ALL_FITS = (*_COARSE, "refit", "choose_with")
+_COARSE = ("size", "spacing", "max_gaussians", "steps", "steps_per_photo", "sh_degree")
+_ALL_FITS = (*_COARSE, "update", "choose_with")
 
 # of a preset, by rule; metrics.json records what its field was fitted with
 PRESET_KEYS: dict[str, tuple[str, ...]] = {
     "fit_coarse": _COARSE,
     "evaluate_coarse": _COARSE,
     "prepare_external_field": ("max_gaussians",),
-    "update_field": (*_COARSE, "refit"),
+    "update_field": (*_COARSE, "update"),
     "fit_chosen_photos": _COARSE,
     "evaluate_round": _ALL_FITS,
     "evaluate_at": _ALL_FITS,

@@ -137,20 +137,18 @@ class Flight(ConfigModel):
 
 
 class Preset(ConfigModel):
-    """How much a fit may spend. `auto` asks the scene; fit.json says what was chosen and why."""
+    """How much a fit may spend."""
 
     size: PhotoSize = key("longer side of the photos that the fit sees, or `native`: the scene's", unit="pixels")
     spacing: float = key("of the ground's discs, in sizes of a photo's pixel on the ground", ge=0.5, le=16)
-    max_gaussians: Annotated[int, Field(ge=1000, le=8_000_000)] | Auto = key(
-        "most Gaussians in the field", renamed="cap"
+    max_gaussians: int = key("most Gaussians in the field", renamed="cap", ge=1000, le=8_000_000)
+    steps: int = key("optimiser steps of the coarse fit, to 8 photos or fewer", ge=1, le=100_000)
+    steps_per_photo: int = key(
+        "optimiser steps for each photo more: beyond 8 of the coarse fit, and each new one of a round",
+        ge=1,
+        le=100_000,
     )
-    steps: Annotated[int, Field(ge=1, le=100_000)] | Auto = key(
-        "optimiser steps of the coarse fit, to 8 photos or fewer"
-    )
-    steps_per_photo: Annotated[int, Field(ge=1, le=100_000)] | Auto = key(
-        "optimiser steps for each photo more: beyond 8 of the coarse fit, and each new one of a round"
-    )
-    refit: Literal["continue", "scratch"] = key(
+    update: Literal["continue", "scratch"] = key(
         "how a round takes new photos: `continue`: the field is fitted on; `scratch`: all photos are fitted anew. "
         "Not read with `choose_with`",
         "continue",
@@ -158,11 +156,8 @@ class Preset(ConfigModel):
     choose_with: Name | None = key(
         "preset whose rounds choose the photos; this one then fits all of them at once. Left out: its own", None
     )
-    sh_degree: Annotated[int, Field(ge=0, le=3)] | Auto = key(
-        "of the spherical harmonics of colour; tiles show their constant part", 0, renamed="degree"
-    )
-    pose_rate: float = key(
-        "first learning rate of the cameras' rotations; 0: they are held", 0, unit="radians", ge=0, le=0.01
+    sh_degree: int = key(
+        "of the spherical harmonics of colour; tiles show their constant part", 0, renamed="degree", ge=0, le=3
     )
     level_steps: int = key("optimiser steps for a coarser level", ge=1, le=100_000)
     levels: Annotated[int, Field(ge=1, le=8)] | Auto | None = key("instead of the config's `levels`", None)
@@ -171,8 +166,6 @@ class Preset(ConfigModel):
 class _Prior(ConfigModel):
     samples: int = key("drawn for each pose", ge=2, le=100)
     steps: int = key("denoising steps of a sample", ge=1, le=1000)
-    staged: bool = key("`true`: all poses with 2 steps, then in full those that may be among the best", True)
-    posterior: bool = key("`true`: a sample is a distribution, as wide as the encoder says; `false`: a point", False)
     independent_noise: bool = key(
         "`true`: each sample starts from its own noise; `false`: from one noise, as in the paper",
         False,

@@ -1,96 +1,57 @@
 """The settings of fits, from an entry of the config's `presets`, which trade speed for accuracy."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import Any, TypeVar
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
-from dav_gswt.field import GaussianField
 from dav_gswt.reconstruction import underlay
-from dav_gswt.reconstruction.fitting.plan import (
-    AUTO,
-    MAX_GAUSSIANS,
-    STEPS_PER_NEW_PHOTO,
-    Count,
-    FitPlan,
-    count_first_steps,
-)
+from dav_gswt.reconstruction.fitting.plan import FitPlan, count_first_steps
 
-# Learning rates of an update at its first step, as a share of a first fit's: the field is nearly right, and rates as at
-# first would undo its detail faster than a round's few steps make it again (docs/active-views.md)
+# Learning rates of an update at its first step, as a share of a first fit's: the field is nearly right, and full rates
+# would undo its detail faster than a round's few steps make it again (docs/active-views.md)
 UPDATE_RATE = 0.3
 GROUND_SHARE = 0.9  # of the Gaussians, that the ground may take with its underlay; objects get the rest
 
 
 @dataclass(frozen=True, kw_only=True)
-class _FitSettings:
-    """What the first fit and its updates have in common."""
+class FitSettings:
+    """The keys of a preset that the first fit and its updates read.
 
-    size: int  # longer side of the photos, pixels
-    max_gaussians: Count
-    sh_degree: Count = 0
-    pose_rate: float = 0.0  # radians a step that cameras may turn
+    size: longer side of the photos, pixels. spacing: of the discs, in sizes of a photo's pixel on the ground. steps: of
+    the first fit. steps_per_photo: of the first fit for each photo beyond `plan.FEW_PHOTOS`, and of an update for each
+    new photo. first_rate: of an update; not a key of presets.
+    """
 
-    @property
-    def gaussian_limit(self) -> int:
-        return limit_gaussians(self.max_gaussians)
+    size: int
+    spacing: float
+    max_gaussians: int
+    steps: int
+    steps_per_photo: int = 0
+    sh_degree: int = 0
+    first_rate: float = UPDATE_RATE
 
+    @staticmethod
+    def from_preset(preset: Mapping[str, Any]) -> "FitSettings":
+        """The settings of a preset, which may have keys for other stages."""
+        names = [each.name for each in fields(FitSettings) if each.name != "first_rate"]
+        return FitSettings(**{name: preset[name] for name in names if name in preset})
 
-@dataclass(frozen=True, kw_only=True)
-class CoarseSettings(_FitSettings):
-    """The keys of a preset that the first fit reads."""
+    def from_scratch(self, start: int, photos: int) -> "FitSettings":
+        """The settings of one fit with as many steps as a fit to `start` photos and updates to `photos` take."""
+        steps = self.plan_coarse_fit(start).steps + self.steps_per_photo * max(0, photos - start)
+        return replace(self, steps=steps, steps_per_photo=0)
 
-    spacing: float  # of the discs, in sizes of a photo's pixel on the ground
-    steps: Count
-    steps_per_photo: Count = 0  # for each photo beyond `plan.FEW_PHOTOS`
-
-    @property
-    def max_discs(self) -> int:
-        """Cells that the ground's grid may have."""
-        return limit_discs(self.max_gaussians)
-
-    def plan_coarse_fit(self, photos: int, half_share: float = 0.0) -> FitPlan:
+    def plan_coarse_fit(self, photos: int) -> FitPlan:
         """The plan of the first fit, to so many photos."""
         steps = count_first_steps(self.steps, self.steps_per_photo, photos)
-        return FitPlan(steps, self.max_gaussians, self.sh_degree, half_share, self.pose_rate)
+        return FitPlan(steps, self.max_gaussians, self.sh_degree)
+
+    def plan_update(self, earlier: int, new: int) -> FitPlan:
+        """The plan of an update of a field from so many earlier photos with so many new ones."""
+        first_rate = self.first_rate if earlier else 1.0
+        return FitPlan(self.steps_per_photo * new, self.max_gaussians, self.sh_degree, first_rate)
 
 
-@dataclass(frozen=True, kw_only=True)
-class UpdateSettings(_FitSettings):
-    """The keys of a preset that the update of a field reads."""
-
-    steps_per_photo: Count  # for every new photo
-    first_rate: float = field(default=UPDATE_RATE, metadata={"of_preset": False})  # for comparisons
-
-    @property
-    def steps_per_new_photo(self) -> int:
-        return STEPS_PER_NEW_PHOTO if self.steps_per_photo == AUTO else int(self.steps_per_photo)
-
-    def plan_update(self, field: GaussianField, earlier: int, new: int) -> FitPlan:
-        """The plan of an update of a field from so many earlier photos with so many new ones.
-
-        Steps: a number for each new photo. With "auto", the Gaussians per photo are at most those of the field, and the
-        spherical harmonics have the field's degree. Rates begin at `first_rate` of a first fit's.
-        """
-        limit = min(MAX_GAUSSIANS, len(field) * (earlier + new) // max(1, earlier))
-        degree = field.sh_degree if self.sh_degree == AUTO else self.sh_degree
-        rates = {"pose_rate": self.pose_rate, "first_rate": self.first_rate if earlier else 1.0}
-        return FitPlan(self.steps_per_new_photo * new, self.max_gaussians, degree, limit=limit, **rates)
-
-
-Settings = TypeVar("Settings", CoarseSettings, UpdateSettings)
-
-
-def select_settings(kind: type[Settings], preset: Mapping[str, Any]) -> Settings:
-    """The settings of one kind from a preset, which may have keys for other stages."""
-    names = [each.name for each in fields(kind) if each.metadata.get("of_preset", True)]
-    return kind(**{name: preset[name] for name in names if name in preset})
-
-
-def limit_gaussians(max_gaussians: Count) -> int:
-    """Most Gaussians of a field."""
-    return MAX_GAUSSIANS if max_gaussians == AUTO else int(max_gaussians)
-
-
-def limit_discs(max_gaussians: Count) -> int:
+def limit_discs(max_gaussians: int) -> int:
     """Most cells of the ground's grid in a field of so many Gaussians."""
-    return int(GROUND_SHARE * limit_gaussians(max_gaussians) / (1 + 1 / underlay.STRIDE**2))
+    return int(GROUND_SHARE * max_gaussians / (1 + 1 / underlay.STRIDE**2))

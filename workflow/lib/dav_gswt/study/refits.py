@@ -20,9 +20,9 @@ from dav_gswt.photos.training_views import TrainingView, read_training_views
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.reconstruction import evaluation
 from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings
+from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.reconstruction.observation import mask_to_ground
-from dav_gswt.reconstruction.refinement import RefinementInput, refine_field
+from dav_gswt.reconstruction.update import UpdateInput, update_field
 
 COLUMNS = ("photos", "photos_a_round", "first_rate", "seed", "steps", *evaluation.MEASURES, "gaussians", "seconds")
 
@@ -43,8 +43,8 @@ class RefitPhotos:
 class RefitSettings:
     """start: photos of the first fit. weights: of LPIPS; without them it is not measured."""
 
-    coarse: CoarseSettings
-    update: UpdateSettings
+    coarse: FitSettings
+    update: FitSettings
     start: int
     weights: Weights | None
 
@@ -74,7 +74,7 @@ def compare_refits(
     """
     rows, everything = [], len(photos.views)
     steps = settings.coarse.plan_coarse_fit(settings.start).steps
-    steps += settings.update.steps_per_new_photo * (everything - settings.start)
+    steps += settings.update.steps_per_photo * (everything - settings.start)
     for seed in seeds:
         first = _fit(photos, settings.coarse, settings.start, seed)
         rows.append(_describe(photos, settings, first, {"photos": settings.start, "seed": seed}))
@@ -97,7 +97,7 @@ class _Fitted:
     seconds: float
 
 
-def _fit(photos: RefitPhotos, settings: CoarseSettings, count: int, seed: int) -> _Fitted:
+def _fit(photos: RefitPhotos, settings: FitSettings, count: int, seed: int) -> _Fitted:
     """The first fit, to the first photos."""
     begun = time.process_time()
     points, colours = photos.points(count)
@@ -106,15 +106,15 @@ def _fit(photos: RefitPhotos, settings: CoarseSettings, count: int, seed: int) -
     return _Fitted(made, settings.plan_coarse_fit(count).steps, time.process_time() - begun)
 
 
-def _refit(photos: RefitPhotos, settings: UpdateSettings, first: _Fitted, starts: range, seed: int) -> _Fitted:
+def _refit(photos: RefitPhotos, settings: FitSettings, first: _Fitted, starts: range, seed: int) -> _Fitted:
     """The rounds after the first fit; each takes the photos from one of the starts to the next."""
     last = first
     for t, n in enumerate(starts, 1):
         begun, field = time.process_time(), last.made.field
         new = photos.views[n : n + starts.step]
-        given = RefinementInput(field, last.made.grid, photos.frame, photos.views[:n], new)
-        made = refine_field(given, settings, np.random.default_rng([seed, t]))
-        steps = last.steps + settings.steps_per_new_photo * len(new)
+        given = UpdateInput(field, last.made.grid, photos.frame, photos.views[:n], new)
+        made = update_field(given, settings, np.random.default_rng([seed, t]))
+        steps = last.steps + settings.steps_per_photo * len(new)
         last = _Fitted(made, steps, last.seconds + time.process_time() - begun)
     return last
 

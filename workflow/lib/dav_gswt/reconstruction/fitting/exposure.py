@@ -13,7 +13,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.images import channels
 from dav_gswt.photos.training_views import TrainingView, one_by_one
-from dav_gswt.reconstruction.fitting.photo_colours import nan_median, sample_colours
+from dav_gswt.reconstruction.photo_colours import nan_median, sample_colours
 
 MAX_GAIN = 1.6  # of a photo against the set
 MAX_STEP_GAIN = 1.25  # during the fit

@@ -17,7 +17,7 @@ from dav_gswt.photos.synthetic.scene import FIELD_OF_VIEW
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import CoarseSettings
+from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.study.scale.photos import photo_name, place_cameras
@@ -36,7 +36,7 @@ ABOVE = 1.2  # of a field's side: height of the camera that sees all of it
 
 
 def measure_fit(
-    field: GaussianField, frame: SceneFrame, photos: Path | str, count: int, settings: CoarseSettings, scratch: Path
+    field: GaussianField, frame: SceneFrame, photos: Path | str, count: int, settings: FitSettings, scratch: Path
 ) -> dict[str, float | int]:
     """Seconds and memory of a first fit to photos of `photos.render_photos`.
 

@@ -20,9 +20,9 @@ from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import evaluation
 from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings
+from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.reconstruction.observation import mask_to_ground
-from dav_gswt.reconstruction.refinement import RefinementInput, refine_field
+from dav_gswt.reconstruction.update import UpdateInput, update_field
 from dav_gswt.views import policies
 from dav_gswt.views.candidates import camera_positions
 from dav_gswt.views.coverage import DirectionalCoverage, GroundCells, measure_cell_errors
@@ -55,8 +55,8 @@ class Pool:
 class BoundSettings:
     """k: photos a round. weights: of LPIPS; without them it is not measured."""
 
-    coarse: CoarseSettings
-    update: UpdateSettings
+    coarse: FitSettings
+    update: FitSettings
     k: int
     rounds: int
     weights: Weights | None
@@ -77,8 +77,8 @@ class State:
         """The field refitted with new photos. made: instead of the field. earlier: of the new ones, already in it."""
         base = made or self.made
         known = self.taken + new[:earlier]
-        given = RefinementInput(base.field, base.grid, self.pool.frame, known, new[earlier:])
-        return refine_field(given, self.settings.update, np.random.default_rng([*self.seed, earlier]))
+        given = UpdateInput(base.field, base.grid, self.pool.frame, known, new[earlier:])
+        return update_field(given, self.settings.update, np.random.default_rng([*self.seed, earlier]))
 
 
 def choose_by_policy(policy: str, state: State) -> list[TrainingView]:
