@@ -13,7 +13,7 @@ from dav_gswt.files import is_from_future, locate_path
 from dav_gswt.images.lpips_package import locate_weights
 from dav_gswt.materials import mobilesam_package
 from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
-from dav_gswt.views.policy_names import NEEDS_PHOTOS, ORACLES, POLICY_NAMES
+from dav_gswt.views.policies import NEEDS_PHOTOS, ORACLES, POLICY_NAMES
 from dav_gswt.workflow import NamedEntries, lift_job_rate_limit, list_command_line_values
 
 BASE = Path(workflow.basedir)

@@ -29,7 +29,7 @@ from dav_gswt.photos.importers.point_ply import read_point_ply
 from dav_gswt.photos.lenses import read_lenses
 from dav_gswt.photos.training_views import read_captured_views
 from dav_gswt.photos.view_split import read_view_split
-from dav_gswt.views.frozen_scales import read_frozen_scales
+from dav_gswt.views.scores import read_frozen_scales
 from dav_gswt.views.scores import FIELDS, read_scores
 from dav_gswt.views.selection import read_pose_selection
 

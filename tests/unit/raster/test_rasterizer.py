@@ -119,7 +119,6 @@ def test_the_order_of_gaussians_changes_no_bit(either, view):
     assert_same_bits(shuffled[0], seen)
     for name in NAMES:
         np.testing.assert_array_equal(getattr(shuffled[1], name), getattr(found, name)[order])
-    np.testing.assert_allclose(shuffled[1].camera, found.camera, rtol=1e-5)  # a sum in another order
 
 
 def test_a_crop_of_the_picture_is_the_picture_of_a_cropped_camera(either):

@@ -21,11 +21,11 @@ from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import coverage, oracle, policy_inputs
-from dav_gswt.views.greedy import lazy_greedy
+from dav_gswt.views.policies import lazy_greedy
 from dav_gswt.views.pose_maps import PoseMaps, write_pose_maps
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import scoring_camera
-from dav_gswt.views.uncertainty.weighting import Scales
+from dav_gswt.views.uncertainty import Scales
 
 
 @pytest.fixture(scope="module")

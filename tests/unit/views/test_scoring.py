@@ -14,10 +14,10 @@ from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import DecodedViews
 from dav_gswt.reconstruction.objects import make_blobs
 from dav_gswt.views import collision, coverage, frozen_scales, pose_maps, scores, scoring
-from dav_gswt.views.frozen_scales import FrozenScales
+from dav_gswt.views.scores import FrozenScales
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.uncertainty import Quantiles, Scales
-from dav_gswt.views.uncertainty.backprojection import backproject_maps
+from dav_gswt.views.scoring import backproject_maps
 
 MIDDLE = [1.6, 1.6, 0.0]
 

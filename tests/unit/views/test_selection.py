@@ -10,8 +10,8 @@ from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset, select_farthest_poses
 from dav_gswt.views import policies, scores, selection
 from dav_gswt.views.policies import POLICIES, SelectionInput
-from dav_gswt.views.policy_names import NEEDS_FIELD, POLICY_NAMES, POLICY_SPECS, PolicySpec, resolve_policy
-from dav_gswt.views.score_colours import candidate_values
+from dav_gswt.views.policies import NEEDS_FIELD, POLICY_NAMES, POLICY_SPECS, PolicySpec, resolve_policy
+from dav_gswt.views.policies import candidate_values
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty import Scales
 

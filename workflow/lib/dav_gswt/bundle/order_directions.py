@@ -14,7 +14,7 @@ from dav_gswt.bundle import level_distances, orders
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images.metrics import mse_to_psnr
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 
 ELEVATIONS = {"walker": float(np.degrees(np.arcsin(0.1))), "oblique": 45.0}  # a walker's eye: a tenth of the distance
 WIDTH, HEIGHT = 256, 128  # pixels about the tile's middle
@@ -58,7 +58,7 @@ def render_in_order(
     depth = side * (1 + place / max(len(field), 1))
     means += (depth - means @ along)[:, None] * along
     moved = replace(field, means=means.astype(np.float32))
-    return Rasterizer(near=1e-6).forward(**to_raster_arrays(moved), camera=camera).colour
+    return make_rasterizer(near=1e-6).forward(**to_raster_arrays(moved), camera=camera).colour
 
 
 def _find_visible(field: GaussianField, middle: Float[Array, "3"], camera: Camera) -> Bool[Array, "n"]:

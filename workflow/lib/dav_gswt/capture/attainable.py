@@ -4,7 +4,7 @@ from dav_gswt.capture import drone, serial_rig
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.views import collision, feasibility
+from dav_gswt.views import feasibility
 from dav_gswt.views.candidates import Candidates
 
 
@@ -24,4 +24,4 @@ def filter_attainable(
         candidates = drone.filter_reachable(scene, frame, candidates)
     clearance = feasibility.CLEARANCE * frame.flying_height
     feasible = feasibility.filter_feasible(candidates, grid, scene.get("feasibility"), clearance)
-    return collision.drop_blocked(feasible, field, grid)
+    return feasibility.drop_blocked(feasible, field, grid)

@@ -17,7 +17,7 @@ from dav_gswt.files import locate_path
 from dav_gswt.images.image_files import SUFFIXES, read_size
 from dav_gswt.photos.view_split import count_tests
 from dav_gswt.reconstruction.fitting import plan
-from dav_gswt.views.policy_names import PRIOR_POLICIES
+from dav_gswt.views.policies import PRIOR_POLICIES
 
 LONG = 600.0  # seconds: a run that takes longer is told of a faster preset
 PER_JOB = 1.6  # seconds to start a job: Snakemake, Python, imports

@@ -66,7 +66,7 @@ def _count_working_threads() -> float:
 
 def _make_raster_work(threads: int) -> Callable[[], object]:
     from dav_gswt.geometry import camera_layouts
-    from dav_gswt.raster import Rasterizer
+    from dav_gswt.raster import make_rasterizer
 
     rng = np.random.default_rng(0)
     places = [rng.uniform(-3, 3, (GAUSSIANS, 2)), rng.uniform(0, 0.2, (GAUSSIANS, 1))]
@@ -78,7 +78,7 @@ def _make_raster_work(threads: int) -> Callable[[], object]:
         "colours": rng.random((GAUSSIANS, 3)).astype(np.float32),
     }
     camera = camera_layouts.orbit(60.0, 0.0, 7.0, np.zeros(3), PIXELS, PIXELS, 55.0)
-    rasterizer, gradient = Rasterizer(threads=threads), np.ones((PIXELS, PIXELS, 3), np.float32)
+    rasterizer, gradient = make_rasterizer(threads=threads), np.ones((PIXELS, PIXELS, 3), np.float32)
 
     def work() -> None:
         rasterizer.forward(**arrays, camera=camera)

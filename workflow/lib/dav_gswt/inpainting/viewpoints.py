@@ -10,7 +10,7 @@ from dav_gswt.geometry.camera_layouts import Place
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.views import collision
+from dav_gswt.views import feasibility
 from dav_gswt.views.candidates import Candidates
 
 BLOCK = 0.4  # flying heights: side of the ground under one camera, whose picture shows 0.7
@@ -42,6 +42,6 @@ def place_cameras(
         distance = radius * frame.flying_height
         camera = camera_layouts.orbit(elevation, azimuth, distance, target, size, size, FIELD_OF_VIEW)
         centre = camera.centre[None]
-        if not (collision.find_below_ground(centre, grid) | collision.find_inside_objects(centre, field)).any():
+        if not (feasibility.find_below_ground(centre, grid) | feasibility.find_inside_objects(centre, field)).any():
             cameras.append((pose_of_camera(f"virtual_{elevation:g}_{azimuth:g}", camera, frame), camera))
     return cameras

@@ -15,8 +15,8 @@ from dav_gswt.inspect.scene import UNCERTAINTY_MAP, ColourBar, Label, Layer, Sce
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views import pose_maps as posed
+from dav_gswt.views.policies import HIGHEST
 from dav_gswt.views.pose_maps import Part
-from dav_gswt.views.score_colours import HIGHEST
 
 ASPECT = 1.6  # of all pictures side by side, over their height
 MAX_PICTURES = 60

@@ -19,7 +19,7 @@ from dav_gswt.inspect.photo_scenes import compute_bounds, make_frustum, outline_
 from dav_gswt.inspect.scene import BLACK, ColourKey, Label, Layer, Scene, make_balls, make_bar, map_colours
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.views import scores as tables
-from dav_gswt.views.score_colours import HIGHEST, candidate_values
+from dav_gswt.views.policies import HIGHEST, candidate_values
 from dav_gswt.views.scores import Scores
 
 BALL, CHOSEN_BALL, LETTER = 0.018, 0.03, 0.07  # radii and height, in radii of the hemisphere

@@ -108,7 +108,7 @@ def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[Trainin
     more would show another colour than the level before it.
     """
     field = replace(field, sh=field.sh[:, :1])
-    rasterizer, views = raster.Rasterizer(), []
+    rasterizer, views = raster.make_rasterizer(), []
     for number, camera in enumerate(_neighbour_cameras(coarse)):
         fine = camera.resized(2 * camera.width, 2 * camera.height)
         render = rasterizer.forward(**to_raster_arrays(field), camera=fine)

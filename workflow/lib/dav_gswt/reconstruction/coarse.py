@@ -13,7 +13,7 @@ from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.colmap_model import read_colmap_model, triangulate_points
 from dav_gswt.photos.training_views import TrainingView, one_by_one
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import discs, ground, objects, observation, underlay
 from dav_gswt.reconstruction.fit_settings import FitSettings, limit_discs
 from dav_gswt.reconstruction.fitting import trainer
@@ -135,7 +135,7 @@ def estimate_uncertainty(field: GaussianField, views: list[TrainingView]) -> Gau
     This needs no prior. It is near 0 where the surface is closed, as the photos' cameras see it.
     """
     known = np.zeros(len(field), np.float32)
-    raster = Rasterizer()
+    raster = make_rasterizer()
     for view in one_by_one(views):
         seen = raster.forward(**to_raster_arrays(field), camera=view.camera)
         maps = np.stack([view.weight * seen.alpha, view.weight], -1).astype(np.float32)

@@ -101,7 +101,7 @@ def ground_colours(
 ) -> tuple[Float[Array, "n 3"], Bool[Array, "r c"]]:
     """Median colours of the ground's cells, and which cells a photo sees that no object hides."""
     if len(occluders):
-        rasterizer = raster.Rasterizer()
+        rasterizer = raster.make_rasterizer()
         arrays = raster.to_raster_arrays(occluders)
         clear = (rasterizer.forward(**arrays, camera=view.camera).alpha < 0.5 for view in views)
         views = [view.with_pixels(weight=view.weight * c) for view, c in zip(one_by_one(views), clear, strict=True)]

@@ -134,7 +134,7 @@ def list_rejected_photos(reports: Iterable[dict]) -> set[str]:
 
 def measure_psnr(field: GaussianField, views: list[TrainingView]) -> list[float | None]:
     """PSNR of each photo in dB over the pixels that count, after a gain and offset per channel; None without any."""
-    rasterizer = raster.Rasterizer()
+    rasterizer = raster.make_rasterizer()
     return [_psnr(rasterizer, field, view) if view.weight.any() else None for view in one_by_one(views)]
 
 

@@ -80,7 +80,7 @@ def profile_fit(photos: PhotoSet, settings: FitSettings, seed: int = 0, every: i
     watched, measuring = next(iter(photos.tests.values())), 0.0
     start = time.perf_counter()
     curve: list[dict] = []
-    drawn = raster.Rasterizer()
+    drawn = raster.make_rasterizer()
 
     def watch(step: int, state) -> None:
         nonlocal measuring

@@ -1,4 +1,4 @@
-"""True pictures of candidate poses and the true error of a field there, for oracle policies and for calibration.
+"""True pictures of candidate poses, for oracle policies and for calibration.
 
 They exist for synthetic scenes and for photo sets, where pictures of candidates are available without a capture.
 """
@@ -7,21 +7,18 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float32, Float64
+from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import select_farthest_poses
-from dav_gswt.images import image_files, metrics
+from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.training_views import WHOLE, TrainingView
-from dav_gswt.raster import render
-from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.scoring import WIDTH, ground_mask, scoring_camera
+from dav_gswt.views.scoring import WIDTH, scoring_camera
 
 FINE = 4  # supersampling: photos are clipped and encoded before they are shrunk, so rendering at WIDTH is too bright
 
@@ -88,39 +85,3 @@ def _shrink_view(
         else image_files.shrink_image(cover[..., None], *size)[..., 0] > WHOLE
     )
     return TrainingView(name, camera, image_files.shrink_image(image, *size), weight.astype(np.float32))
-
-
-def measure_errors(
-    field: GaussianField, grid: Ground, views: list[TrainingView], size: int, corrected: bool = False
-) -> tuple[Float64[Array, "n"], list[Float32[Array, "_ _"]]]:
-    """Measure the RMSE between renders and true views, over the pixels that look at the modelled exemplar.
-
-    Args:   size: longer side of the photos that the field was fitted to, pixels. The field is rendered at that size,
-            then shrunk; at a smaller size splats are blurred to a pixel's width.
-            corrected: fit gain and offset of each channel to the view first (photos differ in exposure).
-    Returns: of each view the error (NaN where no pixel counts), and its map: root mean square over the channels, NaN
-            where a pixel does not count.
-    """
-    error, maps = np.full(len(views), np.nan), []
-    for i, view in enumerate(views):
-        weight = view.weight * ground_mask(grid, view.camera)
-        mask = weight > 0
-        squares = np.full(mask.shape, np.nan)
-        if mask.any():
-            picture = _render_at_size(field, view.camera, size)
-            if corrected:
-                picture = np.clip(metrics.correct_colours(picture, view.image, weight), 0, 1)
-            apart = picture[mask].astype(np.float64) - view.image[mask]
-            squares[mask] = (apart**2).mean(-1)
-            error[i] = np.sqrt(squares[mask].mean())
-        maps.append(np.sqrt(squares).astype(np.float32))
-    return error, maps
-
-
-def _render_at_size(field: GaussianField, camera: Camera, size: int) -> Float32[Array, "h w 3"]:
-    """Render the field `size` pixels long, then shrink it to the camera's size."""
-    width, height = camera.width, camera.height
-    share = max(1.0, size / max(width, height))
-    large = camera.resized(round(width * share), round(height * share))
-    seen = np.clip(render(field, large).colour, 0, 1).astype(np.float32)
-    return image_files.shrink_image(seen, width, height)

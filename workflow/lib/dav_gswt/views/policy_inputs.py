@@ -14,8 +14,7 @@ from dav_gswt.reconstruction import ground, regression_guard
 from dav_gswt.views import oracle, pose_maps
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.coverage import ERROR_WIDTH, DirectionalCoverage, GroundCells, measure_cell_errors
-from dav_gswt.views.policies import InformationGain
-from dav_gswt.views.policy_names import NEEDS_FIELD, NEEDS_PHOTOS, ORACLES, PRIOR_POLICIES
+from dav_gswt.views.policies import NEEDS_FIELD, NEEDS_PHOTOS, ORACLES, PRIOR_POLICIES, InformationGain
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import scoring_camera
 

@@ -82,7 +82,7 @@ def fit_field(
     if begin.sh_degree > plan.sh_degree:
         begin.resize_sh(plan.sh_degree)
     run = TrainingState(begin, rng, exposure.ExposureTracker(len(views)))
-    task = TrainingTask(views, plan, Schedule(plan, len(field)), constraints, raster.Rasterizer())
+    task = TrainingTask(views, plan, Schedule(plan, len(field)), constraints, raster.make_rasterizer())
     descent = _choose_descent(task)
     descent.push(run)
     for _ in progress(range(plan.steps), options.name):

@@ -7,7 +7,7 @@ import numpy as np
 
 from dav_gswt.images import figures
 from dav_gswt.study.comparison.tables import EVERY, EVERYTHING
-from dav_gswt.views.policy_names import ORACLES
+from dav_gswt.views.policies import ORACLES
 
 PANEL = 3.3, 3.4  # inches
 FOREST = 0.34  # inches a policy

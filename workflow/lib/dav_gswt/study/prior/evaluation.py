@@ -17,9 +17,9 @@ from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.logs import progress
 from dav_gswt.prior.networks import LATENT, SIZE
 from dav_gswt.prior.terrain import TerrainPrior, pack_render, pack_truth
+from dav_gswt.study.calibration.agreement import ause, spearman
 from dav_gswt.study.prior.training.example_files import Examples
-from dav_gswt.views.uncertainty import ause, gradient_map, spearman, w2_sq
-from dav_gswt.views.uncertainty.texture import LUMINANCE
+from dav_gswt.views.uncertainty import LUMINANCE, gradient_map, w2_sq
 
 OPAQUE = 0.99  # opacity of the truth from which on a pixel counts
 P_DROPS = 0.05, 0.1, 0.15, 0.2, 0.3

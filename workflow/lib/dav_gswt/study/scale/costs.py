@@ -14,7 +14,7 @@ from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos import training_views
 from dav_gswt.photos.synthetic.scene import FIELD_OF_VIEW
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.fit_settings import FitSettings
@@ -82,7 +82,7 @@ def measure_render(field: GaussianField, gaussians: int) -> dict[str, float | in
     copies = copies[np.sort(np.random.default_rng(0).choice(len(copies), gaussians, replace=False))]
     middle = (*(low + side * rows / 2), float(np.median(field.means[field.ground, 2])))
     camera = camera_layouts.orbit(90.0, 0.0, ABOVE * side * rows, middle, SIDE, SIDE, FIELD_OF_VIEW)
-    rasterizer, arrays, spent = Rasterizer(), to_raster_arrays(copies), []
+    rasterizer, arrays, spent = make_rasterizer(), to_raster_arrays(copies), []
     for _ in range(REPEATS + 1):  # the first one takes the memory
         begin = time.perf_counter()
         seen = rasterizer.forward(**arrays, camera=camera)

@@ -7,9 +7,9 @@ from fractions import Fraction
 import numpy as np
 from numpy import ndarray as Array
 
+from dav_gswt.study.calibration import agreement as calibration
 from dav_gswt.study.stability.formula import FLOAT32, Case, Check
 from dav_gswt.views.coverage import compute_gain
-from dav_gswt.views.uncertainty import calibration
 
 SIZES = (1e-12, 1e-6, 1e-3, 1.0, 1e3, 1e6)
 

@@ -7,7 +7,7 @@ from itertools import product
 
 from dav_gswt.errors import InputError
 from dav_gswt.study.seams.replicates import split_tiling
-from dav_gswt.views.policy_names import PRIOR_POLICIES, ZERO_SETTINGS
+from dav_gswt.views.policies import PRIOR_POLICIES, ZERO_SETTINGS
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k", "rounds", "tiling", "tau")  # its wildcards
 ASKING = ("prior", "p_drop", "lam")  # what only a prior that is asked depends on

@@ -26,11 +26,10 @@ from dav_gswt.reconstruction.update import UpdateInput, update_field
 from dav_gswt.views import policies
 from dav_gswt.views.candidates import camera_positions
 from dav_gswt.views.coverage import DirectionalCoverage, GroundCells, measure_cell_errors
-from dav_gswt.views.policies import SelectionInput
-from dav_gswt.views.policy_names import NEEDS_FIELD
+from dav_gswt.views.policies import NEEDS_FIELD, SelectionInput
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import scoring_camera
-from dav_gswt.views.uncertainty.weighting import Scales
+from dav_gswt.views.uncertainty import Scales
 
 GAIN = "gain"  # in place of a policy: the choice by true gain
 COMPARED = ("farthest", "random", "coverage-error", GAIN)
@@ -88,7 +87,7 @@ def choose_by_policy(policy: str, state: State) -> list[TrainingView]:
     information = _measure_coverage(state) if policy in NEEDS_FIELD else None
     places = _list_places(state.taken, state.pool.frame)
     inputs = SelectionInput(places, state.settings.k, np.random.default_rng([*state.seed, 1]), information=information)
-    return [state.left[i] for i in policies.POLICIES[policy](scores, inputs)]
+    return [state.left[i] for i in policies.POLICIES[policy].choose(scores, inputs)]
 
 
 def choose_by_gain(state: State) -> list[TrainingView]:

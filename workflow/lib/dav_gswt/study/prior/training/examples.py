@@ -16,7 +16,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior.conditions import RenderedView, find_nearest, relative_pose, render_view
 from dav_gswt.prior.interface import Condition
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.reconstruction.photo_colours import sample_colours
@@ -110,7 +110,7 @@ def simulate_points(
     each = int(np.exp(rng.uniform(least, most))) // len(photos) + 1
     points, colours = [], []
     for view in photos:
-        render = Rasterizer().forward(**to_raster_arrays(world.field), camera=view.camera)
+        render = make_rasterizer().forward(**to_raster_arrays(world.field), camera=view.camera)
         rows, columns = rng.integers(0, render.alpha.shape, (each, 2)).T
         solid = render.alpha[rows, columns] > 0.9
         rows, columns = rows[solid], columns[solid]

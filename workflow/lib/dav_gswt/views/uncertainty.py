@@ -1,6 +1,7 @@
-"""Combination of uncertainty terms, each divided by a scale fixed in the first round; Quantiles map a sum to [0, 1].
+"""Uncertainty of views from samples of a prior: the terms' formulas, how terms are combined, and gamma.
 
-Only raw terms are stored; lam enters when poses are selected, so that a sweep over lam shares the scoring.
+Each term is divided by a scale that the first round fixes. Only raw terms are stored; lam enters when poses are
+selected, so that a sweep over lam shares the scoring.
 """
 
 import logging
@@ -8,13 +9,114 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32, Float64
+from jaxtyping import Bool, Float, Float32, Float64
 from numpy import ndarray as Array
 from scipy.special import expit
 
-from dav_gswt.views.uncertainty.finite import reject_poses, require_finite
-
 _log = logging.getLogger(__name__)
+
+NAMED = 5  # poses named in a message
+LATENTS, PIXELS = 1 << 18, 1 << 20  # values of samples and of pictures per chunk: fits a cache
+LUMINANCE = 0.2126, 0.7152, 0.0722  # of Rec. 709's red, green and blue
+
+
+def reject_poses(bad: Bool[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
+    """Raises: ValueError: any pose is bad; the message names the poses, or their indices without names."""
+    if bad.any():
+        raise ValueError(f"{what} of pose {format_names(bad, names)}")
+
+
+def format_names(bad: Bool[Array, "n"], names: Sequence[str] | None = None) -> str:
+    """Format the first bad poses by name, or by index without names, and the number of others."""
+    found = [names[i] if names is not None else str(i) for i in np.flatnonzero(bad).tolist()]
+    more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
+    return ", ".join(found[:NAMED]) + more
+
+
+def require_finite(values: Float[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
+    """Raises: ValueError: a value that is NaN or infinite, naming the poses."""
+    reject_poses(~np.isfinite(values), f"not finite: {what}", names)
+
+
+def w2_sq(
+    means: Float32[Array, "n m c h w"],
+    variances: Float32[Array, "n m c h w"] | None = None,
+    names: Sequence[str] | None = None,
+) -> tuple[Float64[Array, "n"], Float32[Array, "n h w"]]:
+    """Mean squared 2-Wasserstein distance between the pairs of m latent samples: of each pose, and of each pixel.
+
+    A latent is a diagonal Gaussian a pixel, so the distance of a pair is |mu_i - mu_j|^2 + |s_i - s_j|^2 with the
+    standard deviations s. Its mean over all pairs is 2 var(ddof=1) of mu and of s, summed over channels: O(m), and no
+    difference of large squares. Samples are taken relative to the first one, so a common shift costs no digits.
+
+    Args:   variances: of each latent; None: each is a point (deviations 0). names: of the poses, for errors.
+    Returns: the mean over pixels, and the map, both in squared latent units; exactly 0 where all samples agree.
+    Raises: ValueError: m < 2 (no pair), a value that is not finite or whose square is not, a variance below 0, naming
+            the poses.
+    Source: DAV-GSWT, Eq. (w2_pixel), in a form that float32 holds.
+    """
+    n, m, c, h, w = means.shape
+    if m < 2:
+        raise ValueError(f"disagreement needs at least 2 samples of a pose, not {m}: one has no pair")
+    maps = np.empty((n, h, w), np.float32)
+    scores = np.empty(n)
+    step = max(1, LATENTS // max(1, m * c * h * w))
+    for start in range(0, n, step):
+        rows = slice(start, start + step)
+        with np.errstate(over="ignore", invalid="ignore"):  # rejected below
+            found = _twice_the_variance(means[rows])
+            if variances is not None:
+                reject_poses(np.any(variances[rows] < 0, axis=(1, 2, 3, 4)), "variance below 0", names and names[rows])
+                found = found + _twice_the_variance(np.sqrt(variances[rows], dtype=np.float64))
+            maps[rows] = found
+            scores[rows] = found.mean((1, 2), dtype=np.float64)
+    require_finite(scores, "the latents, or their squared distance,", names)
+    return scores, maps
+
+
+def _twice_the_variance(samples: Float[Array, "b m c h w"]) -> Float[Array, "b h w"]:
+    """2 var(ddof=1) over m, summed over channels: the mean of |x_i - x_j|^2 over the pairs."""
+    apart = samples - samples[:, :1]  # exact for near values, and exactly 0 for equal ones
+    apart -= apart.mean(1, keepdims=True)
+    return np.einsum("bmchw,bmchw->bhw", apart, apart) * samples.dtype.type(2 / (samples.shape[1] - 1))
+
+
+def image_gradient(
+    pictures: Float32[Array, "n m h w 3"], squared: bool = False, names: Sequence[str] | None = None
+) -> Float64[Array, "n"]:
+    """Mean over pixels of the gradient's 2-norm, of the mean of the m pictures decoded at each pose; per pixel step.
+
+    squared: of the norm's square, as the paper's appendix has it.
+    Returns: 0 for a constant picture; a times as much (a^2 where squared) for pictures times a.
+    Raises: ValueError: no picture, a side under 2 pixels, a value that is not finite, naming the poses.
+    Source: DAV-GSWT, Eq. (uncert_img), its first term.
+    """
+    n, m, h, w, _ = pictures.shape
+    if m < 1 or min(h, w) < 2:
+        raise ValueError(f"a gradient needs at least one picture of 2 x 2 pixels, not {m} of {w} x {h}")
+    found = np.empty(n)
+    step = max(1, PIXELS // (m * h * w * 3))
+    for start in range(0, n, step):
+        rows = slice(start, start + step)
+        with np.errstate(invalid="ignore"):  # rejected below
+            slope = gradient_map(pictures[rows].mean(1, dtype=np.float64) @ np.array(LUMINANCE))
+        found[rows] = (slope**2 if squared else slope).mean((1, 2))
+    require_finite(found, "the decoded pictures", names)
+    return found
+
+
+def gradient_map(values: Float64[Array, "n h w"]) -> Float64[Array, "n h w"]:
+    """Norm of the gradient by the Sobel operator over 8, with reflection at the border."""
+    padded = np.pad(values, ((0, 0), (1, 1), (1, 1)), mode="reflect")
+    return np.hypot(_along(padded, 2), _along(padded, 1))
+
+
+def _along(padded: Float[Array, "n _ _"], axis: int) -> Float[Array, "n _ _"]:
+    """Central difference along an axis, smoothed by 1 2 1 along the other; without the border."""
+    x = np.moveaxis(padded, axis, -1)
+    difference = x[..., 2:] - x[..., :-2]
+    smooth = difference[:, :-2] + 2 * difference[:, 1:-1] + difference[:, 2:]
+    return np.moveaxis(smooth, -1, axis) / 8
 
 
 @dataclass(frozen=True)
