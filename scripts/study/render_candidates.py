@@ -3,11 +3,11 @@
 from dav_gswt.files import atomic_folder
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
-from dav_gswt.views import candidates, oracle
+from dav_gswt.views import candidates, policy_inputs
 
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
     listed = candidates.list_rendered(scene, read_scene_frame(snakemake.input.frame))
     with atomic_folder(snakemake.output.truth) as folder:
-        some = oracle.spread_candidates(listed, snakemake.params.poses)
-        oracle.write_truth(folder, oracle.render_truth(scene, some, ""))
+        some = policy_inputs.spread_candidates(listed, snakemake.params.poses)
+        policy_inputs.write_truth(folder, policy_inputs.render_truth(scene, some, ""))

@@ -29,9 +29,6 @@ def test_the_core_and_numpy_agree_the_number_of_threads_changes_no_bit_and_other
     assert differ.mean() < 2e-3
     np.testing.assert_allclose(found.total[~differ], wanted.total[~differ], atol=1e-5)
     np.testing.assert_allclose(found.squares[~differ], wanted.squares[~differ], atol=1e-5)
-    sums = np.zeros((3, 5, 1), np.float32).T, np.zeros((1, 5), np.float32), np.zeros((1, 5), np.float32)
-    with pytest.raises(ValueError, match="sums 0 must be C-contiguous"):
-        cpu.add_colours(views[0].image, views[0].weight, views[0].camera, places[:5], heights[:1], sums)
 
 
 def test_deviations_are_those_of_the_colours():

@@ -8,7 +8,7 @@ from fixtures import ground as made
 
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
-from dav_gswt.reconstruction import coarse, ground, update
+from dav_gswt.reconstruction import coarse, ground, regression_guard, update
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.evaluation import evaluate_field
 from dav_gswt.reconstruction.fit_settings import UPDATE_RATE, FitSettings
@@ -88,7 +88,7 @@ def test_no_photos_and_those_that_contradict_the_earlier_ones_change_nothing():
 @pytest.mark.parametrize("taken", [True, False])
 def test_where_earlier_photos_lose_much_an_update_tells_whether_the_new_ones_are_right(monkeypatch, taken):
     asked, update_field = [], update.update_field
-    monkeypatch.setattr(update.regression_guard, "allowed_loss", lambda *_: 100.0 if asked else -100.0)
+    monkeypatch.setattr(regression_guard, "allowed_loss", lambda *_: 100.0 if asked else -100.0)
 
     def updated(*given):
         asked.append(given)

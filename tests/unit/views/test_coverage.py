@@ -20,7 +20,7 @@ from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import coverage, oracle, policy_inputs
+from dav_gswt.views import coverage, policy_inputs
 from dav_gswt.views.policies import lazy_greedy
 from dav_gswt.views.pose_maps import PoseMaps, write_pose_maps
 from dav_gswt.views.scores import Scores
@@ -155,7 +155,7 @@ def files(tmp_path_factory):
     points = np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
     (tmp_path / "sparse").mkdir()
     write_colmap_model(ColmapModel(tuple(names), tuple(c for _, c in pool()), *points), tmp_path / "sparse")
-    oracle.write_truth(tmp_path / "truth", iter(views[1:]))
+    policy_inputs.write_truth(tmp_path / "truth", iter(views[1:]))
     known = np.where(true.means[:, 1] > 1.6, 0.8, 0.2).astype(np.float32)
     cells = coverage.GroundCells(true, patch.grid()).view([scoring_camera(camera) for _, camera in pool()]).pixels
     write_pose_maps(tmp_path / "maps.npz", PoseMaps(names, np.zeros((3, 4, 4), np.float32), None, cells), known)

@@ -158,16 +158,10 @@ def add_colours(
 ) -> None:
     """Add a photo's bilinear colours at points of the world moved up by each height, where it counts.
 
-    sums: of colours, of their squares over the channels, and how many were added, in place.
-    Raises: ValueError: an array's type, shape or layout.
+    sums: of colours, of their squares over the channels, and how many were added, in place. All arrays must be
+    C-contiguous.
     """
-    n, m, size = len(points), len(heights), (camera.height, camera.width)
-    shapes = (m, n, 3), (m, n), (m, n)
-    wanted = {"image": (image, (*size, 3)), "weight": (weight, size), "points": (points, (n, 3))}
-    wanted |= {"heights": (heights, (m,))}
-    wanted |= {f"sums {k}": pair for k, pair in enumerate(zip(sums, shapes, strict=True))}
-    for name, (array, shape) in wanted.items():
-        interface.check(array, name, shape)
+    n, m = len(points), len(heights)
     threads = 1 if m * n < MIN_PARALLEL else threads or default_threads()
     inner = [camera.fx, camera.fy, camera.cx, camera.cy]
     numbers = np.concatenate([np.ravel(camera.rotation), np.ravel(camera.translation), inner]).astype(np.float32)

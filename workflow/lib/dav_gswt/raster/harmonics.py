@@ -24,7 +24,8 @@ def basis(directions: Float[Array, "n 3"], degree: int) -> Float[Array, "n k"]:
 
     Orthonormal over the sphere.
     """
-    return np.stack(list_terms(*np.asarray(directions, float).T, degree), 1)
+    x, y, z = np.asarray(directions, float).T
+    return np.stack(list_terms(x, y, z, degree), 1)
 
 
 def list_terms(x: Any, y: Any, z: Any, degree: int) -> list[Any]:

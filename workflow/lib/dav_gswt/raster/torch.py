@@ -65,10 +65,11 @@ class Rasterizer(interface.Rasterizer):
                 _put_squares(
                     picture, group.corners, _blend_weights(shapes[group.rows], group.corners) @ values[group.rows]
                 )
-        images = split_channels(
-            picture[: camera.height, : camera.width], gaussians.colours.shape[-1], gaussians.features is not None
-        )
-        return images, BinnedSplats(groups, splats.index)
+        array = picture[: camera.height, : camera.width].numpy()
+        n = gaussians.colours.shape[-1]
+        parts = [array[..., :n], array[..., n], array[..., n + 1], array[..., n + 2 :]]
+        images = (np.ascontiguousarray(part) for part in parts[: 3 if gaussians.features is None else 4])
+        return Rendering(*images), BinnedSplats(groups, splats.index)
 
     @torch.enable_grad()
     def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
@@ -132,13 +133,6 @@ class Rasterizer(interface.Rasterizer):
 def to_leaves(gaussians: GaussianArrays) -> dict[str, Tensor]:
     """Gaussians as float64 tensors; features only if there are any."""
     return {name: torch.as_tensor(array).double() for name, array in gaussians.by_name().items()}
-
-
-def split_channels(picture: Float[Tensor, "h w c"], colours: int, features: bool) -> Rendering:
-    """Colour, alpha, depth and perhaps features from the channels of one picture, in this order."""
-    array = picture.detach().cpu().numpy()
-    parts = [array[..., :colours], array[..., colours], array[..., colours + 1], array[..., colours + 2 :]]
-    return Rendering(*(np.ascontiguousarray(part) for part in parts[: 4 if features else 3]))
 
 
 def join_gradients(rendering: Rendering, given: PictureGradients) -> Float[Tensor, "h w c"]:

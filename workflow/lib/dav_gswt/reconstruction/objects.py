@@ -76,12 +76,10 @@ def make_blobs(
 ):
     """Round Gaussians at points."""
     n = len(points)
-    quats = np.zeros((n, 4), np.float32)
-    quats[:, 0] = 1
     return GaussianField(
         points.astype(np.float32),
         np.repeat(np.log(np.maximum(sizes, 1e-12))[:, None], 3, 1).astype(np.float32),
-        quats,
+        np.tile(np.float32([1, 0, 0, 0]), (n, 1)),
         np.full(n, logit, np.float32),
         rgb_to_sh(colours),
         np.zeros(n, np.float32),

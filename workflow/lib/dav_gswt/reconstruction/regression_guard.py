@@ -121,11 +121,6 @@ def mean_loss(before: list[float | None], after: list[float | None]) -> float:
     return float(np.mean([min(b, VISIBLE_PSNR) - min(a, VISIBLE_PSNR) for b, a in known])) if known else 0.0
 
 
-def report_unchanged(field: GaussianField) -> UpdateReport:
-    """The report of a round without new photos."""
-    return UpdateReport(gaussians=len(field))
-
-
 def list_rejected_photos(reports: Iterable[dict]) -> set[str]:
     """Names of the photos that contradicted earlier ones, by their rounds' fit.json."""
     rejected = [report["new_views"]["views"] for report in reports if not report["new_views"]["taken"]]

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.reconstruction import objects, observation, regression_guard, underlay
+from dav_gswt.reconstruction import objects, observation, underlay
 from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, finish_field, fit_coarse_field, read_start_views
 from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.reconstruction.fitting import trainer
@@ -26,6 +26,7 @@ from dav_gswt.reconstruction.fitting.plan import FitPlan
 from dav_gswt.reconstruction.fitting.trainer import FitOptions, FitResult
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
+from dav_gswt.reconstruction.regression_guard import UpdateReport, fit_with_guard
 
 _log = logging.getLogger(__name__)
 
@@ -80,11 +81,11 @@ def update_field(given: UpdateInput, settings: FitSettings, rng: np.random.Gener
 
     Ground that only the new photos see takes their colours, and objects that they show where nothing stood are added;
     then all Gaussians are fitted to all photos. New photos that contradict the earlier ones change nothing (see
-    `regression_guard`); without new photos the field is returned as it is.
+    `fit_with_guard`); without new photos the field is returned as it is.
     """
     field, grid, new = given.field, given.grid, given.new
     if not new:
-        return Reconstruction(field, grid, regression_guard.report_unchanged(field))
+        return Reconstruction(field, grid, UpdateReport(gaussians=len(field)))
     start = _prepare_start(given, settings, rng)
     options = FitOptions(f"fit {len(new)} new photos")
 
@@ -93,7 +94,7 @@ def update_field(given: UpdateInput, settings: FitSettings, rng: np.random.Gener
 
     n = len(given.earlier)
     plan = settings.plan_update(n, len(new))
-    kept, report = regression_guard.fit_with_guard(field, start.field, start.views[:n], start.views[n:], plan, fit)
+    kept, report = fit_with_guard(field, start.field, start.views[:n], start.views[n:], plan, fit)
     if not report.takes_new_views:
         return Reconstruction(field, grid, report)
     return Reconstruction(*finish_field(kept, start.grid, start.views), report)
@@ -110,7 +111,7 @@ def update_from_scratch(
     """
     field, grid, count = given.field, given.grid, len(given.earlier)
     if not given.new:
-        return Reconstruction(field, grid, regression_guard.report_unchanged(field))
+        return Reconstruction(field, grid, UpdateReport(gaussians=len(field)))
     photos = start.views
     anew = settings.from_scratch(first, len(photos))
     made: list[Reconstruction] = []
@@ -121,13 +122,11 @@ def update_from_scratch(
 
     def is_update_accepted() -> bool:
         report = update_field(given, settings, rng.spawn(1)[0]).report
-        return isinstance(report, regression_guard.UpdateReport) and report.takes_new_views
+        return isinstance(report, UpdateReport) and report.takes_new_views
 
     seen = observation.mask_for_fit(photos, grid)
     plan = anew.plan_coarse_fit(len(photos))
-    _, report = regression_guard.fit_with_guard(
-        field, field, seen[:count], seen[count:], plan, fit, 0, is_update_accepted
-    )
+    _, report = fit_with_guard(field, field, seen[:count], seen[count:], plan, fit, 0, is_update_accepted)
     return replace(made[-1], report=report) if report.takes_new_views else Reconstruction(field, grid, report)
 
 

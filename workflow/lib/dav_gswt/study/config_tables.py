@@ -23,8 +23,8 @@ is *required* must be given; one without any may be left out.
 POLICIES_HEAD = """# Policies
 
 How the next views are chosen: the config's `policy`. `auto`, the default, takes `farthest` where a scene chooses from
-given photos (`agent: replay`), else `coverage-error`; [what each is worth](../active-views.md). Made by `make reference` from the decorators
-in `workflow/lib/dav_gswt/views/policies.py`;
+given photos (`agent: replay`), else `coverage-error`; [what each is worth](../active-views.md). Made
+by `make reference` from the decorators in `workflow/lib/dav_gswt/views/policies.py`;
 [architecture](../architecture.md#a-policy) says how to add one.
 
 Every policy knows where the candidates and the photos so far are; the column `reads` says what it reads besides:

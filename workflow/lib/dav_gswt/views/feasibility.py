@@ -155,13 +155,16 @@ def _find_outside_limits(site: _GroundMesh, centres: Float[Array, "n 3"], limits
     """Find cameras outside of the limits."""
     above = centres[:, 2] - site.grid.height_at(centres)
     away = np.linalg.norm(centres - site.middle, axis=1)
-    low, high, far = (
-        limits.get(name, default)
-        for name, default in (("min_height", -np.inf), ("max_height", np.inf), ("max_distance", np.inf))
+    rules = (
+        ("max_distance", away, 1, "too far: {:.3g} from the middle, {:g} is the most"),
+        ("max_height", above, 1, "too high: {:.3g} above the ground, {:g} is the most"),
+        ("min_height", above, -1, "too low: {:.3g} above the ground, {:g} is the least"),
     )
-    reasons = {int(i): f"too low: {above[i]:.3g} above the ground, {low:g} is the least" for i in _indices(above < low)}
-    reasons |= {i: f"too high: {above[i]:.3g} above the ground, {high:g} is the most" for i in _indices(above > high)}
-    return {i: f"too far: {away[i]:.3g} from the middle, {far:g} is the most" for i in _indices(away > far)} | reasons
+    reasons = {}
+    for key, values, sign, text in rules:
+        if key in limits:
+            reasons |= {i: text.format(values[i], limits[key]) for i in _indices(sign * values > sign * limits[key])}
+    return reasons
 
 
 def _indices(mask: Bool[Array, "n"]) -> list[int]:

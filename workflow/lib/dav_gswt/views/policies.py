@@ -16,7 +16,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.poses import select_farthest_poses
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.uncertainty import combine_image_terms, combine_terms
+from dav_gswt.views.uncertainty import combine_terms
 
 AUTO = "auto"  # in the config: what `resolve_policy` says
 HIGHEST = 0.98  # quantile of all candidates' values at which colours of figures end
@@ -150,8 +150,7 @@ def everything(scores: Scores, inputs: SelectionInput) -> list[int]:
 )
 def grad_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
     """The k candidates of greatest u_img, an ablation: texture of the expected picture, and lam LPIPS."""
-    gradient, lpips = scores.term("gradient"), scores.terms.get("lpips")
-    return top(combine_image_terms(gradient, lpips, inputs.lam, scores.scales, scores.names), inputs.k)
+    return top(uncertainty(scores, inputs.lam, "gradient"), inputs.k)
 
 
 @policy(
@@ -198,9 +197,10 @@ def resolve_policy(policy: str, agent: str | None) -> str:
     return "farthest" if agent == "replay" else "coverage-error"
 
 
-def uncertainty(scores: Scores, lam: float) -> Float64[Array, "n"]:
-    """Return u = W2² + lam LPIPS of every candidate."""
-    return combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
+def uncertainty(scores: Scores, lam: float, term: str = "w2_sq") -> Float64[Array, "n"]:
+    """Return u = W2² + lam LPIPS of every candidate, or another term in place of W2²."""
+    lpips = scores.terms.get("lpips")
+    return combine_terms(scores.term(term), lpips, lam, scores.scales, scores.names, term)
 
 
 def candidate_values(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:

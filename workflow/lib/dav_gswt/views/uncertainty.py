@@ -173,37 +173,21 @@ def robust_scale(values: Float[Array, "n"]) -> float:
 
 
 def combine_terms(
-    w2: Float[Array, "n"],
+    first: Float[Array, "n"],
     lpips: Float[Array, "n"] | None,
     lam: float,
     scales: Scales,
     names: Sequence[str] | None = None,
+    name: str = "w2_sq",
 ) -> Float64[Array, "n"]:
     """u = W2² + lam LPIPS, each over its frozen scale (`w2_sq`, `lpips`). lpips: None where its weights are missing.
 
     lam = 0 ranks by W2, a large lam by LPIPS; the units of the latent space do not matter. Without LPIPS its term is
-    left out, with a warning if lam > 0.
+    left out, with a warning if lam > 0. name: `gradient` for u_img, an ablation, with the picture's gradient in place
+    of W2; the appendix's aggregate of both is their sum.
     Raises: ValueError: lam below 0 or not finite; a term without scale; a value that is not finite, naming the poses.
-    Source: DAV-GSWT, Eq. (uncert_latent).
+    Source: DAV-GSWT, Eq. (uncert_latent), Eq. (uncert_img).
     """
-    return _weighted_sum("w2_sq", w2, lpips, lam, scales, names)
-
-
-def combine_image_terms(
-    gradient: Float[Array, "n"],
-    lpips: Float[Array, "n"] | None,
-    lam: float,
-    scales: Scales,
-    names: Sequence[str] | None = None,
-) -> Float64[Array, "n"]:
-    """u_img, an ablation: as `combine_terms`, with the picture's gradient (scale `gradient`) in place of W2.
-
-    The appendix's aggregate of both is their sum. Source: DAV-GSWT, Eq. (uncert_img).
-    """
-    return _weighted_sum("gradient", gradient, lpips, lam, scales, names)
-
-
-def _weighted_sum(name: str, first, lpips, lam: float, scales: Scales, names) -> Float64[Array, "n"]:
     if not 0 <= lam < np.inf:
         raise ValueError(f"lam must be a number of at least 0, not {lam}")
     total = _divide_by_scale(name, first, scales, names)

@@ -118,7 +118,8 @@ class HostDescent:
         seen = task.raster.forward(**run.state.values, camera=view.camera)
         behind = background(view, run.rng.uniform(0, 1, 3).astype(np.float32))
         image = channels.composite(seen.colour, seen.alpha, behind)
-        run.exposures.update(index, image, view)
+        sample = exposure.sample_photo(view.image, view.weight)
+        run.exposures.learn(index, exposure.thin(image, view.weight.size), sample)
         gain, offset = run.exposures.gain_and_offset(index)
         exposed = channels.scale_channels(image, gain, offset)
         if task.collects_errors(run.step):

@@ -119,10 +119,8 @@ class DeviceDescent:
     def _find_photo(self, view: TrainingView, index: int) -> Photo:
         """A view on the device; kept there while there is room."""
         if (photo := self._photos.get(index)) is None:
-            parts = view.image, view.weight, view.behind
-            image, weight, behind = (
-                None if a is None else cuda.upload(np.ascontiguousarray(a), self.device) for a in parts
-            )
+            image, weight = (cuda.upload(np.ascontiguousarray(a), self.device) for a in (view.image, view.weight))
+            behind = None if view.behind is None else cuda.upload(np.ascontiguousarray(view.behind), self.device)
             photo = Photo(image, weight, behind, exposure.sample_photo(view.image, view.weight))
             if self._cached + photo.size <= CACHE:
                 self._photos[index] = photo

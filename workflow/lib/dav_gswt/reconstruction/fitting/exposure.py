@@ -137,10 +137,6 @@ class ExposureTracker:
     def __init__(self, views: int):
         self.gains, self.offsets = np.ones((views, 3), np.float32), np.zeros((views, 3), np.float32)
 
-    def update(self, index: int, picture: Float32[Array, "h w 3"], view: TrainingView) -> None:
-        """Update a photo's values from the field's picture at its pose."""
-        self.learn(index, thin(picture, view.weight.size), sample_photo(view.image, view.weight))
-
     def learn(self, index: int, picture: Float32[Array, "r c 3"], photo: Sample) -> None:
         """Update a photo's values from the thinned picture of the field (`thin`)."""
         a, b = update_gain_and_offset(picture, photo, (self.gains[index], self.offsets[index]))

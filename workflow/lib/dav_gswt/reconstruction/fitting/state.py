@@ -65,6 +65,7 @@ def from_field(field: GaussianField) -> State:
 
 def to_field(state: State, ground: int, keep: Bool[Array, "n"] | None = None) -> GaussianField:
     """The field of a state: its first `ground` Gaussians are discs of the ground; its uncertainty is 0."""
-    n = len(state)
-    field = GaussianField(*(state.values[name] for name in NAMES), np.zeros(n, np.float32), np.arange(n) < ground)
+    n, (means, log_scales, quats, logits, sh) = len(state), (state.values[name] for name in NAMES)
+    certain = np.zeros(n, np.float32)
+    field = GaussianField(means, log_scales, quats, logits, sh, certain, np.arange(n) < ground)
     return field if keep is None else field[keep]

@@ -205,8 +205,7 @@ def _sum_weights_reference(arrays: Arrays, camera: Camera) -> Array:
 
     gaussians = (torch.tensor(arrays[name], dtype=torch.float64) for name in PARAMETERS)
     means, log_scales, quats, opacity_logits, colours = gaussians
-    view = oracle.move_camera(camera, None, means)
-    splats = oracle.project(means, log_scales, quats, opacity_logits, colours, camera, view)
+    splats = oracle.project(means, log_scales, quats, opacity_logits, colours, camera)
     x, y = np.meshgrid(np.arange(SIDE) + 0.5, np.arange(SIDE) + 0.5)
     found = np.zeros(len(arrays["means"]))
     found[splats.index] = oracle.weights(splats, torch.from_numpy(np.stack([x.ravel(), y.ravel()], 1))).sum(0)
