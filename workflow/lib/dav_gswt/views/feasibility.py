@@ -1,7 +1,8 @@
 """Feasibility of poses: in the ground or an object, too near the ground, hidden, or outside of the scene's limits.
 
-The ground is the whole height field as a mesh; rays decide what is hidden. embree traces in single precision, so all
-coordinates are relative to the exemplar: its middle is the origin, its side the unit.
+The ground is the whole height field as a mesh; rays decide what is hidden. trimesh traces them by embree, or slower by
+rtree where embree has no package. embree has single precision, so all coordinates are relative to the exemplar: its
+middle is the origin, its side the unit.
 """
 
 import logging
@@ -12,7 +13,6 @@ import numpy as np
 import trimesh
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
-from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from scipy.special import expit
@@ -89,8 +89,6 @@ def find_infeasible(
     centres = np.stack([camera.centre for camera in cameras])
     if clearance is None:
         clearance = CLEARANCE * float(np.median(np.linalg.norm(centres - site.middle, axis=1)))
-    if not trimesh.ray.has_embree:
-        _log.warning("embreex is not installed: rays are marched in steps, which is slower")
     reasons = (
         _find_hidden(site, cameras, centres)
         | _find_outside_limits(site, centres, limits or {})
@@ -204,8 +202,6 @@ def _in_picture(camera: Camera, points: Float[Array, "m 3"]) -> Bool[Array, "m"]
 
 def _cast_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
     """Distance to the ground along rays of unit direction; infinite for misses."""
-    if not trimesh.ray.has_embree:
-        return _march_rays(site, origins, ways)
     found = np.full(len(origins), np.inf)
     face = site.mesh.ray.intersects_first(origins, ways)
     hit = np.flatnonzero(face >= 0)
@@ -215,34 +211,6 @@ def _cast_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Arra
     rise = np.einsum("ni,ni->n", normal, a - origins[hit])
     found[hit] = rise / np.where(along == 0, np.nan, along)  # a ray within its triangle's plane
     return np.nan_to_num(found, nan=0.0, posinf=np.inf)
-
-
-def _march_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
-    """As `_cast_rays`, without embree: march each ray through the grid's box until it is below the surface.
-
-    There are as many steps as vertices along the longer side, so crests wider than a cell are detected.
-    """
-    steps = max(len(site.x), len(site.y))
-    heights = site.mesh.vertices[:, 2].reshape(len(site.y), len(site.x))
-    margin = OFF + 2 / steps * np.ptp(heights)  # so that the last step of a ray downwards ends below the surface
-    low = np.array([site.x[0], site.y[0], heights.min() - margin])
-    high = np.array([site.x[-1], site.y[-1], heights.max() + OFF])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slabs = np.stack([(low - origins) / ways, (high - origins) / ways])
-    first = np.maximum(np.nan_to_num(slabs.min(0), nan=-np.inf).max(1), 0)
-    last = np.nan_to_num(slabs.max(0), nan=np.inf).min(1)
-    found, open_ = np.full(len(origins), np.inf), np.flatnonzero(first < last)
-    for k in range(steps):
-        t = first[open_] + (k + 1) / steps * (last - first)[open_]
-        at = origins[open_] + t[:, None] * ways[open_]
-        row, column = (
-            np.interp(at[:, 1], site.y, np.arange(len(site.y))),
-            np.interp(at[:, 0], site.x, np.arange(len(site.x))),
-        )
-        below = at[:, 2] < map_coordinates(heights, [row, column], order=1, mode="nearest")
-        found[open_[below]] = t[below]
-        open_ = open_[~below]
-    return found
 
 
 def drop_blocked(candidates: Candidates, field: GaussianField, grid: Ground) -> Candidates:
