@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from record import report_figures
 
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.study import fit_profile
 
 COPR = FitSettings(size=256, spacing=1.5, max_gaussians=350_000, steps=1000)

@@ -9,7 +9,7 @@ from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import coarse, ground
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params

@@ -7,7 +7,7 @@ from dav_gswt.photos.colmap_model import read_colmap_model, triangulate_points
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.study import csv_tables
 from dav_gswt.study.views import gain_bound
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import describe_machine, record_provenance
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.study import csv_tables, fit_profile, markdown, peers
 
 with logging_to(snakemake.log[0]):

@@ -6,7 +6,7 @@ from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.study import csv_tables, refits
 
 with logging_to(snakemake.log[0]):

@@ -9,7 +9,7 @@ from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import describe_machine, record_provenance
 from dav_gswt.reconstruction import ground
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.study.scale import costs
 
 with logging_to(snakemake.log[0]):

@@ -5,7 +5,7 @@ from fixtures import ground as made
 
 from dav_gswt.photos.colmap_model import ColmapModel
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.study import fit_profile
 
 NONE = np.zeros((0, 3)), np.zeros((0, 3), np.float32)

@@ -14,7 +14,7 @@ from dav_gswt.config.settings import Preset
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.photos.synthetic import scene as synthetic
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.views import candidates
 
 RIG = {"port": "p", "inbox": "in", "millimetres": 250.0, "limits": dict.fromkeys(("pan", "tilt", "radius"), (0, 1000))}

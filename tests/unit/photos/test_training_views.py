@@ -11,7 +11,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.array_file import ArrayFile
 from dav_gswt.photos.training_views import mask_outside_ground, read_training_view
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 
 FRAME = replace(made.FRAME, kind="photos")  # with exposures and moving things
 

@@ -10,8 +10,7 @@ from fixtures import ground as made
 
 from dav_gswt.field import rgb_to_sh
 from dav_gswt.reconstruction import regression_guard
-from dav_gswt.reconstruction.fit_settings import FitSettings
-from dav_gswt.reconstruction.fitting.plan import FitReport
+from dav_gswt.reconstruction.fitting.plan import FitReport, FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitResult
 from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.reconstruction.update import UpdateInput, update_field

@@ -11,7 +11,7 @@ from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.reconstruction import coarse, ground, regression_guard, update
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.evaluation import evaluate_field
-from dav_gswt.reconstruction.fit_settings import UPDATE_RATE, FitSettings
+from dav_gswt.reconstruction.fitting.plan import UPDATE_RATE, FitSettings
 from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.reconstruction.update import UpdateInput
 

@@ -54,16 +54,6 @@ def test_w2_holds_close_deviations_that_differences_of_variances_lose():
     assert un.w2_sq(means, variances)[0][0] == pytest.approx(1, abs=0.07)
 
 
-def test_w2_and_the_gradient_in_several_chunks_equal_those_in_one(monkeypatch):
-    latents, pictures = normal(7, 3, 4, 5, 5), normal(5, 2, 8, 8, 3)
-    together = *un.w2_sq(latents), un.image_gradient(pictures)
-    monkeypatch.setattr(un, "LATENTS", 2 * 3 * 4 * 5 * 5)
-    monkeypatch.setattr(un, "PIXELS", 2 * 2 * 8 * 8 * 3)
-    for a, b in zip((*un.w2_sq(latents), un.image_gradient(pictures)), together, strict=True):
-        np.testing.assert_array_equal(a, b)
-    assert un.w2_sq(latents[:0])[1].shape == (0, 5, 5)
-
-
 @pytest.mark.parametrize("bad", [np.nan, 1e30], ids=str)  # whose square is infinite
 def test_latents_that_are_not_finite_are_an_error_that_names_the_poses(bad):
     latents = normal(9, 3, 2, 4, 4)
@@ -102,7 +92,6 @@ def test_a_ramp_has_its_slope_within_the_border_and_none_across_it_and_a_diagona
     np.testing.assert_allclose(found[:, [0, -1]], 0, atol=1e-12)
     np.testing.assert_allclose(un.gradient_map(ramp.T[None])[0], found.T, rtol=1e-12)
     assert un.image_gradient(grey(ramp))[0] == pytest.approx(3 * 8 / 10, rel=1e-6)
-    assert un.image_gradient(grey(ramp), squared=True)[0] == pytest.approx(9 * 8 / 10, rel=1e-6)
     rows, columns = np.mgrid[:9, :9].astype(float)
     np.testing.assert_allclose(un.gradient_map((3 * rows + 4 * columns)[None])[0, 1:-1, 1:-1], 5, rtol=1e-12)
 

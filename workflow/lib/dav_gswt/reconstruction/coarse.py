@@ -15,9 +15,8 @@ from dav_gswt.photos.colmap_model import read_colmap_model, triangulate_points
 from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import discs, ground, objects, observation, underlay
-from dav_gswt.reconstruction.fit_settings import FitSettings, limit_discs
 from dav_gswt.reconstruction.fitting import trainer
-from dav_gswt.reconstruction.fitting.plan import FitReport
+from dav_gswt.reconstruction.fitting.plan import FitReport, FitSettings, limit_discs
 from dav_gswt.reconstruction.fitting.trainer import DEFAULT_OPTIONS, FitOptions
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.top_view import render_top_view

@@ -20,9 +20,8 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import objects, observation, underlay
 from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, finish_field, fit_coarse_field, read_start_views
-from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.reconstruction.fitting import trainer
-from dav_gswt.reconstruction.fitting.plan import FitPlan
+from dav_gswt.reconstruction.fitting.plan import FitPlan, FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions, FitResult
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints

@@ -21,7 +21,7 @@ from dav_gswt.images import metrics
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground, read_training_view
 from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions
 from dav_gswt.reconstruction.ground import WHOLE, Ground
 

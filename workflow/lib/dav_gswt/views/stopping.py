@@ -26,15 +26,6 @@ SCENES = 4  # behind both constants; the interval uses Student's t for so few
 
 
 @dataclass(frozen=True)
-class RoundGaps:
-    """fitted: photos before this round. gaps: dB by which each photo of the round is shown worse than those on
-    average."""
-
-    fitted: int
-    gaps: list[float]
-
-
-@dataclass(frozen=True)
 class ExpectedGain:
     """Expected gain of the next `photos` photos together in dB, and the ends of its 95 % interval. closes: dB of the
     gap that they close; `gain` is a share of it."""
@@ -51,20 +42,20 @@ class ExpectedGain:
         return self.gain / self.photos
 
 
-def predict_gain(history: list[RoundGaps], fitted: int, coming: int) -> ExpectedGain | None:
+def predict_gain(gaps: list[float], fitted: int, coming: int) -> ExpectedGain | None:
     """Predict the gain of a field fitted to `fitted` = n photos from `coming` = k more.
 
-    Model: the gap is c / n, with c estimated from all new photos so far; k photos close c (1 / n - 1 / (n + k)) of it,
-    and test views gain SHARE of that. The interval is of the logarithm: normal for c, Student's t for SHARE on one more
-    scene, t_(SCENES - 1) SPREAD sqrt(1 + 1 / SCENES). If c <= 0 the gain is 0, and its upper end follows from c alone.
+    gaps: see `build_history`. Model: the gap is c / n, with c estimated from all new photos so far; k photos close
+    c (1 / n - 1 / (n + k)) of it, and test views gain SHARE of that. The interval is of the logarithm: normal for c,
+    Student's t for SHARE on one more scene, t_(SCENES - 1) SPREAD sqrt(1 + 1 / SCENES). If c <= 0 the gain is 0, and
+    its upper end follows from c alone.
     Returns: None with fewer than LEAST new photos so far, or none to come.
     """
-    gaps = np.array([r.fitted * gap for r in history for gap in r.gaps])
     if len(gaps) < LEAST or coming < 1:
         return None
     n, k, z = fitted, coming, float(ndtri((1 + LEVEL) / 2))
     part = 1 / n - 1 / (n + k)
-    c, error = float(gaps.mean()), float(gaps.std(ddof=1) / np.sqrt(len(gaps)))
+    c, error = float(np.mean(gaps)), float(np.std(gaps, ddof=1) / np.sqrt(len(gaps)))
     if not c > 0:
         return ExpectedGain(k, 0.0, 0.0, SHARE * part * max(0.0, c + z * error), 0.0)
     scene = float(stdtrit(SCENES - 1, (1 + LEVEL) / 2)) * SPREAD * np.sqrt(1 + 1 / SCENES)
@@ -72,20 +63,22 @@ def predict_gain(history: list[RoundGaps], fitted: int, coming: int) -> Expected
     return ExpectedGain(k, gain, gain / wide, gain * wide, part * c)
 
 
-def build_history(reports: list[dict], start: int) -> tuple[list[RoundGaps], int]:
-    """The gaps from the reports of the rounds so far (fit.json), and how many photos the field is fitted to now.
+def build_history(reports: list[dict], start: int) -> tuple[list[float], int]:
+    """How much worse new photos were shown than earlier ones, and how many photos the field is fitted to now.
 
-    start: photos before the first round. Rejected photos are left out: the field was never fitted to them.
+    The gaps are dB below the earlier photos' mean, times the number of photos that the field was fitted to then.
+    reports: of the rounds so far (fit.json). start: photos before the first round. Rejected photos are left out: the
+    field was never fitted to them.
     """
-    rounds, fitted = [], start
+    gaps, fitted = [], start
     for report in reports:
         new, earlier = report["new_views"], report["earlier_views"]
         if new["taken"] and new["photos"]:
             level = earlier["psnr_before"]
             unseen = [row["psnr_before"] for row in new["views"] if row["psnr_before"] is not None]
-            rounds.append(RoundGaps(fitted, [] if level is None else [level - value for value in unseen]))
+            gaps += [] if level is None else [fitted * (level - value) for value in unseen]
             fitted += new["photos"]
-    return rounds, fitted
+    return gaps, fitted
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from dav_gswt.photos.synthetic.scene import FIELD_OF_VIEW
 from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.study.scale.photos import photo_name, place_cameras

@@ -20,7 +20,7 @@ from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import evaluation
 from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.reconstruction.update import UpdateInput, update_field
 from dav_gswt.views import policies

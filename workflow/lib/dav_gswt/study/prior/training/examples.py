@@ -18,7 +18,7 @@ from dav_gswt.prior.conditions import RenderedView, find_nearest, relative_pose,
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.reconstruction.photo_colours import sample_colours
 from dav_gswt.study.prior.training.example_files import SIZE, Examples, concatenate, empty_examples
 from dav_gswt.study.prior.training.worlds import FLYING_HEIGHT, World, make_world
