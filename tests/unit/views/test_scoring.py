@@ -113,6 +113,10 @@ def test_without_a_prior_only_geometric_terms_are_computed_of_which_coverage_is_
     assert set(found.scores.terms) == {"opacity", "coverage"} and found.maps.w2_sq is None
     assert np.array_equal(found.gaussians, patch.field().uncertainty) and not found.scores.steps.any()
     assert (found.scores.terms["coverage"] > 0).all() and found.frozen.pixels is None
+    masks = [scoring.ground_mask(patch.grid(), scoring.scoring_camera(camera)) for _, camera in pool()]
+    means = [(seen * mask).sum() / mask.sum() for seen, mask in zip(found.maps.opacity, masks, strict=True)]
+    np.testing.assert_allclose(found.scores.terms["opacity"], means, rtol=1e-6)
+    assert all(0 < mask.mean() < 1 for mask in masks)
     taken, wanted = (
         cells.view([scoring.scoring_camera(camera) for camera in seen])
         for seen in ([view.camera for view in patch.photos()], [camera for _, camera in pool()])

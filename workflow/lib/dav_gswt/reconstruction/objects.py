@@ -79,7 +79,7 @@ def make_blobs(
     return GaussianField(
         points.astype(np.float32),
         np.repeat(np.log(np.maximum(sizes, 1e-12))[:, None], 3, 1).astype(np.float32),
-        np.tile(np.float32([1, 0, 0, 0]), (n, 1)),
+        np.tile(np.array([1, 0, 0, 0], np.float32), (n, 1)),
         np.full(n, logit, np.float32),
         rgb_to_sh(colours),
         np.zeros(n, np.float32),

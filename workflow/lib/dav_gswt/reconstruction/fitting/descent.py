@@ -1,12 +1,12 @@
 """A step of a fit: forward, loss, backward and Adam on one photo; here with arrays in memory.
 
-For the backends `cpu` and `torch`; `device_descent` does the same on a GPU.
+For the backends `cpu` and `torch`; `device_descent` has a subclass for a GPU.
 """
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
@@ -80,40 +80,11 @@ class TrainingTask:
         return rates
 
 
-@runtime_checkable
-class Descent(Protocol):
-    """How steps are done. Parameters may be elsewhere than in `run.state`; `pull` and `push` copy them."""
+class Descent:
+    """How steps are done: here with parameters in `run.state`. Where a subclass has them elsewhere, it copies them."""
 
     def descend(self, run: TrainingState, task: TrainingTask, index: int) -> None:
         """One step on a photo: gradients, exposure, errors that say where to grow, Adam."""
-        ...
-
-    def perturb(self, run: TrainingState, task: TrainingTask) -> None:
-        """See `densification.perturb`, after the step `run.step`."""
-        ...
-
-    def pull(self, run: TrainingState, parts: Parts = PARTS) -> None:
-        """Bring these parts of `run.state` up to date."""
-        ...
-
-    def push(self, run: TrainingState, parts: Parts = PARTS) -> None:
-        """Go on from these parts of `run.state`, which were changed."""
-        ...
-
-
-@contextmanager
-def on_host(descent: Descent, run: TrainingState, parts: Parts = PARTS) -> Iterator[None]:
-    """Change these parts of `run.state` in the block."""
-    descent.pull(run, parts)
-    yield
-    descent.push(run, parts)
-
-
-class HostDescent:
-    """See `Descent`. Parameters are in `run.state`."""
-
-    def descend(self, run: TrainingState, task: TrainingTask, index: int) -> None:
-        """See `Descent.descend`."""
         view = task.views[index]
         seen = task.raster.forward(**run.state.values, camera=view.camera)
         behind = background(view, run.rng.uniform(0, 1, 3).astype(np.float32))
@@ -133,14 +104,21 @@ class HostDescent:
         view.release()
 
     def perturb(self, run: TrainingState, task: TrainingTask) -> None:
-        """See `Descent.perturb`."""
+        """See `densification.perturb`, after the step `run.step`."""
         densification.perturb(run.state.values, task.constraints.fixed, perturbation(run, task), run.rng)
 
     def pull(self, run: TrainingState, parts: Parts = PARTS) -> None:
-        """Nothing to do."""
+        """Bring these parts of `run.state` up to date."""
 
     def push(self, run: TrainingState, parts: Parts = PARTS) -> None:
-        """Nothing to do."""
+        """Go on from these parts of `run.state`, which were changed."""
+
+    @contextmanager
+    def on_host(self, run: TrainingState, parts: Parts = PARTS) -> Iterator[None]:
+        """Change these parts of `run.state` in the block."""
+        self.pull(run, parts)
+        yield
+        self.push(run, parts)
 
     def _step_adam(self, run: TrainingState, task: TrainingTask, gradients: Gradients) -> None:
         """One step of Adam for the visible Gaussians; the others keep their values and moments."""

@@ -21,6 +21,7 @@ from dav_gswt.reconstruction.fitting.descent import (
     BETAS,
     PARTS,
     STRUCTURE,
+    Descent,
     Parts,
     TrainingState,
     TrainingTask,
@@ -49,8 +50,8 @@ class Photo:
         return sum(part.nelement() * part.element_size() for part in parts if part is not None)
 
 
-class DeviceDescent:
-    """See `Descent`. Between `push` and `pull` the parameters are on the device."""
+class DeviceDescent(Descent):
+    """Between `push` and `pull` the parameters are on the device."""
 
     def __init__(self, rasterizer: cuda.Rasterizer):
         self.raster, self.device = rasterizer, rasterizer.device
@@ -89,7 +90,7 @@ class DeviceDescent:
         gradient = gain * gradient
         gradients = self.raster.differentiate(last, gradient, -BACKDROP * (gradient * behind).sum(2))
         hold_ground(gradients, task.constraints, smooth)
-        self._step_adam(run, task, gradients, cuda.find_visible(last))
+        self._move_parameters(run, task, gradients, cuda.find_visible(last))
         view.release()
 
     def perturb(self, run: TrainingState, task: TrainingTask) -> None:
@@ -100,10 +101,10 @@ class DeviceDescent:
         densification.perturb(loose, 0, perturbation(run, task), run.rng)
         self.values["means"][rows] = cuda.upload(loose["means"], self.device)
 
-    def _step_adam(
+    def _move_parameters(
         self, run: TrainingState, task: TrainingTask, gradients: dict[str, Tensor], rows: Bool[Tensor, "n"]
     ) -> None:
-        """As `HostDescent._step_adam`."""
+        """As `Descent._step_adam`."""
         rates = task.rates(run.step, self.values["colours"].shape[1])
         unbiased = [1 - beta ** (run.step + 1) for beta in BETAS]
         for name, value in self.values.items():

@@ -20,7 +20,7 @@ from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.raster import backends
 from dav_gswt.reconstruction.fitting import densification, exposure, state
-from dav_gswt.reconstruction.fitting.descent import Descent, HostDescent, TrainingState, TrainingTask, on_host
+from dav_gswt.reconstruction.fitting.descent import Descent, TrainingState, TrainingTask
 from dav_gswt.reconstruction.fitting.plan import FitPlan, FitReport, Schedule
 from dav_gswt.reconstruction.fitting.state import State
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
@@ -106,7 +106,7 @@ def _leave_out_blind(views: list[TrainingView], what: str) -> list[TrainingView]
 def _choose_descent(task: TrainingTask) -> Descent:
     """Steps on the GPU with the backend `cuda`."""
     if backends.select_backend() != "cuda":
-        return HostDescent()
+        return Descent()
     from dav_gswt.reconstruction.fitting.device_descent import DeviceDescent  # deferred: it needs gsplat
 
     return DeviceDescent(cast(Any, task.raster))
@@ -120,12 +120,12 @@ def _advance(run: TrainingState, task: TrainingTask, descent: Descent) -> None:
     descent.descend(run, task, run.turn.pop())
     run.step += 1
     if run.step % PROJECT_EVERY == 0 or run.step == task.plan.steps:
-        with on_host(descent, run, ("values",)):
+        with descent.on_host(run, ("values",)):
             task.constraints.project_parameters(run.state.values)
     descent.perturb(run, task)
     grows, prunes = task.schedule.to_growth(run.step) == 0, task.schedule.prunes(run.step)
     if grows or prunes:
-        with on_host(descent, run):
+        with descent.on_host(run):
             if grows:
                 _grow(run, task)
             if prunes:
@@ -137,7 +137,7 @@ def _raise_sh_degree(run: TrainingState, task: TrainingTask, descent: Descent) -
     """The spherical harmonics come one degree after the other, in the first half."""
     due = int(task.plan.sh_degree * min(1.0, 2 * run.step / max(1, task.plan.steps)))
     if due > run.state.sh_degree:
-        with on_host(descent, run):
+        with descent.on_host(run):
             run.state.resize_sh(due)
 
 

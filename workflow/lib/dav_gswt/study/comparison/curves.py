@@ -8,6 +8,7 @@ from pathlib import Path
 
 from dav_gswt.files import read_json
 from dav_gswt.study import csv_tables
+from dav_gswt.views import stopping
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")
 MEASURES = ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")
