@@ -1,6 +1,6 @@
 """Inputs of single policies beside the scores: the information gain, and true pictures of candidates for oracles.
 
-True pictures exist for synthetic scenes and for photo sets, where no capture is needed.
+True pictures exist for synthetic scenes and for photo sets, without a capture.
 """
 
 from collections.abc import Iterator
@@ -14,11 +14,8 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import select_farthest_poses
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
-from dav_gswt.logs import progress
-from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.training_views import WHOLE, TrainingView, read_training_views
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.reconstruction import ground, regression_guard
@@ -27,9 +24,7 @@ from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.coverage import ERROR_WIDTH, DirectionalCoverage, GroundCells, measure_cell_errors
 from dav_gswt.views.policies import NEEDS_FIELD, NEEDS_PHOTOS, ORACLES, PRIOR_POLICIES, InformationGain
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.scoring import WIDTH, scoring_camera
-
-FINE = 4  # supersampling: photos are clipped and encoded before they are shrunk, so rendering at WIDTH is too bright
+from dav_gswt.views.scoring import scoring_camera
 
 Files = dict  # of the rule's inputs: a path, or for `captures` and `fits` a list of paths
 
@@ -79,36 +74,17 @@ def _read_photos(split: ViewSplit, files: Files) -> list[TrainingView]:
 def _read_truth(candidates: Candidates, files: Files, agent: str) -> list[TrainingView]:
     """The true pictures of candidates, where they are known."""
     if agent == "replay":
-        return list(render_truth({"agent": agent}, candidates, files["images"]))
+        return list(read_replayed(candidates, files["images"]))
     found = read_truth(candidates, files["truth"])[1]
     if not found:
         raise InputError(f"{files['truth']}: shows no candidate that is left; make it again with more of them")
     return found
 
 
-def render_truth(scene: dict, candidates: Candidates, images_folder: Path | str) -> Iterator[TrainingView]:
-    """Yield the photo of each candidate at the scoring size, named by its pose; weight 0 where it is masked.
-
-    scene: its entry in the config. Agent `render`: the photo is rendered, at most FINE times as wide, then shrunk.
-    Agent `replay`: the photo is read from `images_folder`.
-    Raises: InputError: another agent, or a missing photo.
-    """
-    if scene["agent"] == "render":
-        world = synthetic.scene_from_config(scene)
-        for pose, camera in progress(candidates, "render candidates"):
-            yield _shrink_view(pose.name, camera, synthetic.render(world, _render_camera(camera)))
-    elif scene["agent"] == "replay":
-        for pose, camera in candidates:
-            yield _shrink_view(pose.name, camera, *image_files.read_photo_and_alpha(Path(images_folder) / pose.name))
-    else:
-        agent = scene["agent"]
-        raise InputError(f"agent {agent}: true pictures of candidates exist for the agents render and replay only")
-
-
-def write_truth(folder: Path | str, views: Iterator[TrainingView]) -> None:
-    """Write pictures of candidates as PNGs named by their poses."""
-    for view in views:
-        image_files.write_png(Path(folder) / f"{view.name}.png", view.image)
+def read_replayed(candidates: Candidates, folder: Path | str) -> Iterator[TrainingView]:
+    """Yield the photo of each candidate of a replayed scene at the scoring size; weight 0 where it is masked."""
+    for pose, camera in candidates:
+        yield shrink_view(pose.name, camera, *image_files.read_photo_and_alpha(Path(folder) / pose.name))
 
 
 def read_truth(candidates: Candidates, folder: Path | str) -> tuple[Candidates, list[TrainingView]]:
@@ -126,20 +102,10 @@ def read_truth(candidates: Candidates, folder: Path | str) -> tuple[Candidates, 
     return some, found
 
 
-def spread_candidates(candidates: Candidates, count: int) -> Candidates:
-    """Choose `count` candidates, or all, by farthest point sampling from the first one."""
-    return [candidates[i] for i in select_farthest_poses([pose for pose, _ in candidates], count)]
-
-
-def _render_camera(camera: Camera) -> Camera:
-    """The candidate's camera, with its width clipped to [WIDTH, FINE WIDTH]."""
-    across = min(max(camera.width, WIDTH), FINE * WIDTH)
-    return camera.resized(across, max(1, round(across * camera.height / camera.width)))
-
-
-def _shrink_view(
+def shrink_view(
     name: str, camera: Camera, image: Float32[Array, "h w 3"], cover: Float32[Array, "h w"] | None = None
 ) -> TrainingView:
+    """A true picture at the scoring size, named by its pose. cover: 0 where it is masked."""
     camera = scoring_camera(camera)
     size = camera.width, camera.height
     weight = (

@@ -15,7 +15,7 @@ from dav_gswt.photos.training_views import TrainingView, read_training_views
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground, read_ground
-from dav_gswt.study.calibration import controls, measures
+from dav_gswt.study.calibration import controls, measures, true_pictures
 from dav_gswt.views import policy_inputs
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.pose_maps import PoseMaps
@@ -85,14 +85,14 @@ def choose_candidates(
 ) -> tuple[Candidates, list[TrainingView]]:
     """Choose candidates, spread over the scored ones. Returns them and their true pictures.
 
-    given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `policy_inputs.write_truth`).
+    given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `true_pictures.write_truth`).
     """
     names = set(scored.names)
     known = [(pose, camera) for pose, camera in candidates if pose.name in names]
     if given.get("truth"):
         return policy_inputs.read_truth(known, given["truth"])
-    some = policy_inputs.spread_candidates(known, count)
-    return some, list(policy_inputs.render_truth(judged.scene, some, given["images"]))
+    some = true_pictures.spread_candidates(known, count)
+    return some, list(true_pictures.render_truth(judged.scene, some, given["images"]))
 
 
 def geometric_baselines(some: list[Pose], taken: list[Pose]) -> dict[str, Float64[Array, "n"]]:

@@ -9,7 +9,7 @@ from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose, pose_offset
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import scene
-from dav_gswt.views import policy_inputs
+from dav_gswt.study.calibration import true_pictures
 from dav_gswt.views.scoring import scoring_camera
 
 SIDE = 48
@@ -39,7 +39,7 @@ def test_what_can_be_rendered_is_drawn_as_a_photo_then_shrunk(monkeypatch, size,
     taken = []
     monkeypatch.setattr(scene, "render", lambda world, camera: taken.append(camera) or noise(camera))
     pool = candidates(*size, count=2)
-    views = list(policy_inputs.render_truth(ENTRY, pool, "nowhere"))
+    views = list(true_pictures.render_truth(ENTRY, pool, "nowhere"))
     assert [(camera.width, camera.height) for camera in taken] == [drawn] * 2
     assert [view.name for view in views] == ["p0.png", "p1.png"]
     for view, camera, (_, whole) in zip(views, taken, pool, strict=True):
@@ -57,7 +57,7 @@ def test_a_replayed_scene_truly_shows_its_frames_without_what_is_masked(tmp_path
     cover = np.ones((camera.height, camera.width), np.float32)
     cover[: camera.height // 2] = 0
     image_files.write_png(tmp_path / pose.name, np.dstack([noise(camera), cover]))
-    (view,) = policy_inputs.render_truth({"agent": "replay"}, pool, tmp_path)
+    (view,) = true_pictures.render_truth({"agent": "replay"}, pool, tmp_path)
     small = scoring_camera(camera)
     assert vars(view.camera).keys() == vars(small).keys() and view.camera.fx == small.fx
     assert view.image.shape == (small.height, small.width, 3) == (*view.weight.shape, 3)
@@ -70,11 +70,11 @@ def test_a_replayed_scene_truly_shows_its_frames_without_what_is_masked(tmp_path
 
 def test_truth_is_not_known_where_photos_must_be_asked_for(tmp_path):
     with pytest.raises(InputError, match="handheld"):
-        list(policy_inputs.render_truth({"agent": "handheld"}, candidates(64, 64), tmp_path))
+        list(true_pictures.render_truth({"agent": "handheld"}, candidates(64, 64), tmp_path))
     with pytest.raises(InputError, match=r"p0\.png"):
-        list(policy_inputs.render_truth({"agent": "replay"}, candidates(128, 96), tmp_path))
+        list(true_pictures.render_truth({"agent": "replay"}, candidates(128, 96), tmp_path))
 
 
 def test_few_candidates_are_spread():
-    chosen = policy_inputs.spread_candidates(candidates(8, 8, count=12), 2)
+    chosen = true_pictures.spread_candidates(candidates(8, 8, count=12), 2)
     assert [pose.name for pose, _ in chosen] == ["p0.png", "p6.png"]
