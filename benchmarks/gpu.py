@@ -11,7 +11,7 @@ import numpy as np
 from raster import Scene, made
 from record import report_figures
 
-from dav_gswt.raster import backends
+from dav_gswt.raster import adam, backends, loss
 
 SCENES = [
     Scene("512_100k", 512, 512, 100_000),
@@ -54,12 +54,12 @@ def time_backend(name: str, scene: Scene) -> list[float]:
 
     def step() -> None:
         for key, values in arrays.items():
-            backend.adam(values, found[key], *moments[key], rate=1e-9, step=1, rows=drawn.visible)
+            adam(values, found[key], *moments[key], rate=1e-9, step=1, rows=drawn.visible, backend=name)
 
     calls = [
         lambda: drawn.forward(**arrays, camera=camera),
         lambda: drawn.backward(gradient),
-        lambda: backend.loss(seen.colour, target),
+        lambda: loss(seen.colour, target, backend=name),
         step,
     ]
     return [milliseconds(call) for call in calls]

@@ -11,7 +11,7 @@ import numpy as np
 from record import merge_figures
 
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.raster import _core, cpu
+from dav_gswt.raster import _core, adam, cpu, loss
 from dav_gswt.threads import default_threads
 
 # Floating-point operations of a pixel and a Gaussian that is blended into it, a fused multiply-add counted as two.
@@ -142,10 +142,11 @@ def training_step() -> dict[str, float]:
 
     def step():
         seen = raster.forward(**arrays, camera=camera)
-        _, by_colour = cpu.loss(seen.colour, target, threads=THREADS)
+        _, by_colour = loss(seen.colour, target, threads=THREADS, backend="cpu")
         gradients = raster.backward(by_colour)
         for name, values in arrays.items():  # a rate so small that all steps see the same scene
-            cpu.adam(values, getattr(gradients, name), *moments[name], rate=1e-9, step=1, threads=THREADS)
+            given = values, getattr(gradients, name), *moments[name]
+            adam(*given, rate=1e-9, step=1, threads=THREADS, backend="cpu")
 
     name, took = "train_step_256x192_30k_ms", milliseconds(step)
     report_figures(name, took, "ms", 15, f"{raster.count_pairs() / (256 * 192):.0f} live Gaussians a pixel")

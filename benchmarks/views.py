@@ -15,10 +15,10 @@ from record import read_installed_lpips, report_figures
 
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.poses import Pose, pose_offset
-from dav_gswt.views.policies import POLICIES, SelectionInput
-from dav_gswt.views.policy_names import NEEDS_FIELD, ORACLES
-from dav_gswt.views.scores import TERMS, Scores
-from dav_gswt.views.uncertainty.weighting import Scales
+from dav_gswt.views.policies import NEEDS_FIELD, ORACLES, POLICIES, SelectionInput
+from dav_gswt.views.scores import Scores
+from dav_gswt.views.terms import TERMS
+from dav_gswt.views.uncertainty import Scales
 
 ROOT = Path(__file__).resolve().parents[1]
 CANDIDATES, PHOTOS, CHOSEN = 1000, 28, 20
@@ -50,7 +50,7 @@ def selection() -> dict[str, float]:
         times = []
         for _ in range(REPEATS):
             start = time.perf_counter()
-            policy(scores, SelectionInput(captured, CHOSEN, np.random.default_rng(0), 0.1))
+            policy.choose(scores, SelectionInput(captured, CHOSEN, np.random.default_rng(0), 0.1))
             times.append(time.perf_counter() - start)
         out[name] = min(times)
     slowest = max(out, key=out.get)

@@ -26,7 +26,6 @@ rule make_levels:
         levels=lambda wildcards: config["levels"],
         preset=preset_keys("make_levels"),
         seed=integer("seed"),
-        keep=SNAPSHOTS,
         source=code_of("make_levels"),
     script:
         "../scripts/make_levels.py"

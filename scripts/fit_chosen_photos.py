@@ -8,7 +8,7 @@ from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
-from dav_gswt.reconstruction import ground, refit, regression_guard
+from dav_gswt.reconstruction import ground, regression_guard, update
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
@@ -16,9 +16,9 @@ with logging_to(snakemake.log[0]):
     aside = regression_guard.list_rejected_photos(map(read_json, paths.fits))
     views = read_training_views(paths.images, paths.model, names, list(paths.captures), size, params.keep)
     photos = [view for view in views if view.name not in aside]
-    files = refit.PhotoFiles(paths.model, paths.images, len(names), params.scene.get("whole", False))
+    files = update.PhotoFiles(paths.model, paths.images, len(names), params.scene.get("whole", False))
     frame, rng = read_scene_frame(paths.frame), np.random.default_rng([params.seed, params.t])
-    fitted = refit.fit_chosen_photos(photos, frame, params.preset, files, rng, params.keep)
+    fitted = update.fit_chosen_photos(photos, frame, params.preset, files, rng)
     write_field(fitted.field, snakemake.output.field)
     ground.write_ground(fitted.grid, snakemake.output.ground)
     write_json(snakemake.output.fit, fitted.report.to_dict())

@@ -20,6 +20,6 @@ with logging_to(snakemake.log[0]):
             exemplars = [(pose_maps.apply_uncertainty(field, maps), grid) for field, grid in exemplars]
     steps = params.preset["level_steps"]
     cropped = [merge.crop_to_blocks(*exemplar, 1) for exemplar in exemplars]
-    sets = [build.build_levels(*each, params.levels, steps, params.seed, params.keep) for each in cropped]
+    sets = [build.build_levels(*each, params.levels, steps, params.seed) for each in cropped]
     asked = {"levels": params.levels, "level_steps": steps, "seed": params.seed}
     store.write_levels(sets, snakemake.output.levels, record_provenance(inputs, asked))

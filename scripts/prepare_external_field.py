@@ -3,10 +3,10 @@
 from dav_gswt.field import read_field, write_field
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
-from dav_gswt.reconstruction import external_field, ground
+from dav_gswt.reconstruction import coarse, ground
 
 with logging_to(snakemake.log[0]):
-    entered, grid = external_field.prepare_external_field(
+    entered, grid = coarse.prepare_external_field(
         read_field(snakemake.input.field),
         read_scene_frame(snakemake.input.frame),
         snakemake.params.preset["max_gaussians"],

@@ -8,7 +8,7 @@ from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import candidates, frozen_scales, pose_maps, prior_sampling, scores, scoring
+from dav_gswt.views import candidates, pose_maps, prior_sampling, scores, scoring
 
 with logging_to(snakemake.log[0]):
     paths, out, params = snakemake.input, snakemake.output, snakemake.params
@@ -19,11 +19,11 @@ with logging_to(snakemake.log[0]):
     remaining = filter_attainable(scene, frame, grid, fitted, remaining)
     taken = read_training_views(paths.images, paths.model, split.start, captures, scoring.PHOTO_WIDTH)
     prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, paths.get("lpips"))
-    first = frozen_scales.read_frozen_scales(paths.frozen) if paths.get("frozen") else None
+    first = scores.read_frozen_scales(paths.frozen) if paths.get("frozen") else None
     scored = scoring.score_poses(fitted, grid, remaining, taken, frame, prior, first)
     scores.write_scores(out.scores, scored.scores)
     pose_maps.write_pose_maps(out.maps, scored.maps, scored.gaussians)
     image_files.write_exr_parts(out.shown, scoring.make_exr_parts(scored, fitted, grid))
     inputs = {name: paths[name] for name in ("field", "ground", "views", "weights", "lpips") if paths.get(name)}
     about = {"prior": params.prior, "p_drop": params.p_drop, "seed": params.seed}
-    frozen_scales.write_frozen_scales(out.facts, scored.frozen, scored.describe(), inputs, about)
+    scores.write_frozen_scales(out.facts, scored.frozen, scored.describe(), inputs, about)

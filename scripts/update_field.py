@@ -1,4 +1,4 @@
-"""Rule update_field: the field of the round before, refitted with this round's photos, or all photos fitted anew."""
+"""Rule update_field: the field of the round before, updated with this round's photos."""
 
 import numpy as np
 
@@ -9,8 +9,7 @@ from dav_gswt.logs import logging_to
 from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
-from dav_gswt.reconstruction import ground, refit, regression_guard
-from dav_gswt.reconstruction.refinement import RefinementInput
+from dav_gswt.reconstruction import ground, regression_guard, update
 
 with logging_to(snakemake.log[0]):
     paths, params, size = snakemake.input, snakemake.params, snakemake.params.preset["size"]
@@ -21,8 +20,8 @@ with logging_to(snakemake.log[0]):
     known, new = [view for view in views[:count] if view.name not in aside], views[count:]
     rng = np.random.default_rng([params.seed, params.t])
     last = read_field(paths.field), ground.read_ground(paths.ground), read_scene_frame(paths.frame)
-    files = refit.PhotoFiles(paths.model, paths.images, len(names), params.scene.get("whole", False))
-    updated = refit.update_field(RefinementInput(*last, known, new), params.preset, files, rng, params.keep)
+    files = update.PhotoFiles(paths.model, paths.images, len(names), params.scene.get("whole", False))
+    updated = update.update_as_preset(update.UpdateInput(*last, known, new), params.preset, files, rng)
     write_field(updated.field, snakemake.output.field)
     ground.write_ground(updated.grid, snakemake.output.ground)
     write_json(snakemake.output.fit, updated.report.to_dict())

@@ -14,10 +14,7 @@ from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import lpips
 from dav_gswt.prior import conditions
 from dav_gswt.views import prior_sampling, uncertainty
-from dav_gswt.views.prior_sampling import PriorConfig
-from dav_gswt.views.uncertainty.staging import TOP
-from dav_gswt_study.prior.training import examples
-from dav_gswt_study.prior.training.worlds import FLYING_HEIGHT, make_world
+from dav_gswt.views.prior_sampling import TOP, PriorConfig
 
 REPEATS = 7
 LATENTS = 1000, 5, 4, 64, 64  # poses, samples, channels, rows, columns
@@ -86,12 +83,12 @@ def pools() -> dict[str, float]:
         pool = [(pose_of_camera(f"pose_{i:04d}", c, made.frame), c) for i, c in enumerate(cameras)]
         start = time.perf_counter()
         told = conditions.build_condition(field, pool, known, FLYING_HEIGHT, model.size)
-        ask = PriorConfig(model, samples, steps, 0.15, seed, given, staged)
+        ask = PriorConfig(model, samples, steps, 0.15, seed, given)
+        prior_sampling.FEW = 0 if staged else count
         everywhere = np.ones((count, model.size, model.size), np.float32)
         terms, _ = prior_sampling.sample_terms(ask, told, [pose.name for pose, _ in pool], everywhere)
-        return time.perf_counter() - start, uncertainty.combine_terms(
-            terms.w2_sq, terms.lpips, 0.1, uncertainty.Scales.from_terms(terms.by_name())
-        )
+        scales = uncertainty.Scales.from_terms({name: terms[name] for name in ("w2_sq", "lpips")})
+        return time.perf_counter() - start, uncertainty.combine_terms(terms["w2_sq"], terms["lpips"], 0.1, scales)
 
     draft, _ = scored(250, staged=True)
     seconds, some = scored(1000, staged=True)

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from record import report_figures
 
-from dav_gswt.reconstruction.fit_settings import CoarseSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt_study import fit_profile
 
-COPR = CoarseSettings(size=256, spacing=1.5, max_gaussians=350_000, steps=1000)
-HIGH = CoarseSettings(size=384, spacing=1.25, max_gaussians=150_000, steps=400)
+COPR = FitSettings(size=256, spacing=1.5, max_gaussians=350_000, steps=1000)
+HIGH = FitSettings(size=384, spacing=1.25, max_gaussians=150_000, steps=400)
 SCENES = ("desert_high", "meadow_high")
 
 

@@ -21,7 +21,7 @@ from dav_gswt.images import metrics
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground, read_training_view
 from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import CoarseSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions
 from dav_gswt.reconstruction.ground import WHOLE, Ground
 
@@ -75,12 +75,12 @@ def _over_exemplar(views: list[TrainingView], square: Square) -> list[TrainingVi
     return [v for v in seen if v.weight.any()]
 
 
-def profile_fit(photos: PhotoSet, settings: CoarseSettings, seed: int = 0, every: int = 25) -> Trial:
+def profile_fit(photos: PhotoSet, settings: FitSettings, seed: int = 0, every: int = 25) -> Trial:
     """Fit the training photos, looking at the first group of test views every so many steps."""
     watched, measuring = next(iter(photos.tests.values())), 0.0
     start = time.perf_counter()
     curve: list[dict] = []
-    drawn = raster.Rasterizer()
+    drawn = raster.make_rasterizer()
 
     def watch(step: int, state) -> None:
         nonlocal measuring

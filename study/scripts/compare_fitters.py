@@ -5,13 +5,13 @@ from pathlib import Path
 from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import describe_machine, record_provenance
-from dav_gswt.reconstruction.fit_settings import CoarseSettings, select_settings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt_study import fit_profile, markdown, peers
 
 with logging_to(snakemake.log[0]):
     out, asked = snakemake.output, dict(snakemake.params.asked)
     program = peers.find_program(asked["opensplat"])  # before any work
-    settings = select_settings(CoarseSettings, asked)
+    settings = FitSettings.from_preset(asked)
     folder = Path(snakemake.input.frame).parent
     photos = peers.select_photos(fit_profile.read_photo_set(folder, settings.size, asked["margin"]))
     curves = {peers.OURS: fit_profile.profile_fit(photos, settings, every=asked["every"]).curve}

@@ -4,7 +4,7 @@ from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.views import candidates, scores
-from dav_gswt.views.score_colours import candidate_values
+from dav_gswt.views.policies import candidate_values
 from dav_gswt.views.selection import read_pose_selection
 from dav_gswt_study.views import sphere
 

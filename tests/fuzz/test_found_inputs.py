@@ -28,8 +28,7 @@ from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.lenses import read_lenses
 from dav_gswt.photos.training_views import read_captured_views
 from dav_gswt.photos.view_split import read_view_split
-from dav_gswt.views.frozen_scales import read_frozen_scales
-from dav_gswt.views.scores import FIELDS, read_scores
+from dav_gswt.views.scores import list_columns, read_frozen_scales, read_scores
 from dav_gswt.views.selection import read_pose_selection
 
 POSE = Pose("pose_0001", 60.0, 10.0, 4.0)
@@ -41,7 +40,7 @@ SHOT = {"name": "a.png", "asked": asdict(POSE) | {"camera": camera_to_json(CAMER
 SHOT |= {"asked_to_got": 0.0, "taken": None}
 LENS = {"model": "PINHOLE", "width": 8, "height": 6, "params": [9, 9, 4, 3], "pinhole": [9, 9, 4, 3, 8, 6]}
 SELECTION = {"policy": "farthest", "k": 1, "poses": [asdict(POSE)]}
-SCORES = f"{','.join(FIELDS)}\na,{{}},1,1,{{}},,,,,,,{{}},1,,,,,,\n"
+SCORES = f"{','.join(list_columns())}\na,{{}},1,1,{{}},,,,,,,{{}},1,,,,,,\n"
 
 
 def read_found(path: Path):

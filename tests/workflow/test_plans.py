@@ -7,7 +7,7 @@ from importlib.util import find_spec
 import pytest
 from fixtures.runs import TINY, USUAL
 
-from dav_gswt.views.policy_names import ORACLES, POLICY_NAMES, PRIOR_POLICIES, ZERO_SETTINGS
+from dav_gswt.views.policies import ORACLES, POLICY_NAMES, PRIOR_POLICIES, ZERO_SETTINGS
 
 DRAFT = "results/desert/seed0/draft"
 ROUND = DRAFT + "/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"

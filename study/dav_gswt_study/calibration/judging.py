@@ -7,19 +7,23 @@ from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField, read_field
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
+from dav_gswt.images import image_files, metrics
 from dav_gswt.photos.training_views import TrainingView, read_training_views
 from dav_gswt.photos.view_split import ViewSplit
+from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground, read_ground
-from dav_gswt.views import oracle, prior_sampling
+from dav_gswt.views import policy_inputs
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.pose_maps import PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.scoring import PHOTO_WIDTH, build_conditions
+from dav_gswt.views.scoring import PHOTO_WIDTH, build_conditions, ground_mask
+from dav_gswt.views.terms import weighted_mean
 from dav_gswt.views.uncertainty import combine_terms
-from dav_gswt_study.calibration import controls, measures
+from dav_gswt_study.calibration import controls, measures, true_pictures
 
 
 @dataclass(frozen=True)
@@ -66,9 +70,9 @@ def calibrate_scores(
         others = controls.control_maps(prior, condition)
         shown |= others
         # `residual` takes the place of the scores' term: that of samples from other noises, whatever was asked for them
-        terms |= {name: prior_sampling.weighted_mean(m, masks) for name, m in others.items()}
+        terms |= {name: weighted_mean(m, masks) for name, m in others.items()}
     corrected = judged.frame.kind == "photos"  # photos differ in exposure
-    error, error_maps = oracle.measure_errors(judged.field, judged.grid, views, judged.size, corrected)
+    error, error_maps = measure_errors(judged.field, judged.grid, views, judged.size, corrected)
     table = [
         {"pose": pose.name, "error": error[i]} | {name: values[i] for name, values in terms.items()}
         for i, (pose, _) in enumerate(some)
@@ -81,14 +85,14 @@ def choose_candidates(
 ) -> tuple[Candidates, list[TrainingView]]:
     """Choose candidates, spread over the scored ones. Returns them and their true pictures.
 
-    given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `oracle.write_truth`).
+    given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `true_pictures.write_truth`).
     """
     names = set(scored.names)
     known = [(pose, camera) for pose, camera in candidates if pose.name in names]
     if given.get("truth"):
-        return oracle.read_truth(known, given["truth"])
-    some = oracle.spread_candidates(known, count)
-    return some, list(oracle.render_truth(judged.scene, some, given["images"]))
+        return policy_inputs.read_truth(known, given["truth"])
+    some = true_pictures.spread_candidates(known, count)
+    return some, list(true_pictures.render_truth(judged.scene, some, given["images"]))
 
 
 def geometric_baselines(some: list[Pose], taken: list[Pose]) -> dict[str, Float64[Array, "n"]]:
@@ -109,3 +113,39 @@ def _select_terms(
         u = combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
         terms, shown = terms | {"u": u[rows]}, shown | {"w2_sq": maps.w2_sq[rows]}
     return terms, shown
+
+
+def measure_errors(
+    field: GaussianField, grid: Ground, views: list[TrainingView], size: int, corrected: bool = False
+) -> tuple[Float64[Array, "n"], list[Float32[Array, "_ _"]]]:
+    """Measure the RMSE between renders and true views, over the pixels that look at the modelled exemplar.
+
+    Args:   size: longer side of the photos that the field was fitted to, pixels. The field is rendered at that size,
+            then shrunk; at a smaller size splats are blurred to a pixel's width.
+            corrected: fit gain and offset of each channel to the view first (photos differ in exposure).
+    Returns: of each view the error (NaN where no pixel counts), and its map: root mean square over the channels, NaN
+            where a pixel does not count.
+    """
+    error, maps = np.full(len(views), np.nan), []
+    for i, view in enumerate(views):
+        weight = view.weight * ground_mask(grid, view.camera)
+        mask = weight > 0
+        squares = np.full(mask.shape, np.nan)
+        if mask.any():
+            picture = _render_at_size(field, view.camera, size)
+            if corrected:
+                picture = np.clip(metrics.correct_colours(picture, view.image, weight), 0, 1)
+            apart = picture[mask].astype(np.float64) - view.image[mask]
+            squares[mask] = (apart**2).mean(-1)
+            error[i] = np.sqrt(squares[mask].mean())
+        maps.append(np.sqrt(squares).astype(np.float32))
+    return error, maps
+
+
+def _render_at_size(field: GaussianField, camera: Camera, size: int) -> Float32[Array, "h w 3"]:
+    """Render the field `size` pixels long, then shrink it to the camera's size."""
+    width, height = camera.width, camera.height
+    share = max(1.0, size / max(width, height))
+    large = camera.resized(round(width * share), round(height * share))
+    seen = np.clip(render(field, large).colour, 0, 1).astype(np.float32)
+    return image_files.shrink_image(seen, width, height)

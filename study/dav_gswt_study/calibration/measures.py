@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Float32, Float64
 from numpy import ndarray as Array
 
 from dav_gswt.images import image_files
-from dav_gswt.views.uncertainty import ause, calibrate_intervals, spearman
+from dav_gswt_study.calibration.agreement import ause, calibrate_intervals, spearman
 
 LEVEL = 0.9  # of the intervals
 LEAST = 8  # poses needed for a result

@@ -9,7 +9,7 @@ from dav_gswt import csv_tables
 from dav_gswt.files import read_json
 from dav_gswt.sweeps import QUALITY as MEASURES
 from dav_gswt.sweeps import describe_origin, read_benchmark, select_metrics, sum_or_none
-from dav_gswt.views import marginal_gain
+from dav_gswt.views import stopping
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")
 EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # predicted before a round: `marginal_gain`
@@ -49,9 +49,8 @@ def _predict_gain(before: list[dict], fits: list[dict], photos: int) -> dict:
     """Predict a round's gain from the rounds before it. before: their rows; fits: their reports."""
     if not before:
         return dict.fromkeys(EXPECTED)
-    found = marginal_gain.predict_gain(
-        marginal_gain.build_history(fits, before[0]["photos"], photos - before[-1]["photos"])
-    )
+    history = stopping.build_history(fits, before[0]["photos"])
+    found = stopping.predict_gain(*history, photos - before[-1]["photos"])
     values = (found.closes, found.gain, found.low, found.high) if found else (None,) * len(EXPECTED)
     return dict(zip(EXPECTED, values, strict=True))
 

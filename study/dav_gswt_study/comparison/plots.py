@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.images import figures
-from dav_gswt.views.policy_names import ORACLES
+from dav_gswt.views.policies import ORACLES
 from dav_gswt_study.comparison.tables import EVERY, EVERYTHING
 
 PANEL = 3.3, 3.4  # inches

@@ -11,7 +11,7 @@ from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.logs import progress
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.tiles import compose, poisson_blending
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import CENTRE, Exemplar
@@ -129,7 +129,7 @@ def _make_targets(
     repair: Repair,
 ) -> list[RefitTarget]:
     """The pictures of all places: their render plus what the repair adds."""
-    rasterizer, renders, near, now = Rasterizer(), [], [], []
+    rasterizer, renders, near, now = make_rasterizer(), [], [], []
     looks = [(place, camera) for place in places for camera in place.cameras]
     for place, camera in looks:
         both = concatenate_fields([field[place.own], place.around])

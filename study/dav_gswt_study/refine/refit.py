@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt import raster
 from dav_gswt.field import SH0, GaussianField, concatenate_fields
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt_study.refine.limits import Bounds
 from dav_gswt_study.refine.viewpoints import SeamView
 
@@ -70,7 +70,7 @@ def _gradient(
 ) -> tuple[float, Float32[Array, "n 7"]]:
     """The root of the loss, and its gradient with respect to the moves."""
     total, gradient = 0.0, np.zeros((len(field), 7), float)
-    rasterizer = Rasterizer()
+    rasterizer = make_rasterizer()
     for one in targets:
         own, k = one.place.own, len(one.place.own)
         seen = rasterizer.forward(

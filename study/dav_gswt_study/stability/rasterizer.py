@@ -6,7 +6,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.raster import Rasterizer, harmonics
+from dav_gswt.raster import harmonics, make_rasterizer
 from dav_gswt_study.stability.formula import FLOAT32, Case, Check
 
 SIDE = 24
@@ -21,7 +21,7 @@ PARAMETERS = ("means", "log_scales", "quats", "opacity_logits", "colours")  # of
 
 def render(arrays: Arrays, camera: Camera, near: float = 0.01, antialiased: bool = False) -> Array:
     """Colour and alpha."""
-    seen = Rasterizer(near=near, antialiased=antialiased).forward(**arrays, camera=camera)
+    seen = make_rasterizer(near=near, antialiased=antialiased).forward(**arrays, camera=camera)
     return np.concatenate([seen.colour, seen.alpha[..., None]], -1)
 
 
@@ -129,7 +129,8 @@ def _white_cases() -> list[Case]:
 
 def _render_over_white(arrays: Arrays, camera: Camera) -> Array:
     """White Gaussians over white: absorbed plus transmitted light."""
-    seen = Rasterizer().forward(**{k: np.ascontiguousarray(v, np.float32) for k, v in arrays.items()}, camera=camera)
+    given = {k: np.ascontiguousarray(v, np.float32) for k, v in arrays.items()}
+    seen = make_rasterizer().forward(**given, camera=camera)
     return seen.colour + (1 - seen.alpha)[..., None]
 
 
@@ -141,7 +142,7 @@ def _gradient_cases() -> list[Case]:
 
 
 def _gradients(arrays: Arrays, camera: Camera) -> Array:
-    raster = Rasterizer()
+    raster = make_rasterizer()
     raster.forward(**arrays, camera=camera)
     cases = raster.backward(_output_gradient())
     return np.concatenate([_divide_by_norm(getattr(cases, name), arrays, camera, name) for name in arrays])
@@ -180,7 +181,7 @@ def _weight_cases() -> list[Case]:
 
 
 def _sum_weights(arrays: Arrays, camera: Camera) -> Array:
-    raster = Rasterizer()
+    raster = make_rasterizer()
     raster.forward(**arrays, camera=camera)
     return raster.contributions().total
 
@@ -192,8 +193,7 @@ def _sum_weights_reference(arrays: Arrays, camera: Camera) -> Array:
 
     gaussians = (torch.tensor(arrays[name], dtype=torch.float64) for name in PARAMETERS)
     means, log_scales, quats, opacity_logits, colours = gaussians
-    view = oracle.move_camera(camera, None, means)
-    splats = oracle.project(means, log_scales, quats, opacity_logits, colours, camera, view)
+    splats = oracle.project(means, log_scales, quats, opacity_logits, colours, camera)
     x, y = np.meshgrid(np.arange(SIDE) + 0.5, np.arange(SIDE) + 0.5)
     found = np.zeros(len(arrays["means"]))
     found[splats.index] = oracle.weights(splats, torch.from_numpy(np.stack([x.ravel(), y.ravel()], 1))).sum(0)

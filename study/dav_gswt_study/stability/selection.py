@@ -8,7 +8,7 @@ import numpy as np
 from numpy import ndarray as Array
 
 from dav_gswt.views.coverage import compute_gain
-from dav_gswt.views.uncertainty import calibration
+from dav_gswt_study.calibration import agreement as calibration
 from dav_gswt_study.stability.formula import FLOAT32, Case, Check
 
 SIZES = (1e-12, 1e-6, 1e-3, 1.0, 1e3, 1e6)

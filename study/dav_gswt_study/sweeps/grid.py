@@ -6,7 +6,7 @@ Read by the workflow before the first job, so it loads no numerics.
 from itertools import product
 
 from dav_gswt.errors import InputError
-from dav_gswt.views.policy_names import PRIOR_POLICIES, ZERO_SETTINGS
+from dav_gswt.views.policies import PRIOR_POLICIES, ZERO_SETTINGS
 from dav_gswt_study.seams.replicates import split_tiling
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k", "rounds", "tiling", "tau")  # its wildcards

@@ -20,7 +20,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.logs import progress
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import EDGES, TORUS, arrange_torus
 
@@ -81,7 +81,7 @@ def join_tiles(fields: list[GaussianField], torus: Int[Array, "6 6"], side: floa
 def render_averaged(field: GaussianField, camera: Camera, factor: int) -> Float32[Array, "h w 3"]:
     """A picture drawn `factor` times as large and averaged. What shines through is not the field's: divided out."""
     large = camera.resized(factor * camera.width, factor * camera.height)
-    seen = Rasterizer(near=1e-6, antialiased=True).forward(**to_raster_arrays(field), camera=large)
+    seen = make_rasterizer(near=1e-6, antialiased=True).forward(**to_raster_arrays(field), camera=large)
     colour = np.clip(seen.colour / np.maximum(seen.alpha, 0.5)[..., None], 0, 1).astype(np.float32)
     return image_files.shrink_image(colour, camera.width, camera.height)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from dav_gswt.errors import InputError
 from dav_gswt.paths import encode_number
-from dav_gswt.views.policy_names import PRIOR_POLICIES
+from dav_gswt.views.policies import PRIOR_POLICIES
 
 CALLED = {"presets": "preset", "tilings": "tiling", "priors": "prior"}  # how what is chosen calls an entry of a table
 LEFT_OUT = {"levels": "auto"}  # what a key means where an entry has none

@@ -18,7 +18,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import figures
-from dav_gswt.views.score_colours import HIGHEST, candidate_values
+from dav_gswt.views.policies import HIGHEST, candidate_values
 from dav_gswt.views.scores import Scores
 
 WIDE, TALL = 9.0, 4.5  # inches: the figure, a row of its panels

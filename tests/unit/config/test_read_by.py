@@ -5,7 +5,6 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from fixtures.configs import checked_config
 
 from dav_gswt.capture import serial_rig
 from dav_gswt.config.base import EntryKeys, is_read, select_keys
@@ -14,7 +13,7 @@ from dav_gswt.config.scenes import SCENES, PhotoScene, SyntheticScene
 from dav_gswt.config.settings import Preset
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.photos.synthetic import scene as synthetic
-from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings, select_settings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.views import candidates
 
 RIG = {"port": "p", "inbox": "in", "millimetres": 250.0, "limits": dict.fromkeys(("pan", "tilt", "radius"), (0, 1000))}
@@ -54,12 +53,11 @@ def test_keys_follow_from_the_rule_and_the_agent():
     }
 
 
-@pytest.mark.parametrize("rule, settings", [("fit_coarse", CoarseSettings), ("update_field", UpdateSettings)])
-def test_a_fit_is_given_all_keys_of_its_settings(rule, settings):
-    preset = checked_config()["presets"]["draft"]
-    read = {field.name for field in fields(settings) if field.metadata.get("of_preset", True)}
-    given = select_keys(Preset, rule, preset)
-    assert not read & given.withheld and select_settings(settings, given) == select_settings(settings, preset)
+@pytest.mark.parametrize("rule", ["fit_coarse", "update_field", "fit_chosen_photos"])
+def test_a_fit_is_given_all_keys_of_its_settings(rule):
+    preset = {key: 1.0 if key == "spacing" else 2 for key in Preset.model_fields}
+    found = FitSettings.from_preset(select_keys(Preset, rule, preset))
+    assert found == FitSettings.from_preset(preset) and found.sh_degree == 2
 
 
 def test_scores_are_given_all_keys_of_a_rig_s_reach():

@@ -14,7 +14,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos import training_views
 from dav_gswt.photos.training_views import ArrayFile, mask_outside_ground, read_training_view, release_pages
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import CoarseSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 
 FRAME = replace(made.FRAME, kind="photos")  # with exposures and moving things
 
@@ -53,7 +53,7 @@ def test_ground_outside_of_a_rectangle_does_not_count():
 
 
 def test_a_fit_is_the_same_from_files_to_the_bit(filed):
-    settings = CoarseSettings(size=48, spacing=1.0, max_gaussians=2000, steps=6)
+    settings = FitSettings(size=48, spacing=1.0, max_gaussians=2000, steps=6)
     none = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
     fields = [
         fit_coarse_field(StartViews(FRAME, views, *none, 0.15), settings, np.random.default_rng(0)).field

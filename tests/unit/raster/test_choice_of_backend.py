@@ -35,7 +35,7 @@ def test_the_core_is_there():
 @pytest.mark.parametrize("name", [n for n in backends.NAMES if not backends.explain_unavailable(n)])
 def test_the_chosen_backend_renders_and_stands_in_the_provenance(monkeypatch, name):
     monkeypatch.setenv(backends.VARIABLE, name)
-    drawing = raster.Rasterizer(near=0.5, dilation=0.2)
+    drawing = raster.make_rasterizer(near=0.5, dilation=0.2)
     assert isinstance(drawing, raster.Rasterizer) and type(drawing) is backends.load_backend(name).Rasterizer
     assert (drawing.near, drawing.dilation) == (0.5, 0.2)
     assert record_provenance({}, {})["renderer"]["backend"] == name
@@ -45,8 +45,8 @@ def test_loss_and_adam_are_those_of_the_backend_in_use(monkeypatch):
     monkeypatch.setenv(backends.VARIABLE, "torch")
     called, zeros = [], np.zeros((4, 4, 3), np.float32)
     torch = backends.load_backend("torch")
-    monkeypatch.setattr(torch.loss, "compute", lambda *a: called.append("loss") or (0.0, zeros))
-    monkeypatch.setattr(torch.adam, "compute", lambda step: called.append("adam"))
+    monkeypatch.setattr(torch, "compute_loss", lambda *a: called.append("loss") or (0.0, zeros))
+    monkeypatch.setattr(torch, "step_adam", lambda step: called.append("adam"))
     raster.loss(zeros, zeros)
     raster.adam(zeros, zeros, zeros, zeros, rate=0.1, step=1)
     assert called == ["loss", "adam"]
@@ -55,14 +55,14 @@ def test_loss_and_adam_are_those_of_the_backend_in_use(monkeypatch):
 def test_a_backend_that_is_unknown_or_not_here_is_refused_with_what_to_do(monkeypatch):
     monkeypatch.setenv(backends.VARIABLE, "gpu")
     with pytest.raises(InputError, match="DAV_GSWT_BACKEND=gpu: choose from cpu, torch, cuda"):
-        raster.Rasterizer()
+        raster.make_rasterizer()
     with pytest.raises(ValueError, match="no backend 'gpu': choose from cpu, torch"):
         backends.load_backend("gpu")
     if not (why := backends.explain_unavailable("cuda")):
         pytest.skip("here it is")
     monkeypatch.setenv(backends.VARIABLE, "cuda")
     with pytest.raises(InputError) as refused:
-        raster.Rasterizer()
+        raster.make_rasterizer()
     assert str(refused.value) == f"DAV_GSWT_BACKEND=cuda: {why}"
 
 
@@ -83,7 +83,7 @@ def test_without_the_core_torch_draws(monkeypatch):
 @pytest.mark.skipif(not backends.explain_unavailable("cuda"), reason="where gsplat is, torch is asked for a GPU")
 def test_the_library_leaves_the_environment_alone_and_who_has_no_gsplat_does_not_wait_for_torch():
     code = "import os, sys; before = dict(os.environ); from dav_gswt import raster; print(dict(os.environ) == before)"
-    assert said(code + "; raster.Rasterizer(); print('torch' in sys.modules)").split() == ["True", "False"]
+    assert said(code + "; raster.make_rasterizer(); print('torch' in sys.modules)").split() == ["True", "False"]
 
 
 @pytest.mark.parametrize("name", ["cpu", pytest.param("torch", marks=pytest.mark.slow)])

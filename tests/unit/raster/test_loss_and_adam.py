@@ -1,21 +1,24 @@
 """L1 + D-SSIM against a plain float64 twin with autograd's gradient, and Adam against PyTorch's: by the core in every
 instruction set, and by PyTorch's backend."""
 
+from functools import partial
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import torch
 
-from dav_gswt.raster import backends
+from dav_gswt.raster import adam, backends, loss
 
 ISAS = [] if backends.explain_unavailable("cpu") else backends.load_backend("cpu").instruction_sets()
 
 
 @pytest.fixture(params=[*ISAS, "torch"])
 def backend(request, monkeypatch):
-    if request.param == "torch":
-        return backends.load_backend("torch")
-    monkeypatch.setenv("DAV_GSWT_ISA", request.param)
-    return backends.load_backend("cpu")
+    name = "torch" if request.param == "torch" else "cpu"
+    if name == "cpu":
+        monkeypatch.setenv("DAV_GSWT_ISA", request.param)
+    return SimpleNamespace(loss=partial(loss, backend=name), adam=partial(adam, backend=name))
 
 
 # --- the loss

@@ -12,7 +12,7 @@ from dav_gswt.geometry import cameras
 from dav_gswt.geometry.scene_frame import Extent
 from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.reconstruction import external_field, ground, visibility
+from dav_gswt.reconstruction import coarse, discs, ground, photo_colours
 
 FRAME = scene_frame(exemplar=(0.0, 0.0, 8.0), extent=(-2.0, -1.0, 10.0, 9.0))
 
@@ -97,13 +97,13 @@ def test_the_surface_under_a_finished_field_is_found_and_what_lies_beyond_is_cut
         np.zeros(n, np.float32),
         np.ones(n, bool),  # as if it came from a ground layer of ours
     )
-    inside, grid = external_field.prepare_external_field(field, frame, 20_000)
+    inside, grid = coarse.prepare_external_field(field, frame, 20_000)
     assert 0 < len(inside) < n and not inside.ground.any()
     assert inside.means[:, :2].min() >= 0 and inside.means[:, :2].max() <= 4
     x = grid.centres[:, 0].reshape(grid.shape)
     # the topmost of overlapping round Gaussians is seen, up to a standard deviation above the surface
     assert np.abs(grid.heights - (0.3 + 0.1 * x)).max() < 0.06
-    assert grid.spacing == pytest.approx(0.05 / external_field.WIDTH)
+    assert grid.spacing == pytest.approx(0.05 / discs.WIDTH)
 
 
 def around(heights=None):
@@ -125,7 +125,7 @@ def eastings(grid):
 def one(places, *photos, heights=None, values=None, least=1):
     grid = around(heights)
     values = eastings(grid) if values is None else values
-    return visibility.median_behind(grid, values, np.asarray(places, np.float32), list(photos), least)
+    return photo_colours.median_behind(grid, values, np.asarray(places, np.float32), list(photos), least)
 
 
 def test_behind_a_place_is_where_the_ray_through_it_meets_the_ground():

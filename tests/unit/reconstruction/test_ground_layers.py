@@ -11,10 +11,10 @@ from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import discs, top_view, underlay
+from dav_gswt.reconstruction.coarse import estimate_uncertainty
 from dav_gswt.reconstruction.fitting import state
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 from dav_gswt.reconstruction.objects import make_blobs
-from dav_gswt.reconstruction.opacity_uncertainty import estimate_uncertainty
 
 
 def test_a_discs_thin_axis_is_the_surfaces_normal():

@@ -112,15 +112,6 @@ def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
     assert ceiling[inner(grid, 1.4, 1.8)].min() > TALL
 
 
-def test_a_cell_that_says_nothing_takes_the_height_of_its_neighbours_where_steps_cost():
-    costs = np.full((5, 7, 7), 0.5, np.float32)
-    costs[3] = 0.1
-    costs[:, 3, 3] = 0.3
-    costs[1, 3, 3] = 0.29  # a little better elsewhere
-    assert (plane_sweep.aggregate_costs(costs, 0.01, 0.06).argmin(0) == 3).all()
-    np.testing.assert_array_equal(plane_sweep.aggregate_costs(costs, 0.0, 0.0).argmin(0), costs.argmin(0))
-
-
 def test_costs_add_up_over_paths_from_four_sides_by_a_plain_loop():
     costs = np.random.default_rng(0).uniform(0, 1, (4, 3, 5)).astype(np.float32)
     one, more, total = 0.1, 0.25, np.zeros((4, 3, 5))

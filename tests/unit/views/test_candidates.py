@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-import trimesh
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
@@ -197,11 +196,6 @@ def test_the_clearance_follows_from_the_flying_height_where_none_is_given():
     high = [candidate(f"{i}", (0, 0.01, 10)) for i in range(3)]
     low, lower = candidate("low", (0, 0.01, 0.52)), candidate("lower", (0, 0.01, 0.48))
     assert list(feasibility.find_infeasible([*high, low, lower], ground())) == ["lower"]
-
-
-def test_without_embree_the_answers_are_the_same(usual, monkeypatch, caplog):
-    monkeypatch.setattr(trimesh.ray, "has_embree", False)
-    assert verdicts() == usual and "embreex is not installed" in caplog.text
 
 
 def test_what_is_kept_and_how_many_are_not_is_said(caplog):

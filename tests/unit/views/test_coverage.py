@@ -20,12 +20,12 @@ from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import coverage, oracle, policy_inputs
-from dav_gswt.views.greedy import lazy_greedy
+from dav_gswt.views import coverage, policy_inputs
+from dav_gswt.views.policies import lazy_greedy
 from dav_gswt.views.pose_maps import PoseMaps, write_pose_maps
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import scoring_camera
-from dav_gswt.views.uncertainty.weighting import Scales
+from dav_gswt.views.uncertainty import Scales
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,8 @@ def files(tmp_path_factory):
     points = np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
     (tmp_path / "sparse").mkdir()
     write_colmap_model(ColmapModel(tuple(names), tuple(c for _, c in pool()), *points), tmp_path / "sparse")
-    oracle.write_truth(tmp_path / "truth", iter(views[1:]))
+    for view in views[1:]:
+        image_files.write_png(tmp_path / "truth" / f"{view.name}.png", view.image)
     known = np.where(true.means[:, 1] > 1.6, 0.8, 0.2).astype(np.float32)
     cells = coverage.GroundCells(true, patch.grid()).view([scoring_camera(camera) for _, camera in pool()]).pixels
     write_pose_maps(tmp_path / "maps.npz", PoseMaps(names, np.zeros((3, 4, 4), np.float32), None, cells), known)
@@ -191,3 +192,15 @@ def test_a_prior_counts_by_the_gaussians_over_a_cell_and_no_truth_is_refused(cel
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="shows no candidate that is left"):
         build("oracle", files | {"truth": tmp_path / "empty"})
+
+
+def test_a_replayed_photo_counts_at_the_scoring_size_where_it_is_not_masked(tmp_path):
+    ((pose, camera), *_) = pool()
+    large, cover = camera.resized(144, 192), np.ones((192, 144), np.float32)
+    cover[:96] = 0
+    picture = np.random.default_rng(0).uniform(0, 1, (192, 144, 3)).astype(np.float32)
+    image_files.write_png(tmp_path / pose.name, np.dstack([picture, cover]))
+    (view,) = policy_inputs.read_replayed([(pose, large)], tmp_path)
+    assert (view.camera.width, view.camera.height) == (72, 96) and view.camera.fx == scoring_camera(large).fx
+    np.testing.assert_allclose(view.image, image_files.shrink_image(picture, 72, 96), atol=0.5 / 255)
+    assert (view.weight[:47] == 0).all() and (view.weight[49:] == 1).all()

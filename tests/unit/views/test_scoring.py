@@ -13,11 +13,12 @@ from dav_gswt.images import image_files
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import DecodedViews
 from dav_gswt.reconstruction.objects import make_blobs
-from dav_gswt.views import collision, coverage, frozen_scales, pose_maps, scores, scoring
-from dav_gswt.views.frozen_scales import FrozenScales
+from dav_gswt.views import coverage, feasibility, pose_maps, scores, scoring
 from dav_gswt.views.prior_sampling import PriorConfig
+from dav_gswt.views.scores import FrozenScales
+from dav_gswt.views.scoring import backproject_maps
+from dav_gswt.views.terms import TERMS
 from dav_gswt.views.uncertainty import Quantiles, Scales
-from dav_gswt.views.uncertainty.backprojection import backproject_maps
 
 MIDDLE = [1.6, 1.6, 0.0]
 
@@ -72,7 +73,7 @@ def test_w2_is_the_disagreement_of_the_samples_and_the_residual_how_far_their_me
     assert "lpips" not in dropped.scores.terms
     for found in (still, dropped):  # the mean stays, whatever the samples differ by
         np.testing.assert_allclose(found.scores.terms["residual"][0], 4 * (0.5 * 0.4) ** 2, rtol=0.2)
-    first = FrozenScales(Scales(dict.fromkeys(scores.TERMS, 7.0)), Quantiles(0.0, 1.0))  # of an earlier round
+    first = FrozenScales(Scales(dict.fromkeys(TERMS, 7.0)), Quantiles(0.0, 1.0))  # of an earlier round
     assert scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2), frozen=first).scores.scales == first.scales
 
 
@@ -100,6 +101,10 @@ def test_without_a_prior_only_geometric_terms_are_computed_of_which_coverage_is_
     assert set(found.scores.terms) == {"opacity", "coverage"} and found.maps.w2_sq is None
     assert np.array_equal(found.gaussians, patch.field().uncertainty) and not found.scores.steps.any()
     assert (found.scores.terms["coverage"] > 0).all() and found.frozen.pixels is None
+    masks = [scoring.ground_mask(patch.grid(), scoring.scoring_camera(camera)) for _, camera in pool()]
+    means = [(seen * mask).sum() / mask.sum() for seen, mask in zip(found.maps.opacity, masks, strict=True)]
+    np.testing.assert_allclose(found.scores.terms["opacity"], means, rtol=1e-6)
+    assert all(0 < mask.mean() < 1 for mask in masks)
     taken, wanted = (
         cells.view([scoring.scoring_camera(camera) for camera in seen])
         for seen in ([view.camera for view in patch.photos()], [camera for _, camera in pool()])
@@ -157,11 +162,11 @@ def test_poses_below_the_ground_or_inside_an_object_are_left_out(caplog):
 
     buried, inside = at("buried", 1.6, 1.6, -0.5), at("inside", 1.6, 1.6, 2.0)
     with caplog.at_level("INFO"):
-        left = collision.drop_blocked([buried, *pool(), inside], block, patch.grid())
+        left = feasibility.drop_blocked([buried, *pool(), inside], block, patch.grid())
     assert [pose.name for pose, _ in left] == [pose.name for pose, _ in pool()]
     assert "1 candidate poses are below the ground, 1 inside an object" in caplog.text
     with pytest.raises(InputError, match="pose buried, inside: all are below the ground or inside an object"):
-        collision.drop_blocked([buried, inside], block, patch.grid())
+        feasibility.drop_blocked([buried, inside], block, patch.grid())
 
 
 def test_maps_are_read_as_written_and_stand_in_an_exr_with_their_poses(tmp_path):
@@ -190,9 +195,9 @@ def test_maps_are_read_as_written_and_stand_in_an_exr_with_their_poses(tmp_path)
 
 def test_frozen_scales_are_read_as_written_and_other_files_are_refused(tmp_path):
     first = FrozenScales(Scales({"w2_sq": 1 / 3, "coverage": 0.0}), Quantiles(0.1, 2 / 3))
-    frozen_scales.write_frozen_scales(tmp_path / "scores.json", first, {"candidates": 3}, {}, {})
-    assert frozen_scales.read_frozen_scales(tmp_path / "scores.json") == first
+    scores.write_frozen_scales(tmp_path / "scores.json", first, {"candidates": 3}, {}, {})
+    assert scores.read_frozen_scales(tmp_path / "scores.json") == first
     for bad in ("{}", '{"scales": [], "pixels": null}', '{"scales": {"w2_sq": -1}, "pixels": null}'):
         (tmp_path / "scores.json").write_text(bad)
         with pytest.raises(InputError, match="scores.json: does not hold the scales"):
-            frozen_scales.read_frozen_scales(tmp_path / "scores.json")
+            scores.read_frozen_scales(tmp_path / "scores.json")

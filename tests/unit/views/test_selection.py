@@ -9,9 +9,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset, select_farthest_poses
 from dav_gswt.views import policies, scores, selection
-from dav_gswt.views.policies import POLICIES, SelectionInput
-from dav_gswt.views.policy_names import NEEDS_FIELD, POLICY_NAMES, POLICY_SPECS, PolicySpec, resolve_policy
-from dav_gswt.views.score_colours import candidate_values
+from dav_gswt.views.policies import NEEDS_FIELD, POLICIES, SelectionInput, candidate_values, resolve_policy
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty import Scales
 
@@ -92,13 +90,10 @@ def test_all_and_any_policy_with_fewer_candidates_than_k_choose_every_candidate(
 
 
 def test_a_policy_has_a_name_that_can_stand_in_a_path_says_what_it_reads_and_auto_goes_by_the_agent():
-    assert set(POLICIES) == set(POLICY_NAMES)
-    with pytest.raises(ValueError, match="describe the policy"):
-        policies.policy("unknown")
     for name in ("", "W2", "w2_lpips"):
         with pytest.raises(ValueError, match="small letters, digits and -"):
-            PolicySpec(name, "nothing")
-    reads = {spec.name: spec.describe_inputs() for spec in POLICY_SPECS}
+            policies.policy(name, "nothing")(policies.everything)
+    reads = {name: each.describe_inputs() for name, each in POLICIES.items()}
     assert (reads["farthest"], reads["oracle"]) == ("poses", "field, true pictures")
     assert (reads["coverage-error"], reads["w2-lpips"]) == ("field, photos", "prior")
     assert reads["single"] == "prior (not `p_drop`, `lam`)"
@@ -135,7 +130,7 @@ def test_scores_are_read_as_written_to_the_bit_and_what_is_no_table_of_scores_is
     scores.write_scores(tmp_path / "nan.csv", scored(0, 1, opacity=[float("nan"), 0]))
     scores.write_scores(tmp_path / "far.csv", scored(0, float("inf")))
     for name, line in (("short", "p0,1,2"), ("word", "p0,1,2,x" + "," * 11)):
-        (tmp_path / f"{name}.csv").write_text(",".join(scores.FIELDS) + "\n" + line + "\n")
+        (tmp_path / f"{name}.csv").write_text(",".join(scores.list_columns()) + "\n" + line + "\n")
     reasons = {"nan": "the scores of p0 are not finite", "far": "a pose is not finite", "short": "not a table"}
     for name, reason in (reasons | {"word": "could not convert"}).items():
         with pytest.raises(InputError, match=reason):

@@ -13,10 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dav_gswt.files import write_json
-from dav_gswt.views import marginal_gain, stopping
-from dav_gswt.views.marginal_gain import SHARE, SPREAD, FitHistory, RoundGaps, predict_gain
+from dav_gswt.views import stopping
 from dav_gswt.views.selection import PoseSelection, write_pose_selection
-from dav_gswt.views.stopping import StoppingState, decide_poses
+from dav_gswt.views.stopping import SHARE, SPREAD, StoppingState, decide_poses, predict_gain
 
 
 def fit(*unseen, taken=True, level=25.0):
@@ -98,45 +97,45 @@ def test_files_of_a_job(tmp_path):
 
 
 def by_law(c, sizes, each):
-    """Rounds of photos shown c / n dB worse than those that a field of n photos was fitted to."""
-    return [RoundGaps(n, [c / n] * each) for n in sizes]
+    """Photos shown c / n dB worse than the photos that a field of n photos was fitted to, times n."""
+    return [n * (c / n) for n in sizes for _ in range(each)]
 
 
 @pytest.mark.parametrize("sizes", [(8,), (8, 12, 16)])
 def test_the_law_is_found_whatever_the_rounds(sizes):
-    found = predict_gain(FitHistory(by_law(40.0, sizes, 3), 20, 4))
+    found = predict_gain(by_law(40.0, sizes, 3), 20, 4)
     assert found.gain == pytest.approx(SHARE * 40 * (1 / 20 - 1 / 24)) and found.photos == 4
     assert found.closes == pytest.approx(40 * (1 / 20 - 1 / 24))
 
 
 def test_the_interval_is_that_of_the_share_and_of_how_far_photos_differ():
     share = 3.182446 * SPREAD * np.sqrt(1.25)  # Student's t of 3 degrees of freedom, from a table
-    same = predict_gain(FitHistory(by_law(40.0, (8, 12), 4), 16, 4))
+    same = predict_gain(by_law(40.0, (8, 12), 4), 16, 4)
     wide = np.exp(share)
     assert (same.low, same.high) == pytest.approx((same.gain / wide, same.gain * wide), rel=1e-5)
     # n times the gap is 30, 40 and 50: 40 with a standard error of 10 / sqrt(3)
-    found = predict_gain(FitHistory([RoundGaps(10, [3.0, 4.0, 5.0])], 16, 4))
+    found = predict_gain([30.0, 40.0, 50.0], 16, 4)
     wide = np.exp(np.hypot(share, 1.959964 * 10 / 3**0.5 / 40))
     assert found.gain == pytest.approx(same.gain)
     assert (found.low, found.high) == pytest.approx((found.gain / wide, found.gain * wide), rel=1e-5)
 
 
 def test_photos_that_are_shown_as_well_as_the_others_promise_nothing():
-    found = predict_gain(FitHistory([RoundGaps(8, [-0.5, -0.4, -0.6])], 12, 4))
+    found = predict_gain([-4.0, -3.2, -4.8], 12, 4)
     assert (found.gain, found.low, found.high, found.each, found.closes) == (0, 0, 0, 0, 0)
-    unsure = predict_gain(FitHistory([RoundGaps(10, [-3.0, 2.0, 0.7])], 12, 4))  # -1 with a standard error of 14.98
+    unsure = predict_gain([-30.0, 20.0, 7.0], 12, 4)  # -1 with a standard error of 14.98
     assert unsure.gain == unsure.low == 0
     assert unsure.high == pytest.approx(SHARE * (1 / 12 - 1 / 16) * (1.959964 * 14.9778 - 1), rel=1e-4)
 
 
 def test_with_fewer_than_three_photos_that_count_or_nothing_to_come_nothing_is_said():
-    for rounds in ([], [RoundGaps(8, [2.0]), RoundGaps(9, [1.0])], [RoundGaps(8, []), RoundGaps(10, [])]):
-        assert predict_gain(FitHistory(rounds, 12, 4)) is None
-    assert predict_gain(FitHistory([RoundGaps(8, [2.0, 2.1, 1.9])], 12, 0)) is None
+    for gaps in ([], [16.0, 9.0]):
+        assert predict_gain(gaps, 12, 4) is None
+    assert predict_gain([16.0, 16.8, 15.2], 12, 0) is None
 
 
 def test_reports_tell_the_gap_and_what_each_field_was_fitted_to():
     reports = [fit(20.0, 21.0), fit(5.0, taken=False), fit(22.0, None, level=24.0), fit(), fit(20.0, level=None)]
-    told = marginal_gain.build_history(reports, 8, 3)
-    assert told == FitHistory([RoundGaps(8, [5.0, 4.0]), RoundGaps(10, [2.0]), RoundGaps(12, [])], 13, 3)
-    assert predict_gain(told).photos == 3
+    told, fitted = stopping.build_history(reports, 8)
+    assert told == [8 * 5.0, 8 * 4.0, 10 * 2.0] and fitted == 13
+    assert predict_gain(told, fitted, 3).photos == 3

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
 
-from dav_gswt.views.policy_names import POLICY_NAME, PRIOR_POLICIES, ZERO_SETTINGS, resolve_policy
+from dav_gswt.views.policies import POLICY_NAME, PRIOR_POLICIES, ZERO_SETTINGS, resolve_policy
 
 RESULTS = "results"
 # Directories beside the scenes' own; no scene may have such a name.

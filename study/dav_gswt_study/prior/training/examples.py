@@ -16,10 +16,10 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior.conditions import RenderedView, find_nearest, relative_pose, render_view
 from dav_gswt.prior.interface import Condition
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import CoarseSettings
-from dav_gswt.reconstruction.fitting.photo_colours import sample_colours
+from dav_gswt.reconstruction.fitting.plan import FitSettings
+from dav_gswt.reconstruction.photo_colours import sample_colours
 from dav_gswt_study.prior.training.example_files import SIZE, Examples, concatenate, empty_examples
 from dav_gswt_study.prior.training.worlds import FLYING_HEIGHT, World, make_world
 
@@ -110,7 +110,7 @@ def simulate_points(
     each = int(np.exp(rng.uniform(least, most))) // len(photos) + 1
     points, colours = [], []
     for view in photos:
-        render = Rasterizer().forward(**to_raster_arrays(world.field), camera=view.camera)
+        render = make_rasterizer().forward(**to_raster_arrays(world.field), camera=view.camera)
         rows, columns = rng.integers(0, render.alpha.shape, (each, 2)).T
         solid = render.alpha[rows, columns] > 0.9
         rows, columns = rows[solid], columns[solid]
@@ -127,7 +127,7 @@ def simulate_points(
 def fit_field(world: World, photos: list[TrainingView], rng: np.random.Generator) -> GaussianField:
     """The coarse fit of the reconstruction, small and short; in some worlds of more or less ground than usual."""
     steps = int(rng.integers(*STEPS, endpoint=True))
-    settings = CoarseSettings(size=photos[0].camera.width, spacing=1.25, max_gaussians=MOST_GAUSSIANS, steps=steps)
+    settings = FitSettings(size=photos[0].camera.width, spacing=1.25, max_gaussians=MOST_GAUSSIANS, steps=steps)
     frame = world.frame
     if rng.uniform() < OTHER_EXTENT:
         share = rng.uniform(*EXTENTS) / 1.25

@@ -2,16 +2,12 @@
 
 import numpy as np
 import pytest
-from fixtures import ground as made
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.fitting import densification, state
-from dav_gswt.reconstruction.fitting.constraints import FLAT, NEEDLE, clip_sizes
-from dav_gswt.reconstruction.fitting.plan import MAX_GAUSSIANS, FitPlan
-from dav_gswt.reconstruction.fitting.residual import Residual
-from dav_gswt.reconstruction.fitting.schedule import EVENTS, FINAL_RATE, GROWTH, GROWTH_END, PRUNE_AT, VISIBLE, Schedule
+from dav_gswt.reconstruction.fitting.plan import EVENTS, FINAL_RATE, GROWTH_END, PRUNE_AT, FitPlan, Schedule
+from dav_gswt.reconstruction.ground_constraints import FLAT, NEEDLE, clip_sizes
 from dav_gswt.reconstruction.objects import make_blobs
 
 
@@ -75,32 +71,6 @@ def test_only_the_nearly_transparent_are_shaken_and_steps_along_a_gaussians_axes
     np.testing.assert_allclose(step, [[0, 0.2, 0]], atol=1e-6)
 
 
-def noted(shares):
-    """What a residual says after pictures that are wrong by .1 in this share of their columns."""
-    residual, drawn = Residual(), Rasterizer()
-    for view, share in zip(made.photos(len(shares)), shares, strict=True):
-        drawn.forward(**to_raster_arrays(made.field()), camera=view.camera)
-        weight = np.zeros_like(view.weight)
-        weight[:, : round(share * weight.shape[1])] = 1
-        residual.add(drawn, np.full_like(view.image, 0.1), weight)
-    return residual
-
-
-def test_errors_of_all_photos_add_up_and_count_once_for_each_gaussian():
-    once, twice = noted([1.0]), noted([1.0, 1.0])
-    assert once.error_per_photo == pytest.approx(once.errors.sum(), rel=1e-5)
-    assert twice.errors.sum() > 1.8 * once.errors.sum()
-    assert twice.error_per_photo == pytest.approx(once.error_per_photo, rel=0.1)
-    assert twice.photos.max() == 2
-
-
-def test_pixels_that_do_not_count_say_nothing():
-    assert noted([0.0]).error_per_photo == Residual().error_per_photo == 0 and len(Residual().errors) == 0
-    half, whole = noted([0.5]), noted([1.0])
-    assert 0 < half.errors.sum() < whole.errors.sum()
-    assert (half.photos <= whole.photos).all()
-
-
 LEAST, MOST = 0.01, 10.0
 
 
@@ -129,13 +99,13 @@ def test_a_needle_becomes_as_thick_as_is_allowed():
     clip_sizes(np.zeros((0, 3), np.float32), LEAST, MOST)
 
 
-def grown(plan, start, error=0.0):
+def grown(plan, start):
     """Steps at which a fit grows, and how many Gaussians it ends with."""
     schedule, now, at = Schedule(plan, start), start, []
     for step in range(1, plan.steps + 1):
         if schedule.to_growth(step) == 0:
             at.append(step)
-            now = schedule.max_gaussians(step, now, error)
+            now = schedule.max_gaussians(step, now)
     return at, now
 
 
@@ -171,14 +141,3 @@ def test_rates_begin_where_the_plan_says_and_fall_to_what_is_left_of_them(first)
     assert rates[0] == first and rates[-1] == pytest.approx(FINAL_RATE) and (np.diff(rates) < 0).all()
     assert rates[40] == pytest.approx((first * FINAL_RATE) ** 0.5)
     assert Schedule(FitPlan(0, 1), 1).rate(0) == 1
-
-
-def test_without_a_number_visible_errors_say_how_many_and_growth_is_bounded():
-    schedule, asked = Schedule(FitPlan(100, "auto"), 1000), 5000 * 1.01 * VISIBLE**2
-    assert schedule.max_gaussians(7, 4900, asked) == 5050
-    assert schedule.max_gaussians(7, 1000, asked) == 1000 * (1 + GROWTH)  # the first of ten
-    assert schedule.max_gaussians(70, 1000, asked) == 1000 * (1 + GROWTH / EVENTS)  # the last
-    assert schedule.max_gaussians(7, 6000, asked) == 6000  # none is taken away
-    assert schedule.max_gaussians(7, 1000, 0.0) == 1000
-    assert schedule.max_gaussians(7, MAX_GAUSSIANS - 10, 1e9) == MAX_GAUSSIANS
-    assert Schedule(FitPlan(100, "auto", limit=1200), 1000).max_gaussians(7, 1000, asked) == 1200

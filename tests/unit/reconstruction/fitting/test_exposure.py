@@ -7,7 +7,7 @@ from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.fitting import exposure
-from dav_gswt.reconstruction.fitting.photo_colours import median_colours
+from dav_gswt.reconstruction.photo_colours import median_colours
 
 FRAME = scene_frame(exemplar=(0.0, 0.0, 4.0), extent=(0.0, 0.0, 4.0, 4.0))
 
@@ -98,7 +98,8 @@ def test_the_level_of_the_typical_photo_is_taken_out():
     np.testing.assert_array_equal(tracker.gain_and_offset(2), (np.ones(3), np.zeros(3)))
     for turn in range(20):
         for index, gain in enumerate([0.9, 1.0, 1.1]):  # of a field that is too dark
-            tracker.update(index, picture, photo(gain * (picture / 0.95 + 0.02)))
+            image = gain * (picture / 0.95 + 0.02)
+            tracker.learn(index, picture, exposure.sample_photo(image, np.ones((40, 40), np.float32)))
         if turn == 0:  # a quarter of the way, or colours would swing where there are many photos
             np.testing.assert_allclose(tracker.gains[2], 1 + 0.25 * (1.1 / 0.95 - 1), atol=0.003)
             np.testing.assert_allclose(tracker.offsets[2], 0.25 * 1.1 * 0.02, atol=0.002)

@@ -20,7 +20,7 @@ from dav_gswt.config.settings import (
     TerrainPriorSettings,
     Tiling,
 )
-from dav_gswt.views.policy_names import POLICY_NAMES
+from dav_gswt.views.policies import POLICY_NAMES
 
 if TYPE_CHECKING:
     Policy = str  # the names are known at run time only

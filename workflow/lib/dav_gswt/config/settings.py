@@ -141,7 +141,7 @@ FITTING = ("fit_coarse", "evaluate_coarse", "update_field", "fit_chosen_photos",
 
 
 class Preset(ConfigModel):
-    """How much a fit may spend. `auto` asks the scene; fit.json says what was chosen and why."""
+    """How much a fit may spend."""
 
     size: PhotoSize = key(
         "longer side of the photos that the fit sees, or `native`: the scene's", unit="pixels", read_by=FITTING
@@ -149,17 +149,17 @@ class Preset(ConfigModel):
     spacing: float = key(
         "of the ground's discs, in sizes of a photo's pixel on the ground", read_by=FITTING, ge=0.5, le=16
     )
-    max_gaussians: Annotated[int, Field(ge=1000, le=8_000_000)] | Auto = key(
-        "most Gaussians in the field", read_by=(*FITTING, "prepare_external_field")
+    max_gaussians: int = key(
+        "most Gaussians in the field", read_by=(*FITTING, "prepare_external_field"), ge=1000, le=8_000_000
     )
-    steps: Annotated[int, Field(ge=1, le=100_000)] | Auto = key(
-        "optimiser steps of the coarse fit, to 8 photos or fewer", read_by=FITTING
-    )
-    steps_per_photo: Annotated[int, Field(ge=1, le=100_000)] | Auto = key(
+    steps: int = key("optimiser steps of the coarse fit, to 8 photos or fewer", read_by=FITTING, ge=1, le=100_000)
+    steps_per_photo: int = key(
         "optimiser steps for each photo more: beyond 8 of the coarse fit, and each new one of a round",
         read_by=FITTING,
+        ge=1,
+        le=100_000,
     )
-    refit: Literal["continue", "scratch"] = key(
+    update: Literal["continue", "scratch"] = key(
         "how a round takes new photos: `continue`: the field is fitted on; `scratch`: all photos are fitted anew. "
         "Not read with `choose_with`",
         "continue",
@@ -170,16 +170,8 @@ class Preset(ConfigModel):
         None,
         read_by=EVALUATING,
     )
-    sh_degree: Annotated[int, Field(ge=0, le=3)] | Auto = key(
-        "of the spherical harmonics of colour; tiles show their constant part", 0, read_by=FITTING
-    )
-    pose_rate: float = key(
-        "first learning rate of the cameras' rotations; 0: they are held",
-        0,
-        unit="radians",
-        read_by=FITTING,
-        ge=0,
-        le=0.01,
+    sh_degree: int = key(
+        "of the spherical harmonics of colour; tiles show their constant part", 0, read_by=FITTING, ge=0, le=3
     )
     level_steps: int = key("optimiser steps for a coarser level", read_by=("make_levels",), ge=1, le=100_000)
 
@@ -190,7 +182,6 @@ INPAINTING = ("inpaint_field",)  # scoring reads all keys of a prior
 class _Prior(ConfigModel):
     samples: int = key("drawn for each pose", read_by=INPAINTING, ge=2, le=100)
     steps: int = key("denoising steps of a sample", read_by=INPAINTING, ge=1, le=1000)
-    staged: bool = key("`true`: all poses with 2 steps, then in full those that may be among the best", True)
 
 
 class TerrainPriorSettings(_Prior):

@@ -6,7 +6,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import underlay
 from dav_gswt.reconstruction.ground import Ground
 
@@ -41,7 +41,7 @@ def select_gaussians(field: GaussianField, grid: Ground, cells: Bool[Array, "row
 
 def render_share(field: GaussianField, marked: Bool[Array, "n"], camera: Camera) -> Float32[Array, "h w"]:
     """The share of marked Gaussians in the blend weight of every pixel; 0 in empty pixels."""
-    render = Rasterizer().forward(**to_raster_arrays(field, marked.astype(np.float32)[:, None]), camera=camera)
+    render = make_rasterizer().forward(**to_raster_arrays(field, marked.astype(np.float32)[:, None]), camera=camera)
     return np.clip(render.colour[..., 0], 0, 1)
 
 

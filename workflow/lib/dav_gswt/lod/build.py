@@ -7,7 +7,6 @@ level one disc hides the next.
 
 import logging
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -39,16 +38,14 @@ CLEARANCE = 2.0  # discs that an object may rise above its highest start
 PIXELS_PER_DISC = 2.0  # of a coarse disc: where a level is used, a disc is about a pixel wide
 
 
-def build_levels(
-    field: GaussianField, grid: Ground, wanted: int | str, steps: int, seed: int, keep: Path | str | None = None
-) -> Levels:
+def build_levels(field: GaussianField, grid: Ground, wanted: int | str, steps: int, seed: int) -> Levels:
     """Fit as many coarser levels as are wanted and as the exemplar has room for.
 
     Coarser levels are merged from each tile's own cells (`tiles.compose`), so a level is fitted only if it has at
     least MIN_CELLS cells across the exemplar. The first is always fitted: it gives every field a ground. With AUTO, a
     level that saves too few Gaussians is dropped.
 
-    Args: wanted: number of levels, or AUTO. steps: of each fit. keep: see `trainer.fit`.
+    Args: wanted: number of levels, or AUTO. steps: of each fit.
     Raises: InputError: a number of levels is wanted, and the mean scale of one does not rise.
     """
     fields, grids = [field], [grid]
@@ -58,7 +55,7 @@ def build_levels(
         if finer_grid.cells % 2 or (number > 1 and finer_grid.cells // 2 < MIN_CELLS):
             stopped = f"level {number} would be {finer_grid.cells / 2:g} cells wide; tiles make it from their own cells"
             break
-        level, coarse = fit_coarser_level(finer, finer_grid, steps, np.random.default_rng([seed, number]), keep)
+        level, coarse = fit_coarser_level(finer, finer_grid, steps, np.random.default_rng([seed, number]))
         rises = mean_scale([level]) > mean_scale([finer])
         if wanted == AUTO and not (rises and len(level) <= MAX_SHARE * len(finer)):
             saved = f"it saves too little ({len(finer)} to {len(level)} Gaussians)"
@@ -73,7 +70,7 @@ def build_levels(
 
 
 def fit_coarser_level(
-    field: GaussianField, grid: Ground, steps: int, rng: np.random.Generator, keep: Path | str | None = None
+    field: GaussianField, grid: Ground, steps: int, rng: np.random.Generator
 ) -> tuple[GaussianField, Ground]:
     """The next level: half the resolution, about a quarter of the Gaussians, fitted for `steps` steps.
 
@@ -87,7 +84,7 @@ def fit_coarser_level(
         top += float((objects.means[:, 2] - coarse.height_at(objects.means)).max())
     constraints = GroundConstraints(coarse, np.full(coarse.shape, top), smoothing=None)
     plan = FitPlan(steps, len(start))
-    options = trainer.FitOptions(f"fit level of {len(start)} Gaussians", keep)
+    options = trainer.FitOptions(f"fit level of {len(start)} Gaussians")
     fit = trainer.fit_field(start, views, plan, constraints, rng, options)
     level = replace(fit.field, uncertainty=start.uncertainty[fit.kept])
     level = underlay.copy_uncertainty(level, coarse)
@@ -105,7 +102,7 @@ def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[Trainin
     more would show another colour than the level before it.
     """
     field = replace(field, sh=field.sh[:, :1])
-    rasterizer, views = raster.Rasterizer(), []
+    rasterizer, views = raster.make_rasterizer(), []
     for number, camera in enumerate(_neighbour_cameras(coarse)):
         fine = camera.resized(2 * camera.width, 2 * camera.height)
         render = rasterizer.forward(**to_raster_arrays(field), camera=fine)

@@ -13,7 +13,7 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior.interface import Condition
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 
 SUPERSAMPLING = 2  # renders are this many times larger and averaged: edges are soft, as in a photo made smaller
 LEAST_ALPHA = 0.05  # a pixel of less opacity has no depth
@@ -67,7 +67,7 @@ def build_condition(
 def render_view(field: GaussianField, camera: Camera, flying_height: float) -> RenderedView:
     """Render the field's part of a Condition. Everything that queries a prior renders fields by this function."""
     large = camera.resized(SUPERSAMPLING * camera.width, SUPERSAMPLING * camera.height)
-    render = Rasterizer().forward(**to_raster_arrays(field), camera=large)
+    render = make_rasterizer().forward(**to_raster_arrays(field), camera=large)
     colour, alpha, depth = (_downsample(a) for a in (render.colour, render.alpha, render.depth))
     solid = alpha > LEAST_ALPHA
     inverse = np.where(solid, flying_height * alpha / np.where(solid, depth, 1), 0)

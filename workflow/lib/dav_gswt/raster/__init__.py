@@ -1,6 +1,7 @@
 """Differentiable rendering of Gaussians: one interface, three backends (`cpu`, `torch`, `cuda`; see `backends`).
 
-`render` renders a field once. A fit keeps a `Rasterizer`, and calls it, `loss` and `adam` at each step.
+`render` renders a field once. A fit keeps a rasterizer (`make_rasterizer`) and calls it, `loss` and `adam`
+at each step.
 """
 
 import numpy as np
@@ -10,11 +11,20 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images.channels import composite
-from dav_gswt.raster import backends
-from dav_gswt.raster.adapter import to_raster_arrays
-from dav_gswt.raster.interface import Adam, Contributions, Gradients, Loss, Rasterizer, Rendering
+from dav_gswt.raster.backends import adam, loss, make_rasterizer
+from dav_gswt.raster.interface import Contributions, Gradients, Rasterizer, Rendering, to_raster_arrays
 
-__all__ = ["Contributions", "Gradients", "Rasterizer", "Rendering", "adam", "loss", "render", "to_raster_arrays"]
+__all__ = [
+    "Contributions",
+    "Gradients",
+    "Rasterizer",
+    "Rendering",
+    "adam",
+    "loss",
+    "make_rasterizer",
+    "render",
+    "to_raster_arrays",
+]
 
 
 def render(
@@ -35,9 +45,7 @@ def render(
     harmonics seen from the camera. backend: by default the one in use. near, dilation, antialiased: see `Rasterizer`.
     Raises: ValueError: an unknown backend, shapes that do not fit, a value that is not finite, with its index.
     """
-    raster = backends.load_backend(backend).Rasterizer(
-        near=near, dilation=dilation, antialiased=antialiased, threads=threads
-    )
+    raster = make_rasterizer(backend, near=near, dilation=dilation, antialiased=antialiased, threads=threads)
     arrays = to_raster_arrays(field, colours)
     seen = raster.forward(**{k: np.ascontiguousarray(a, np.float32) for k, a in arrays.items()}, camera=camera)
     behind, channels = np.asarray(background, np.float32), seen.colour.shape[2]
@@ -45,7 +53,3 @@ def render(
         raise ValueError(f"background must have one value or {channels}, one a channel, not {behind.size}")
     behind = np.broadcast_to(behind, channels)
     return Rendering(composite(seen.colour, seen.alpha, behind), seen.alpha, seen.depth)
-
-
-loss = Loss(lambda *inputs: backends.load_backend().loss.compute(*inputs))
-adam = Adam(lambda step: backends.load_backend().adam.compute(step))

@@ -1,19 +1,18 @@
-"""Selection of the rasterizer's backend: the C++ core, plain PyTorch, or gsplat on a GPU."""
+"""The rasterizer's backends (the C++ core, plain PyTorch, gsplat on a GPU) and what each can do."""
 
 import os
 from functools import cache
 from importlib import import_module, metadata
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, cast
+from typing import Any
 
-from dav_gswt import threads
+import numpy as np
+from jaxtyping import Bool, Float32
+from numpy import ndarray as Array
+
 from dav_gswt.errors import InputError
-from dav_gswt.raster.interface import Backend
-
-if TYPE_CHECKING:
-    from dav_gswt.raster import cpu, cuda, torch
-
-    BACKENDS: tuple[Backend, ...] = cpu, torch, cuda  # each module fits the protocol
+from dav_gswt.raster.interface import AdamStep, Rasterizer, check, count_columns
+from dav_gswt.threads import let_waiting_threads_sleep
 
 NAMES = ("cpu", "torch", "cuda")
 VARIABLE = "DAV_GSWT_BACKEND"
@@ -53,12 +52,75 @@ def select_backend() -> str:
     return next((name for name in ("cuda", "cpu") if not explain_unavailable(name)), "torch")
 
 
-def load_backend(name: str | None = None) -> Backend:
-    """A backend's module, by default that of the one in use. Raises: ValueError: it is unknown or unavailable."""
+def load_backend(name: str | None = None) -> Any:
+    """A backend's module, by default of the one in use. Raises: ValueError: it is unknown or unavailable."""
     if name is not None and (why := explain_unavailable(name)):
         raise ValueError(f"no backend '{name}': {why}")
-    threads.let_waiting_threads_sleep()
-    return cast(Backend, import_module(f"dav_gswt.raster.{name or select_backend()}"))
+    let_waiting_threads_sleep()
+    return import_module(f"dav_gswt.raster.{name or select_backend()}")
+
+
+def make_rasterizer(backend: str | None = None, **options) -> Rasterizer:
+    """A rasterizer of a backend, by default of the one in use. options: of its `Rasterizer`."""
+    return load_backend(backend).Rasterizer(**options)
+
+
+def loss(
+    image: Float32[Array, "h w c"],
+    target: Float32[Array, "h w c"],
+    weight: Float32[Array, "h w"] | None = None,
+    structure: float = 0.2,
+    threads: int | None = None,
+    backend: str | None = None,
+) -> tuple[float, Float32[Array, "h w c"]]:
+    """(1 - structure) L1 + structure (1 - SSIM), and its gradient by the image.
+
+    With weights w in [0, 1] (None: 1) over N = h w c values,
+    loss = 1/N sum of w [(1 - structure) |x - y| + structure (1 - SSIM)].
+    SSIM's local means, variances and covariance are weighted averages, by an 11-tap Gaussian (sigma 1.5) times w,
+    divided by the window's sum of both: pixels of weight 0 and those beyond the border have no influence, and a uniform
+    weight scales loss and gradient. C1 = .01^2, C2 = .03^2, as usual for values in [0, 1].
+    Raises: ValueError: an array's type, shape or layout.
+    """
+    check(image, "image", (*image.shape[:2], count_columns(image)))
+    check(target, "target", image.shape)
+    if weight is not None:
+        check(weight, "weight", image.shape[:2])
+    return load_backend(backend).compute_loss(image, target, weight, structure, threads)
+
+
+def adam(
+    values: Float32[Array, "n ..."],
+    gradient: Float32[Array, "n ..."],
+    first: Float32[Array, "n ..."],
+    second: Float32[Array, "n ..."],
+    rate: float | Float32[Array, "columns"],
+    step: int,
+    betas: tuple[float, float] = (0.9, 0.999),
+    epsilon: float = 1e-15,
+    rows: Bool[Array, "n"] | None = None,
+    threads: int | None = None,
+    backend: str | None = None,
+) -> None:
+    """One step of Adam, in place: `values`, and the moments `first` and `second`, which start as zeros.
+
+    values -= rate m / (sqrt(v) + epsilon) with m = first / (1 - beta1^step), v = second / (1 - beta2^step).
+    rate: one for all, or one a column (values.size / n). step: counts from 1. rows: only these move; the moments of the
+    others stay. Raises: ValueError: an array's type, shape or layout, or a step below 1.
+    """
+    if step < 1:
+        raise ValueError(f"step counts from 1, not {step}")
+    for name, array in (("values", values), ("gradient", gradient), ("first", first), ("second", second)):
+        check(array, name, values.shape)
+        if array is not gradient and not array.flags.writeable:
+            raise ValueError(f"{name} is read-only, but is to be changed in place")
+    if rows is not None:
+        check(rows, "rows", values.shape[:1], np.bool_)
+    rates, columns = np.asarray(rate, np.float32).reshape(-1), values.size // max(1, len(values))
+    if len(rates) not in (1, columns):
+        raise ValueError(f"rate must be one number or {columns}, one a column, not {len(rates)}")
+    given = AdamStep(values, gradient, first, second, rates, step, betas, epsilon, rows, threads)
+    load_backend(backend).step_adam(given)
 
 
 def describe_backend() -> dict[str, str]:

@@ -6,7 +6,6 @@ environment variables DAV_GSWT_ISA and DAV_GSWT_THREADS set the instruction set 
 
 import os
 import weakref
-from itertools import chain
 
 import numpy as np
 from jaxtyping import Bool, Float32
@@ -74,22 +73,14 @@ class Rasterizer(interface.Rasterizer):
         threads = 1 if len(gaussians.means) + size[0] * size[1] < MIN_PARALLEL else self.threads
         view = _pack_camera(camera, self.near, self.dilation), *size[::-1], bool(camera.orthographic), self.antialiased
         if not self._core.forward(*arrays, *view, *vars(rendering).values(), threads):
-            interface.find_invalid(gaussians)
+            gaussians.check_values()
         return rendering, threads
 
     def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
-        g = last.gaussians
-        out = Gradients(
-            self._memory.take("means", g.means.shape),
-            self._memory.take("log_scales", g.log_scales.shape),
-            self._memory.take("quats", g.quats.shape),
-            self._memory.take("opacity_logits", g.opacity_logits.shape),
-            self._memory.take("colours", g.colours.shape),
-            None if g.features is None else self._memory.take("features", g.features.shape),
-            np.empty(6, np.float32),
-        )
-        parts = (vars(part).values() for part in (g, last.rendering, given, out))
-        self._core.backward(*chain.from_iterable(parts), last.state)
+        out = Gradients(**{name: self._memory.take(name, a.shape) for name, a in last.gaussians.by_name().items()})
+        parts = *vars(last.gaussians).values(), *vars(last.rendering).values(), *given.values(), *vars(out).values()
+        by_camera = np.empty(6, np.float32)  # by the camera's motion, which nothing uses
+        self._core.backward(*parts, by_camera, last.state)
         return out
 
     def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
@@ -136,19 +127,21 @@ class _MemoryPool:
         return root.reshape(shape)
 
 
-def _compute_loss(
+def compute_loss(
     image: Float32[Array, "h w c"],
     target: Float32[Array, "h w c"],
     weight: Float32[Array, "h w"] | None,
     structure: float,
     threads: int | None,
 ) -> tuple[float, Float32[Array, "h w c"]]:
+    """See `backends.loss`."""
     gradient = np.empty(image.shape, np.float32)
     threads = 1 if image.size < MIN_PARALLEL else threads or default_threads()
     return _core.loss(default_instruction_set(), image, target, weight, structure, gradient, threads), gradient
 
 
-def _step_adam(s: AdamStep) -> None:
+def step_adam(s: AdamStep) -> None:
+    """See `backends.adam`."""
     threads = 1 if s.values.size < MIN_PARALLEL else s.threads or default_threads()
     arrays = s.values, s.gradient, s.first, s.second, s.rows
     _core.adam(default_instruction_set(), *arrays, s.step, s.rates, *s.betas, s.epsilon, threads)
@@ -165,24 +158,14 @@ def add_colours(
 ) -> None:
     """Add a photo's bilinear colours at points of the world moved up by each height, where it counts.
 
-    sums: of colours, of their squares over the channels, and how many were added, in place.
-    Raises: ValueError: an array's type, shape or layout.
+    sums: of colours, of their squares over the channels, and how many were added, in place. All arrays must be
+    C-contiguous.
     """
-    n, m, size = len(points), len(heights), (camera.height, camera.width)
-    shapes = (m, n, 3), (m, n), (m, n)
-    wanted = {"image": (image, (*size, 3)), "weight": (weight, size), "points": (points, (n, 3))}
-    wanted |= {"heights": (heights, (m,))}
-    wanted |= {f"sums {k}": pair for k, pair in enumerate(zip(sums, shapes, strict=True))}
-    for name, (array, shape) in wanted.items():
-        interface.check(array, name, shape)
+    n, m = len(points), len(heights)
     threads = 1 if m * n < MIN_PARALLEL else threads or default_threads()
     inner = [camera.fx, camera.fy, camera.cx, camera.cy]
     numbers = np.concatenate([np.ravel(camera.rotation), np.ravel(camera.translation), inner]).astype(np.float32)
     _core.add_colours(image, weight, numbers, points, heights, *sums, threads)
-
-
-loss = interface.Loss(_compute_loss)
-adam = interface.Adam(_step_adam)
 
 
 def _pack_camera(camera: Camera, near: float, dilation: float) -> Float32[Array, "21"]:

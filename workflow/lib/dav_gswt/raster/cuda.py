@@ -25,10 +25,11 @@ from torch import Tensor
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import interface, oracle
+from dav_gswt.raster import torch as plain
 from dav_gswt.raster.interface import Contributions, Forward, GaussianArrays, Gradients, PictureGradients, Rendering
-from dav_gswt.raster.torch import adam, compute_loss, join_gradients
+from dav_gswt.raster.torch import join_gradients, step_adam
 
-__all__ = ["Rasterizer", "adam", "loss"]
+__all__ = ["Rasterizer", "compute_loss", "step_adam"]
 
 ALPHA_MAX = 0.999  # gsplat's
 ANY_DEPTH = 1e-37, 3e38  # near and far plane that keep all before the camera: the limits of float32
@@ -39,7 +40,6 @@ class GsplatForward:
     """A forward pass of gsplat: its autograd graph and intermediate results."""
 
     leaves: dict[str, Tensor]
-    view: Float32[Tensor, "4 4"]
     picture: Float32[Tensor, "1 h w c"]
     alpha: Float32[Tensor, "1 h w 1"]
     meta: dict[str, Any]
@@ -67,26 +67,25 @@ class Rasterizer(interface.Rasterizer):
         view[:3, :3] = torch.as_tensor(np.asarray(camera.rotation))
         with torch.enable_grad():
             leaves = {name: tensor.detach().requires_grad_() for name, tensor in given.items()}
-            picture, alpha, meta = self._call_gsplat(leaves, view.requires_grad_(), camera)
-        return GsplatForward(leaves, view, picture, alpha, meta)
+            picture, alpha, meta = self._call_gsplat(leaves, view, camera)
+        return GsplatForward(leaves, picture, alpha, meta)
 
     def differentiate(
         self, last: GsplatForward, by_picture: Float[Tensor, "h w c"], by_alpha: Float[Tensor, "h w"]
     ) -> dict[str, Tensor]:
-        """Gradients by the parameters, by name, and by the camera's motion, from those by gsplat's picture and alpha.
+        """Gradients by the parameters, by name, from the gradients by gsplat's picture and alpha.
 
         by_picture: of the picture's first channels; of the others they are zero.
         """
         missing = last.picture.shape[-1] - by_picture.shape[-1]
         found = torch.autograd.grad(
             (last.picture, last.alpha),
-            (*last.leaves.values(), last.view),
+            tuple(last.leaves.values()),
             (torch.nn.functional.pad(by_picture, (0, missing))[None], by_alpha[None, ..., None]),
             retain_graph=True,
             materialize_grads=True,
         )
-        by_camera = motion_gradient(last.view.detach(), found[-1]).float()
-        return dict(zip(last.leaves, found[:-1], strict=True)) | {"camera": by_camera}
+        return dict(zip(last.leaves, found, strict=True))
 
     def contribute(
         self, last: GsplatForward, maps: Float32[Tensor, "h w c"]
@@ -105,7 +104,7 @@ class Rasterizer(interface.Rasterizer):
     def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Any]:
         given = {name: upload(array, self.device) for name, array in gaussians.by_name().items()}
         if not all(bool(tensor.isfinite().all()) for tensor in given.values()) or _has_zero(given["quats"]):
-            interface.find_invalid(gaussians)
+            gaussians.check_values()
         last = self.draw(given, camera)
         c, picture = gaussians.colours.shape[-1], last.picture.detach()[0]
         images = [picture[..., :c], last.alpha.detach()[0, ..., 0], picture[..., -1]]
@@ -118,8 +117,7 @@ class Rasterizer(interface.Rasterizer):
         c = last.rendering.colour.shape[2]
         by_picture = torch.cat([by_channel[..., :c], by_channel[..., c + 2 :], by_channel[..., c + 1 : c + 2]], 2)
         found = self.differentiate(last.state, by_picture, by_channel[..., c])
-        arrays = {name: download(gradient) for name, gradient in found.items()}
-        return Gradients(features=arrays.pop("features", None), **arrays)
+        return Gradients(**{name: download(gradient) for name, gradient in found.items()})
 
     def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
         return Contributions(*(download(t) for t in self.contribute(last.state, upload(weights, self.device))))
@@ -182,15 +180,6 @@ def _has_zero(quats: Float32[Tensor, "n 4"]) -> bool:
     return len(quats) > 0 and bool((quats.abs().amax(1) < interface.TINY).any())
 
 
-def motion_gradient(view: Float[Tensor, "4 4"], by_view: Float[Tensor, "4 4"]) -> Float[Tensor, "6"]:
-    """dL by the camera's small motion q' = exp([w]x) q + tau from dL by the matrix V of q = V (p, 1).
-
-    A column v of V moves by w x v, the last one by tau too: dL/dw = sum over columns of v x dL/dv.
-    """
-    v, g = (m[:3].double() for m in (view, by_view))
-    return torch.cat([torch.linalg.cross(v.T, g.T).sum(0), g[:, 3]])
-
-
 def list_pairs(
     meta: dict[str, Any], width: int, height: int
 ) -> tuple[Int[Tensor, "m"], Int[Tensor, "m"], Float32[Tensor, "m"]]:
@@ -219,4 +208,4 @@ def list_pairs(
     return gaussians, pixels, (alpha * torch.exp(before - before[first])).float()
 
 
-loss = interface.Loss(partial(compute_loss, torch.device("cuda"), torch.float32))
+compute_loss = partial(plain.compute_loss, device="cuda", dtype=torch.float32)

@@ -1,5 +1,8 @@
 """Spherical harmonics up to degree 3: the colour of a Gaussian that depends on where it is seen from."""
 
+from math import sqrt
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
@@ -22,19 +25,23 @@ def basis(directions: Float[Array, "n 3"], degree: int) -> Float[Array, "n k"]:
     Orthonormal over the sphere.
     """
     x, y, z = np.asarray(directions, float).T
-    xx, yy, zz = x * x, y * y, z * z
-    one, pi = np.ones_like(x), np.pi
-    rows = [np.sqrt(1 / (4 * pi)) * one]
+    return np.stack(list_terms(x, y, z, degree), 1)
+
+
+def list_terms(x: Any, y: Any, z: Any, degree: int) -> list[Any]:
+    """The harmonics of unit directions, of arrays or of tensors."""
+    xx, yy, zz, pi = x * x, y * y, z * z, np.pi
+    rows = [0 * x + sqrt(1 / (4 * pi))]
     if degree >= 1:
-        rows += [np.sqrt(3 / (4 * pi)) * f for f in (-y, z, -x)]
+        rows += [sqrt(3 / (4 * pi)) * f for f in (-y, z, -x)]
     if degree >= 2:
-        a, b = np.sqrt(15 / (4 * pi)), np.sqrt(5 / (16 * pi))
+        a, b = sqrt(15 / (4 * pi)), sqrt(5 / (16 * pi))
         rows += [a * x * y, -a * y * z, b * (3 * zz - 1), -a * x * z, a / 2 * (xx - yy)]
     if degree >= 3:
-        a, b, c, d = (np.sqrt(v / pi) for v in (35 / 32, 105 / 4, 21 / 32, 7 / 16))
+        a, b, c, d = (sqrt(v / pi) for v in (35 / 32, 105 / 4, 21 / 32, 7 / 16))
         rows += [-a * y * (3 * xx - yy), b * x * y * z, -c * y * (5 * zz - 1), d * z * (5 * zz - 3)]
         rows += [-c * x * (5 * zz - 1), b / 2 * z * (xx - yy), -a * x * (xx - 3 * yy)]
-    return np.stack(rows, 1)
+    return rows
 
 
 def seen_colours(sh: Float[Array, "n k 3"], means: Float[Array, "n 3"], camera: Camera) -> Float32[Array, "n 3"]:

@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.raster import harmonics
 
 ALPHA_MIN, ALPHA_MAX, CLEAR_MIN = 1 / 255, 0.99, 1e-4
 MARGIN = 0.15  # of the picture's side: further out the camera is linearised at this rim
@@ -37,34 +38,18 @@ def forward(
     colours: Float[Tensor, "n c"] | Float[Tensor, "n k 3"],
     camera: Camera,
     features: Float[Tensor, "n f"] | None = None,
-    motion: Float[Tensor, "6"] | None = None,
     near: float = 0.01,
     dilation: float = 0.3,
     antialiased: bool = False,
 ) -> tuple[Tensor, ...]:
-    """Colour, alpha, depth, and where features are given theirs, differentiable; `interface.Rasterizer` says what they
-    are. motion: see `move_camera`."""
-    view = move_camera(camera, motion, means)
-    splats = project(means, log_scales, quats, opacity_logits, colours, camera, view, near, dilation, antialiased)
+    """Colour, alpha, depth, and features if there are any, differentiable; see `interface.Rasterizer`."""
+    splats = project(means, log_scales, quats, opacity_logits, colours, camera, near, dilation, antialiased)
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     weight = weights(splats, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1)).to(means))
     size = camera.height, camera.width
     images = (weight @ splats.colours).reshape(*size, -1), weight.sum(1).reshape(size)
     images += ((weight @ splats.depth).reshape(size),)
     return images if features is None else (*images, (weight @ features[splats.index]).reshape(*size, -1))
-
-
-def move_camera(camera: Camera, motion: Float[Tensor, "6"] | None, like: Tensor) -> tuple[Tensor, Tensor]:
-    """Rotation and translation of the camera, after the small motion q' = (1 + [w]x) q + tau, (w, tau) = motion.
-
-    To first order that is exp([w]x) q + tau: gradients at motion 0 are exact.
-    """
-    rotation, translation = (torch.tensor(np.asarray(v)).to(like) for v in (camera.rotation, camera.translation))
-    if motion is None:
-        return rotation, translation
-    w = motion[:3]
-    turned = torch.linalg.cross(w.expand(3, 3), rotation.T).T
-    return rotation + turned, translation + torch.linalg.cross(w, translation) + motion[3:]
 
 
 def project(
@@ -74,13 +59,14 @@ def project(
     opacity_logits: Float[Tensor, "n"],
     colours: Float[Tensor, "n c"] | Float[Tensor, "n k 3"],
     camera: Camera,
-    view: tuple[Tensor, Tensor],
     near: float = 0.01,
     dilation: float = 0.3,
     antialiased: bool = False,
 ) -> Splats:
     """The splats of the Gaussians before the near plane, by depth, those of equal depth by index."""
-    rotation, translation = view
+    view = rotation, translation = tuple(
+        torch.tensor(np.asarray(v)).to(means) for v in (camera.rotation, camera.translation)
+    )
     q = means @ rotation.T + translation
     visible = q[:, 2] > 0 if camera.orthographic else q[:, 2] >= near
     index = torch.nonzero(visible)[:, 0]
@@ -137,15 +123,7 @@ def basis(towards: Float[Tensor, "m 3"], k: int) -> Float[Tensor, "m k"]:
     length = towards.norm(dim=1, keepdim=True)
     up = torch.tensor([0.0, 0.0, 1.0]).to(towards)
     x, y, z = torch.where(length > 0, towards / torch.where(length > 0, length, 1), up).unbind(1)
-    xx, yy, zz, pi = x * x, y * y, z * z, np.pi
-    rows = [torch.full_like(x, (1 / (4 * pi)) ** 0.5)]
-    rows += [(3 / (4 * pi)) ** 0.5 * f for f in (-y, z, -x)]
-    a, b = (15 / (4 * pi)) ** 0.5, (5 / (16 * pi)) ** 0.5
-    rows += [a * x * y, -a * y * z, b * (3 * zz - 1), -a * x * z, a / 2 * (xx - yy)]
-    a, b, c, d = ((v / pi) ** 0.5 for v in (35 / 32, 105 / 4, 21 / 32, 7 / 16))
-    rows += [-a * y * (3 * xx - yy), b * x * y * z, -c * y * (5 * zz - 1), d * z * (5 * zz - 3)]
-    rows += [-c * x * (5 * zz - 1), b / 2 * z * (xx - yy), -a * x * (xx - 3 * yy)]
-    return torch.stack(rows[:k], 1)
+    return torch.stack(harmonics.list_terms(x, y, z, 3)[:k], 1)
 
 
 def projection(q: Float[Tensor, "m 3"], camera: Camera) -> tuple[Float[Tensor, "m 2"], Float[Tensor, "m 2 3"]]:

@@ -7,7 +7,6 @@ of threads.
 """
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import torch
@@ -57,19 +56,20 @@ class Rasterizer(interface.Rasterizer):
     """See `interface.Rasterizer`. The number of threads is PyTorch's own (torch.set_num_threads)."""
 
     def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, BinnedSplats]:
-        interface.find_invalid(gaussians)
+        gaussians.check_values()
         with torch.no_grad():
-            splats, shapes, values = self._project(to_leaves(gaussians), camera, None)
+            splats, shapes, values = self._project(to_leaves(gaussians), camera)
             groups = _group_squares(splats, camera)
             picture = torch.zeros(*_padded_size(camera), values.shape[1])
             for group in groups:
                 _put_squares(
                     picture, group.corners, _blend_weights(shapes[group.rows], group.corners) @ values[group.rows]
                 )
-        images = split_channels(
-            picture[: camera.height, : camera.width], gaussians.colours.shape[-1], gaussians.features is not None
-        )
-        return images, BinnedSplats(groups, splats.index)
+        array = picture[: camera.height, : camera.width].numpy()
+        n = gaussians.colours.shape[-1]
+        parts = [array[..., :n], array[..., n], array[..., n + 1], array[..., n + 2 :]]
+        images = (np.ascontiguousarray(part) for part in parts[: 3 if gaussians.features is None else 4])
+        return Rendering(*images), BinnedSplats(groups, splats.index)
 
     @torch.enable_grad()
     def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
@@ -78,8 +78,7 @@ class Rasterizer(interface.Rasterizer):
         by_picture = torch.zeros(*_padded_size(camera), by_pixel.shape[2])
         by_picture[: camera.height, : camera.width] = by_pixel
         leaves = {name: leaf.requires_grad_() for name, leaf in to_leaves(last.gaussians).items()}
-        motion = torch.zeros(6, dtype=torch.float64, requires_grad=True)
-        _, *tables = self._project(leaves, camera, motion)
+        _, *tables = self._project(leaves, camera)
         by_tables = [torch.zeros_like(table) for table in tables]
         for group in binned.groups:
             shapes, values = (table.detach()[group.rows].requires_grad_() for table in tables)
@@ -87,8 +86,9 @@ class Rasterizer(interface.Rasterizer):
             parts = torch.autograd.grad(blended, (shapes, values), _take_squares(by_picture, group.corners))
             for total, part in zip(by_tables, parts, strict=True):
                 total.index_add_(0, group.rows.flatten(), part.flatten(0, 1))
-        found = torch.autograd.grad(tables, (*leaves.values(), motion), by_tables, materialize_grads=True)
-        return to_gradients(dict(zip((*leaves, "camera"), found, strict=True)))
+        found = torch.autograd.grad(tables, list(leaves.values()), by_tables, materialize_grads=True)
+        arrays = (np.ascontiguousarray(gradient.numpy(), np.float32) for gradient in found)
+        return Gradients(**dict(zip(leaves, arrays, strict=True)))
 
     def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
         camera, binned = last.camera, last.state
@@ -96,7 +96,7 @@ class Rasterizer(interface.Rasterizer):
         maps = torch.zeros(*_padded_size(camera), 1 + weights.shape[2])
         maps[:height, :width] = torch.as_tensor(np.concatenate([np.ones((height, width, 1), np.float32), weights], 2))
         with torch.no_grad():
-            _, shapes, _ = self._project(to_leaves(last.gaussians), camera, None)
+            _, shapes, _ = self._project(to_leaves(last.gaussians), camera)
             sums = torch.zeros(len(shapes), maps.shape[2])
             maximum = torch.zeros(len(shapes))
             for group in binned.groups:
@@ -115,14 +115,13 @@ class Rasterizer(interface.Rasterizer):
             visible[where[group.rows.flatten()].numpy()] = True
         return visible[:-1]
 
-    def _project(self, leaves: dict[str, Tensor], camera: Camera, motion: Float[Tensor, "6"] | None):
+    def _project(self, leaves: dict[str, Tensor], camera: Camera):
         """The splats, and two float32 tables of them that end in an empty row: centre, root and opacity; colours, 1,
         depth and features."""
-        view = oracle.move_camera(camera, motion, leaves["means"])
         features = leaves.get("features")
         given = {name: leaf for name, leaf in leaves.items() if name != "features"}
         splats = oracle.project(
-            **given, camera=camera, view=view, near=self.near, dilation=self.dilation, antialiased=self.antialiased
+            **given, camera=camera, near=self.near, dilation=self.dilation, antialiased=self.antialiased
         )
         root = splats.roots.flatten(1)[:, [0, 1, 3]].clamp(-MAX_ROOT, MAX_ROOT)
         shapes = torch.cat([splats.centres.clamp(-MAX_CENTRE, MAX_CENTRE), root, splats.opacity[:, None]], 1)
@@ -136,34 +135,14 @@ def to_leaves(gaussians: GaussianArrays) -> dict[str, Tensor]:
     return {name: torch.as_tensor(array).double() for name, array in gaussians.by_name().items()}
 
 
-def split_channels(picture: Float[Tensor, "h w c"], colours: int, features: bool) -> Rendering:
-    """Colour, alpha, depth and perhaps features from the channels of one picture, in this order."""
-    array = picture.detach().cpu().numpy()
-    parts = [array[..., :colours], array[..., colours], array[..., colours + 1], array[..., colours + 2 :]]
-    return Rendering(*(np.ascontiguousarray(part) for part in parts[: 4 if features else 3]))
-
-
 def join_gradients(rendering: Rendering, given: PictureGradients) -> Float[Tensor, "h w c"]:
     """The gradients by the images as those by the channels of one picture."""
     parts = []
     for name, image in vars(rendering).items():
         if image is not None:
-            gradient = getattr(given, name)
+            gradient = given[name]
             parts.append((np.zeros_like(image) if gradient is None else gradient).reshape(*image.shape[:2], -1))
     return torch.as_tensor(np.concatenate(parts, 2))
-
-
-def to_gradients(found: dict[str, Tensor]) -> Gradients:
-    arrays = {name: np.ascontiguousarray(g.detach().cpu().numpy(), np.float32) for name, g in found.items()}
-    return Gradients(
-        arrays["means"],
-        arrays["log_scales"],
-        arrays["quats"],
-        arrays["opacity_logits"],
-        arrays["colours"],
-        arrays.get("features"),
-        arrays["camera"],
-    )
 
 
 def _padded_size(camera: Camera) -> tuple[int, int]:
@@ -245,15 +224,15 @@ def _bound_boxes(splats: Splats, camera: Camera) -> tuple[Int[Tensor, "m 2"], In
 
 
 def compute_loss(
-    device: torch.device,
-    dtype: torch.dtype,
     image: Float32[Array, "h w c"],
     target: Float32[Array, "h w c"],
     weight: Float32[Array, "h w"] | None,
     structure: float,
     threads: int | None = None,
+    device: str = "cpu",
+    dtype: torch.dtype = torch.float64,
 ) -> tuple[float, Float32[Array, "h w c"]]:
-    """See `interface.Loss`: on a device. threads: not used."""
+    """See `backends.loss`. threads: not used."""
     weight = np.ones(image.shape[:2], np.float32) if weight is None else weight
     x, y, w = (torch.tensor(a, dtype=dtype, device=device) for a in (image, target, weight))
     value, gradient = differentiate_loss(x, y, w, structure)
@@ -264,7 +243,7 @@ def compute_loss(
 def differentiate_loss(
     image: Float[Tensor, "h w c"], target: Float[Tensor, "h w c"], weight: Float[Tensor, "h w"], structure: float
 ) -> tuple[Float[Tensor, ""], Float[Tensor, "h w c"]]:
-    """The loss of `interface.Loss` and its gradient by the image, by autograd."""
+    """The loss of `backends.loss` and its gradient by the image, by autograd."""
     x, y, w = image.detach().requires_grad_(), target, weight[..., None]
     n = _window_sums(w)
     sums = _window_sums(w * torch.cat([x, y, x * x, y * y, x * y], 2)) / torch.where(n > 0, n, 1)
@@ -286,8 +265,8 @@ def _window_sums(values: Float[Tensor, "h w c"]) -> Float[Tensor, "h w c"]:
     return torch.nn.functional.conv2d(planes, taps.reshape(1, 1, 1, 11), padding=(0, 5))[:, 0].permute(1, 2, 0)
 
 
-def _step_adam(s: AdamStep) -> None:
-    """See `interface.Adam`; by NumPy."""
+def step_adam(s: AdamStep) -> None:
+    """See `backends.adam`; by NumPy."""
     which = slice(None) if s.rows is None else np.flatnonzero(s.rows)
     value, g, m, v = (a.reshape(len(a), -1)[which] for a in (s.values, s.gradient, s.first, s.second))
     m = s.betas[0] * m + np.float32(1 - s.betas[0]) * g
@@ -296,7 +275,3 @@ def _step_adam(s: AdamStep) -> None:
     move /= np.sqrt(np.float32(1 / (1 - s.betas[1] ** s.step)) * v) + np.float32(s.epsilon)
     for array, new in ((s.values, value - s.rates * move), (s.first, m), (s.second, v)):
         array.reshape(len(array), -1)[which] = new
-
-
-loss = interface.Loss(partial(compute_loss, torch.device("cpu"), torch.float64))
-adam = interface.Adam(_step_adam)

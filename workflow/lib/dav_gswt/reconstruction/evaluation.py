@@ -44,7 +44,14 @@ def evaluate_field(
 
 
 def _summarize(rows: list[dict]) -> dict:
-    return _average(rows) | {"worst_decile": _average_worst(rows)}
+    """The means of each measure over the rows, and over the worst tenth by that measure."""
+    means, worst = {}, {}
+    for key in MEASURES:
+        values = [row[key] for row in rows]
+        known = bool(values) and None not in values
+        lowest = sorted(values, reverse=key == "lpips")[: ceil(WORST * len(values))] if known else []
+        means[key], worst[key] = (float(np.mean(v)) if known else None for v in (values, lowest))
+    return means | {"worst_decile": worst}
 
 
 def _evaluate_view(field: GaussianField, view: TrainingView, weights: Weights | None) -> dict:
@@ -67,18 +74,3 @@ def _lpips(seen: Float32[Array, "h w 3"], view: TrainingView, weights: Weights) 
     picture = (2 * np.where(counts, seen, view.image) - 1)[None].astype(np.float32)
     photo = (2 * view.image - 1)[None].astype(np.float32)
     return float(lpips.distance(picture, photo, weights)[0] / counts.mean())
-
-
-def _average(rows: list[dict]) -> dict[str, float | None]:
-    columns = {key: [row[key] for row in rows] for key in MEASURES}
-    return {key: None if not c or None in c else float(np.mean(c)) for key, c in columns.items()}
-
-
-def _average_worst(rows: list[dict]) -> dict[str, float | None]:
-    """Means over the worst tenth by each measure."""
-    out = {}
-    for key in MEASURES:
-        values = sorted((row[key] for row in rows if row[key] is not None), reverse=key == "lpips")
-        known = values and len(values) == len(rows)
-        out[key] = float(np.mean(values[: ceil(WORST * len(values))])) if known else None
-    return out

@@ -25,6 +25,7 @@ MARGIN = 0.15  # ground modelled around what tiles are cut from, as a share of t
 FAR = 0.5  # beyond this share of it, ground is modelled for its own sake
 WHOLE = 10.0  # such a margin, where all ground that the photos see is modelled
 STIFFNESS = 0.05  # weight of the bending energy against one point a knot
+LENGTHS, COUNTS = ("west", "south", "spacing"), ("first_row", "first_column", "cells")  # in the header of ground.exr
 
 
 @dataclass(frozen=True)
@@ -105,15 +106,11 @@ def fit_ground(
     of its side, as far as a photo sees any.
     Raises: InputError: the exemplar is too small for one block.
     """
-    west, south, side = frame.exemplar.west, frame.exemplar.south, frame.exemplar.side
-    extent = frame.extent
+    west, south, side, extent = frame.exemplar.west, frame.exemplar.south, frame.exemplar.side, frame.extent
     reach = margin * side
-    around = (
-        max(extent.west, west - reach),
-        max(extent.south, south - reach),
-        min(extent.east, west + side + reach),
-        min(extent.north, south + side + reach),
-    )
+    low = max(extent.west, west - reach), max(extent.south, south - reach)
+    high = min(extent.east, west + side + reach), min(extent.north, south + side + reach)
+    around = *low, *high
     area = (around[2] - around[0]) * (around[3] - around[1])
     spacing = max(spacing, float(np.sqrt(area / max_cells)))
     cells = int(side / spacing) // block * block
@@ -128,16 +125,8 @@ def fit_ground(
     right = max(0, int((around[2] - west - inset) / spacing) - cells)
     above = max(0, int((around[3] - south - inset) / spacing) - cells)
     shape = (below + cells + above, left + cells + right)
-    grid = Ground(
-        west + inset - left * spacing,
-        south + inset - below * spacing,
-        spacing,
-        below,
-        left,
-        cells,
-        np.zeros(shape),
-        np.zeros(shape, bool),
-    )
+    corner = west + inset - left * spacing, south + inset - below * spacing
+    grid = Ground(*corner, spacing, below, left, cells, np.zeros(shape), np.zeros(shape, bool))
     return replace(grid, heights=fit_surface(grid, points))
 
 
@@ -180,13 +169,8 @@ def _bilinear(v, u, ny: int, nx: int):
     i, j = v.astype(int), u.astype(int)
     fv, fu = v - i, u - j
     p = np.arange(len(v))
-    parts = [
-        ((1 - fv) * (1 - fu), i * nx + j),
-        ((1 - fv) * fu, i * nx + j + 1),
-        (fv * (1 - fu), (i + 1) * nx + j),
-        (fv * fu, (i + 1) * nx + j + 1),
-    ]
-    values, knots = np.concatenate([a for a, _ in parts]), np.concatenate([b for _, b in parts])
+    values = np.concatenate([(1 - fv) * (1 - fu), (1 - fv) * fu, fv * (1 - fu), fv * fu])
+    knots = np.concatenate([i * nx + j, i * nx + j + 1, (i + 1) * nx + j, (i + 1) * nx + j + 1])
     return coo_matrix((values, (np.tile(p, 4), knots)), shape=(len(v), ny * nx)).tocsr()
 
 
@@ -201,18 +185,10 @@ def _second(n: int):
 
 def write_ground(grid: Ground, path: Path | str) -> None:
     """Write heights and the seen cells as the channels Z and seen of an EXR, the grid's place in its header."""
-    header = {
-        "west": grid.west,
-        "south": grid.south,
-        "spacing": grid.spacing,
-        "first_row": grid.first_row,
-        "first_column": grid.first_column,
-        "cells": grid.cells,
-    }
     image_files.write_exr(
         path,
         {"Z": grid.heights[::-1].astype(np.float32), "seen": grid.seen[::-1].astype(np.float32)},
-        {f"ground_{k}": repr(v) for k, v in header.items()},
+        {f"ground_{k}": repr(getattr(grid, k)) for k in (*LENGTHS, *COUNTS)},
     )
 
 
@@ -223,8 +199,8 @@ def read_ground(path: Path | str) -> Ground:
     """
     channels, header = image_files.read_exr(path)
     try:
-        number = {k: float(header[f"ground_{k}"]) for k in ("west", "south", "spacing")}
-        count = {k: int(header[f"ground_{k}"]) for k in ("first_row", "first_column", "cells")}
+        number = {k: float(header[f"ground_{k}"]) for k in LENGTHS}
+        count = {k: int(header[f"ground_{k}"]) for k in COUNTS}
         heights, seen = channels["Z"][::-1].astype(float), channels["seen"][::-1] > 0.5
     except (KeyError, ValueError) as error:
         raise InputError(f"{path}: not the grid of a ground ({error}); fit the field again") from error

@@ -1,15 +1,15 @@
 """Objects on the ground as Gaussians: the shell that the sweep saw, down to the ground at its rims."""
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from numpy import ndarray as Array
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.reconstruction.fitting.photo_colours import median_colours
 from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.reconstruction.photo_colours import median_colours
 from dav_gswt.reconstruction.plane_sweep import Relief
 
 SIZE = 0.6  # standard deviation of a shell's Gaussian, in cells of the sweep
@@ -46,14 +46,12 @@ def make_isolated_points(
     above = points[:, 2] - grid.height_at(points)
     known = relief.grid.contains(points)
     covered = np.zeros(len(points), bool)
-    covered[known] = _at(relief.grid, maximum_filter(relief.stands, 3), points[known])
+    covered[known] = maximum_filter(relief.stands, 3)[_cell(relief.grid, points[known])]
     raised = (above > MIN_HEIGHT * grid.spacing) & (above < band) & ~covered
     points, colours = points[raised], colours[raised]
-    apart = (
-        np.asarray(cKDTree(points).query(points, k=4)[0])[:, 1:].mean(1)
-        if len(points) > 3
-        else np.full(len(points), np.inf)
-    )
+    apart = np.full(len(points), np.inf)
+    if len(points) > 3:
+        apart = np.asarray(cKDTree(points).query(points, k=4)[0])[:, 1:].mean(1)
     together = apart < MAX_ISOLATION * grid.spacing
     size = np.clip(0.5 * apart[together], 0.5 * grid.spacing, 1.5 * grid.spacing)
     return make_blobs(points[together], colours[together], size, logit=0.0)
@@ -78,12 +76,10 @@ def make_blobs(
 ):
     """Round Gaussians at points."""
     n = len(points)
-    quats = np.zeros((n, 4), np.float32)
-    quats[:, 0] = 1
     return GaussianField(
         points.astype(np.float32),
         np.repeat(np.log(np.maximum(sizes, 1e-12))[:, None], 3, 1).astype(np.float32),
-        quats,
+        np.tile(np.array([1, 0, 0, 0], np.float32), (n, 1)),
         np.full(n, logit, np.float32),
         rgb_to_sh(colours),
         np.zeros(n, np.float32),
@@ -95,7 +91,3 @@ def _cell(grid: Ground, points: Float[Array, "n 3"]) -> tuple[Array, Array]:
     rows, columns = grid.shape
     row = np.clip((points[:, 1] - grid.south) / grid.spacing, 0, rows - 1).astype(int)
     return row, np.clip((points[:, 0] - grid.west) / grid.spacing, 0, columns - 1).astype(int)
-
-
-def _at(grid: Ground, mask: Bool[Array, "rows columns"], points: Float[Array, "n 3"]) -> Bool[Array, "n"]:
-    return mask[_cell(grid, points)]

@@ -3,8 +3,8 @@
 For every cell and height above the surface the photos that see the point are compared: they agree where a surface is.
 This finds trees, shrubs and stones even in photos straight from above, and relief that the sparse points of structure
 from motion miss. Photos also agree by chance on uniform ground; but an object there would hide ground that they agree
-on as well, which rules it out (`visibility`). Costs are summed along rows and columns as in semi-global matching
-(Hirschmueller 2008), so that ground without texture takes the height of its neighbours.
+on as well, which rules it out (`photo_colours.median_behind`). Costs are summed along rows and columns as in
+semi-global matching (Hirschmueller 2008), so that ground without texture takes the height of its neighbours.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
-from scipy.ndimage import gaussian_filter, label, map_coordinates
+from scipy.ndimage import gaussian_filter, label
 
 from dav_gswt.geometry.poses import select_farthest
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.reconstruction import colour_sums, visibility
+from dav_gswt.reconstruction import photo_colours
 from dav_gswt.reconstruction.ground import Ground
 
 MAX_CELLS = 60_000  # of the sweep's own grid
@@ -54,9 +54,7 @@ class Relief:
 
     def onto(self, grid: Ground, values: Float[Array, "rows columns"]) -> Float[Array, "r c"]:
         """Values of the sweep's cells at the cells of another grid over the same ground, bilinear."""
-        x, y = grid.centres[:, 0], grid.centres[:, 1]
-        row, column = (y - self.grid.south) / self.grid.spacing - 0.5, (x - self.grid.west) / self.grid.spacing - 0.5
-        return map_coordinates(values.astype(float), [row, column], order=1, mode="nearest").reshape(grid.shape)
+        return replace(self.grid, heights=values.astype(float)).height_at(grid.centres).reshape(grid.shape)
 
 
 def sweep_heights(grid: Ground, views: list[TrainingView], flying_height: float, pixel: float) -> Relief:
@@ -88,9 +86,7 @@ def leave_out_photos(grid: Ground, views: list[TrainingView]) -> list[TrainingVi
     places = grid.centres[:: max(1, grid.heights.size // SOME_CELLS)].astype(np.float32)
     photos, kept = np.zeros(len(places), int), []
     for k in select_farthest(np.array([view.camera.centre for view in views]), len(views)):
-        camera = views[k].camera
-        q = places @ camera.rotation.T.astype(np.float32) + camera.translation.astype(np.float32)
-        seen = visibility.project_visible(views[k], q)[0]
+        seen = photo_colours.project_visible(views[k], photo_colours.to_camera(places, views[k]))[0]
         views[k].release()
         if (photos[seen] < ENOUGH_PHOTOS).sum() > SPARED * len(seen):
             photos[seen] += 1
@@ -122,18 +118,10 @@ def coarsen_grid(grid: Ground, stride: int) -> Ground:
 
 def pad_grid(grid: Ground, cells: int) -> Ground:
     """The grid with so many more cells on every side, as high as its border."""
-    off, seen = cells * grid.spacing, np.pad(grid.seen, cells)
-    heights = np.pad(grid.heights, cells, mode="edge")
-    row, column = grid.first_row + cells, grid.first_column + cells
-    return replace(
-        grid,
-        west=grid.west - off,
-        south=grid.south - off,
-        first_row=row,
-        first_column=column,
-        heights=heights,
-        seen=seen,
-    )
+    off = cells * grid.spacing
+    block = {"first_row": grid.first_row + cells, "first_column": grid.first_column + cells}
+    maps = {"heights": np.pad(grid.heights, cells, mode="edge"), "seen": np.pad(grid.seen, cells)}
+    return replace(grid, west=grid.west - off, south=grid.south - off, **block, **maps)
 
 
 def measure_disagreement(
@@ -145,7 +133,7 @@ def measure_disagreement(
     A height that far fewer photos see than the surface below it costs UNKNOWN_COST: few photos agree by chance.
     """
     places, levels = grid.centres.astype(np.float32), heights.astype(np.float32)
-    number = colour_sums.sum_colours(views, places, np.zeros(1, np.float32)).count[0]
+    number = photo_colours.sum_colours(views, places, np.zeros(1, np.float32)).count[0]
     least = np.maximum(2, SUPPORT * number)
 
     def average(spread: Float32[Array, "n"], count: Float32[Array, "n"]) -> Array:
@@ -157,7 +145,7 @@ def measure_disagreement(
     costs = []
     with ThreadPoolExecutor(THREADS) as pool:  # SciPy works beside itself; each height is on its own
         for start in range(0, len(levels), AT_ONCE):
-            sums = colour_sums.sum_colours(views, places, levels[start : start + AT_ONCE])
+            sums = photo_colours.sum_colours(views, places, levels[start : start + AT_ONCE])
             costs += pool.map(average, sums.deviations(), sums.count)
     return np.stack(costs).astype(np.float32, copy=False), number.reshape(grid.shape)
 
@@ -182,7 +170,7 @@ def reject_seen_through(
 
     def at(height: float, cost: Float32[Array, "rows columns"]) -> None:
         rows = np.flatnonzero(cost <= MAX_COST * surface)  # elsewhere nothing would stand anyway
-        behind = visibility.median_behind(
+        behind = photo_colours.median_behind(
             around, ground, places[rows] + np.array([0, 0, height], np.float32), views, MIN_PHOTOS
         )
         cost.ravel()[rows[~(cost.ravel()[rows] <= MAX_COST * behind)]] = UNKNOWN_COST

@@ -9,6 +9,7 @@ import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from math import log2
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
 from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.raster import to_raster_arrays
-from dav_gswt.reconstruction.fitting.plan import EarlierViews, FitPlan, FitReport, NewViews, UpdateReport
+from dav_gswt.reconstruction.fitting.plan import FitPlan, FitReport
 from dav_gswt.reconstruction.fitting.trainer import FitResult
 
 _log = logging.getLogger(__name__)
@@ -30,12 +31,38 @@ EQUAL_PSNR = 100.0  # dB that stand for equal pictures
 
 
 @dataclass(frozen=True)
-class GuardedUpdate:
-    """field: of the last fit if it was accepted, else the one from before."""
+class EarlierViews:
+    """How an update changed the PSNR (dB) of the photos before it. psnr_of_fits: after each fit of the update."""
 
-    field: GaussianField
-    accepted: bool
-    report: UpdateReport
+    photos: int
+    psnr_before: float | None
+    psnr_after: float | None
+    psnr_of_fits: list[float | None]
+    bound: float
+
+
+@dataclass(frozen=True)
+class NewViews:
+    """How an update changed the PSNR (dB) of its own photos. taken: whether the field was fitted to them."""
+
+    photos: int
+    taken: bool
+    psnr_before: float | None
+    psnr_after: float | None
+    views: list[dict[str, Any]]  # view, psnr_before, psnr_after
+
+
+@dataclass
+class UpdateReport(FitReport):
+    """What an update did, over all its fits. earlier_views: None without new photos."""
+
+    earlier_views: EarlierViews | None = None
+    new_views: NewViews = NewViews(0, True, None, None, [])
+
+    @property
+    def takes_new_views(self) -> bool:
+        """Whether the field is fitted to the new photos."""
+        return self.new_views.taken
 
 
 def fit_with_guard(
@@ -47,13 +74,15 @@ def fit_with_guard(
     fit: Callable[[GaussianField, FitPlan], FitResult],
     retries: int = RETRIES,
     second_opinion: Callable[[], bool] | None = None,
-) -> GuardedUpdate:
+) -> tuple[GaussianField, UpdateReport]:
     """Fit, and go on fitting, `retries` times at most, while the earlier photos have lost too much.
 
-    second_opinion: asked where they have; whether the new photos are right all the same.
-
-    field: from before the new photos; it is kept if the loss stays above the bound. start: what the fit starts from.
-    fit: to all views. Where no earlier photo has a pixel that counts, nothing can be lost.
+    Args:
+        field: From before the new photos; it is kept if the loss stays above the bound.
+        start: What the fit starts from.
+        fit: A fit to all views. Where no earlier photo has a pixel that counts, nothing can be lost.
+        second_opinion: Called if the earlier photos have lost too much: whether the new photos are right all the same.
+    Returns: The field of the last fit, or the one from before, and the report.
     """
     before, fitted = measure_psnr(field, earlier), fit(start, plan)
     most = allowed_loss(len(earlier), len(new))
@@ -75,31 +104,10 @@ def fit_with_guard(
             most,
         )
     kept = fitted.field if accepted else field
-    done = f"the field of fit {len(fits)}" if accepted else f"the field from before, after {len(fits)} fits"
-    effect = EarlierViews(
-        photos=len(earlier),
-        psnr_before=_mean(before),
-        psnr_after=_mean(reached[-1] if accepted else before),
-        psnr_of_fits=[_mean(each) for each in reached],
-        lost=loss if accepted else 0.0,
-        bound=most,
-        handed_on=done,
-    )
-    report = _join_reports(fits, effect, _report_new_views(new, field, kept, accepted), kept)
-    return GuardedUpdate(kept, accepted, report)
-
-
-def _join_reports(fits: list[FitReport], earlier: EarlierViews, new: NewViews, kept: GaussianField) -> UpdateReport:
-    """The report of an update of several fits, the later ones of which go on from the earlier."""
-    return UpdateReport(
-        steps=sum(each.steps for each in fits),
-        gaussians=len(kept),
-        degree=fits[-1].degree,
-        choices=[choice for each in fits for choice in each.choices],
-        held_out=fits[-1].held_out,
-        earlier_views=earlier,
-        new_views=new,
-    )
+    after = _mean(reached[-1] if accepted else before)
+    effect = EarlierViews(len(earlier), _mean(before), after, [_mean(each) for each in reached], most)
+    steps = sum(each.steps for each in fits)
+    return kept, UpdateReport(steps, len(kept), effect, _report_new_views(new, field, kept, accepted))
 
 
 def allowed_loss(earlier: int, new: int) -> float:
@@ -113,11 +121,6 @@ def mean_loss(before: list[float | None], after: list[float | None]) -> float:
     return float(np.mean([min(b, VISIBLE_PSNR) - min(a, VISIBLE_PSNR) for b, a in known])) if known else 0.0
 
 
-def report_unchanged(field: GaussianField) -> UpdateReport:
-    """The report of a round without new photos."""
-    return UpdateReport(gaussians=len(field), degree=None, new_views=NewViews(0, True, None, None, []))
-
-
 def list_rejected_photos(reports: Iterable[dict]) -> set[str]:
     """Names of the photos that contradicted earlier ones, by their rounds' fit.json."""
     rejected = [report["new_views"]["views"] for report in reports if not report["new_views"]["taken"]]
@@ -126,7 +129,7 @@ def list_rejected_photos(reports: Iterable[dict]) -> set[str]:
 
 def measure_psnr(field: GaussianField, views: list[TrainingView]) -> list[float | None]:
     """PSNR of each photo in dB over the pixels that count, after a gain and offset per channel; None without any."""
-    rasterizer = raster.Rasterizer()
+    rasterizer = raster.make_rasterizer()
     return [_psnr(rasterizer, field, view) if view.weight.any() else None for view in one_by_one(views)]
 
 

@@ -8,7 +8,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.ground import Ground
 
 MIN_ALPHA = 1e-6
@@ -39,7 +39,7 @@ def render_top_view(field: GaussianField, grid: Ground) -> TopView:
     rows, columns = grid.shape
     top = float(field.means[:, 2].max()) + 10 * grid.spacing
     camera = cameras.top_down(grid.west, grid.south, columns, rows, grid.spacing, top)
-    raster = Rasterizer()
+    raster = make_rasterizer()
     seen = raster.forward(**to_raster_arrays(field), camera=camera)
     uncertain = raster.forward(**to_raster_arrays(field, field.uncertainty[:, None]), camera=camera)
     solid = np.maximum(seen.alpha, MIN_ALPHA)

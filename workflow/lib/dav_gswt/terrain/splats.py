@@ -12,7 +12,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.raster import Rasterizer, Rendering, harmonics
+from dav_gswt.raster import Rendering, harmonics, make_rasterizer
 from dav_gswt.terrain.heights import Slope, displaced_axes
 
 DILATION = 0.3  # square pixels, added to variances by the rasterizer
@@ -115,7 +115,7 @@ def blend(splats: Splats, camera: Camera) -> Rendering:
     n = len(splats)
     flat = Camera(np.eye(3), np.zeros(3), 1.0, 1.0, 0.0, 0.0, camera.width, camera.height, True)
     rank = np.arange(n, 0, -1, dtype=np.float32)
-    return Rasterizer(dilation=DILATION).forward(
+    return make_rasterizer(dilation=DILATION).forward(
         np.concatenate([splats.centres, rank[:, None]], 1),
         np.concatenate([splats.log_scales, np.full((n, 1), np.log(THINNEST), np.float32)], 1),
         np.stack([np.cos(splats.angles / 2), *np.zeros((2, n)), np.sin(splats.angles / 2)], 1).astype(np.float32),

@@ -21,7 +21,7 @@ from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import metrics
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import Rasterizer, make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.ground import Ground
 
 CELLS = 28  # along the longer side of the ground that counts
@@ -67,7 +67,7 @@ class GroundCells:
 
     def view(self, cameras: list[Camera]) -> CellViews:
         """Render the field for each camera and count the pixels that show each cell."""
-        raster, arrays, pixels = Rasterizer(), to_raster_arrays(self.field), []
+        raster, arrays, pixels = make_rasterizer(), to_raster_arrays(self.field), []
         for camera in cameras:
             raster.forward(**arrays, camera=camera)
             pixels.append(self.count_pixels(raster))
@@ -91,7 +91,7 @@ def measure_cell_errors(
     The error of a pixel belongs to the Gaussians that make it, by their blend weights. Photos are compared ERROR_WIDTH
     pixels wide. corrected: fit gain and offset of each channel to the photo first (photos differ in exposure).
     """
-    raster, arrays = Rasterizer(), to_raster_arrays(cells.field)
+    raster, arrays = make_rasterizer(), to_raster_arrays(cells.field)
     wrong, pixels = np.zeros((2, len(cells)))
     for view in views:
         seen = np.clip(raster.forward(**arrays, camera=view.camera).colour, 0, 1)

@@ -1,7 +1,8 @@
-"""Feasibility of poses: below or too near the ground, hidden by it, or outside of the scene's limits.
+"""Feasibility of poses: in the ground or an object, too near the ground, hidden, or outside of the scene's limits.
 
-The ground is the whole height field as a mesh; rays decide what is hidden. embree traces in single precision, so all
-coordinates are relative to the exemplar: its middle is the origin, its side the unit.
+The ground is the whole height field as a mesh; rays decide what is hidden. trimesh traces them by embree, or slower by
+rtree where embree has no package. embree has single precision, so all coordinates are relative to the exemplar: its
+middle is the origin, its side the unit.
 """
 
 import logging
@@ -12,13 +13,16 @@ import numpy as np
 import trimesh
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
-from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+from scipy.special import expit
 
 from dav_gswt.errors import InputError
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views.candidates import Candidates
+from dav_gswt.views.uncertainty import format_names
 
 _log = logging.getLogger(__name__)
 
@@ -27,6 +31,7 @@ LATTICE = 9  # test points along a side of the exemplar
 SHARE = 0.5  # of the test points in the picture that must be visible
 CLEARANCE = 0.05  # flying heights: height of objects on the ground
 OFF = 1e-4  # sides of the exemplar: height above the surface at which a ray starts
+SOLID = 0.5  # opacity from which a Gaussian counts as solid
 
 
 @dataclass(frozen=True)
@@ -84,8 +89,6 @@ def find_infeasible(
     centres = np.stack([camera.centre for camera in cameras])
     if clearance is None:
         clearance = CLEARANCE * float(np.median(np.linalg.norm(centres - site.middle, axis=1)))
-    if not trimesh.ray.has_embree:
-        _log.warning("embreex is not installed: rays are marched in steps, which is slower")
     reasons = (
         _find_hidden(site, cameras, centres)
         | _find_outside_limits(site, centres, limits or {})
@@ -150,13 +153,16 @@ def _find_outside_limits(site: _GroundMesh, centres: Float[Array, "n 3"], limits
     """Find cameras outside of the limits."""
     above = centres[:, 2] - site.grid.height_at(centres)
     away = np.linalg.norm(centres - site.middle, axis=1)
-    low, high, far = (
-        limits.get(name, default)
-        for name, default in (("min_height", -np.inf), ("max_height", np.inf), ("max_distance", np.inf))
+    rules = (
+        ("max_distance", away, 1, "too far: {:.3g} from the middle, {:g} is the most"),
+        ("max_height", above, 1, "too high: {:.3g} above the ground, {:g} is the most"),
+        ("min_height", above, -1, "too low: {:.3g} above the ground, {:g} is the least"),
     )
-    reasons = {int(i): f"too low: {above[i]:.3g} above the ground, {low:g} is the least" for i in _indices(above < low)}
-    reasons |= {i: f"too high: {above[i]:.3g} above the ground, {high:g} is the most" for i in _indices(above > high)}
-    return {i: f"too far: {away[i]:.3g} from the middle, {far:g} is the most" for i in _indices(away > far)} | reasons
+    reasons = {}
+    for key, values, sign, text in rules:
+        if key in limits:
+            reasons |= {i: text.format(values[i], limits[key]) for i in _indices(sign * values > sign * limits[key])}
+    return reasons
 
 
 def _indices(mask: Bool[Array, "n"]) -> list[int]:
@@ -196,8 +202,6 @@ def _in_picture(camera: Camera, points: Float[Array, "m 3"]) -> Bool[Array, "m"]
 
 def _cast_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
     """Distance to the ground along rays of unit direction; infinite for misses."""
-    if not trimesh.ray.has_embree:
-        return _march_rays(site, origins, ways)
     found = np.full(len(origins), np.inf)
     face = site.mesh.ray.intersects_first(origins, ways)
     hit = np.flatnonzero(face >= 0)
@@ -209,29 +213,46 @@ def _cast_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Arra
     return np.nan_to_num(found, nan=0.0, posinf=np.inf)
 
 
-def _march_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
-    """As `_cast_rays`, without embree: march each ray through the grid's box until it is below the surface.
+def drop_blocked(candidates: Candidates, field: GaussianField, grid: Ground) -> Candidates:
+    """Keep the candidates that are above the ground and not within one standard deviation of a solid Gaussian.
 
-    There are as many steps as vertices along the longer side, so crests wider than a cell are detected.
+    Raises: InputError: none is left.
     """
-    steps = max(len(site.x), len(site.y))
-    heights = site.mesh.vertices[:, 2].reshape(len(site.y), len(site.x))
-    margin = OFF + 2 / steps * np.ptp(heights)  # so that the last step of a ray downwards ends below the surface
-    low = np.array([site.x[0], site.y[0], heights.min() - margin])
-    high = np.array([site.x[-1], site.y[-1], heights.max() + OFF])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slabs = np.stack([(low - origins) / ways, (high - origins) / ways])
-    first = np.maximum(np.nan_to_num(slabs.min(0), nan=-np.inf).max(1), 0)
-    last = np.nan_to_num(slabs.max(0), nan=np.inf).min(1)
-    found, open_ = np.full(len(origins), np.inf), np.flatnonzero(first < last)
-    for k in range(steps):
-        t = first[open_] + (k + 1) / steps * (last - first)[open_]
-        at = origins[open_] + t[:, None] * ways[open_]
-        row, column = (
-            np.interp(at[:, 1], site.y, np.arange(len(site.y))),
-            np.interp(at[:, 0], site.x, np.arange(len(site.x))),
+    if not candidates:
+        return candidates
+    centres = np.stack([camera.centre for _, camera in candidates])
+    below, inside = find_below_ground(centres, grid), find_inside_objects(centres, field)
+    blocked = below | inside
+    if blocked.all():
+        names = format_names(blocked, [pose.name for pose, _ in candidates])
+        raise InputError(
+            f"pose {names}: all are below the ground or inside an object; no photo can be taken there. Set `poses`, "
+            "`feasibility` or `min_elevation` of the scene, or check its ground"
         )
-        below = at[:, 2] < map_coordinates(heights, [row, column], order=1, mode="nearest")
-        found[open_[below]] = t[below]
-        open_ = open_[~below]
+    if blocked.any():
+        _log.info("%d candidate poses are below the ground, %d inside an object: left out", below.sum(), inside.sum())
+    return [candidate for candidate, out in zip(candidates, blocked, strict=True) if not out]
+
+
+def find_below_ground(centres: Float[Array, "n 3"], grid: Ground) -> Bool[Array, "n"]:
+    """Which positions are at or below the surface; none outside the grid."""
+    return grid.contains(centres) & (centres[:, 2] <= grid.height_at(centres))
+
+
+def find_inside_objects(centres: Float[Array, "n 3"], field: GaussianField) -> Bool[Array, "n"]:
+    """Which positions are within one standard deviation of a solid Gaussian's centre."""
+    solid = np.flatnonzero(expit(field.opacity_logits) >= SOLID)
+    reach = np.exp(field.log_scales[solid].max(1).astype(float))
+    # most Gaussians reach no position at all: they are left out before each position looks at the others
+    apart, _ = cKDTree(centres).query(field.means[solid], distance_upper_bound=2 * reach.max(initial=1e-30))
+    solid = solid[np.asarray(apart) <= 1.01 * reach]
+    means, scales = field.means[solid].astype(float), np.exp(field.log_scales[solid].astype(float))
+    found = np.zeros(len(centres), bool)
+    for i, centre in enumerate(centres):
+        apart = means - centre
+        near = np.flatnonzero((apart**2).sum(1) <= scales.max(1) ** 2)
+        if len(near):
+            w, x, y, z = field.quats[solid][near].T
+            own = Rotation.from_quat(np.stack([x, y, z, w], 1)).inv().apply(apart[near])
+            found[i] = (((own / scales[near]) ** 2).sum(1) <= 1).any()
     return found

@@ -1,9 +1,12 @@
 """Policies: functions that choose which k of the scored candidates to capture next.
 
-To add one: describe it in `policy_names.POLICY_SPECS`, write its function here, and decorate that with `@policy(name)`.
+To add one, write its function here and decorate it with `@policy(name, ...)`: names, rules and docs follow from the
+decorator. The workflow reads this module before any job, so it imports nothing slow.
 """
 
-from collections.abc import Callable
+import heapq
+import re
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -12,10 +15,12 @@ from jaxtyping import Float, Float64
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.poses import select_farthest_poses
-from dav_gswt.views.greedy import lazy_greedy
-from dav_gswt.views.policy_names import POLICY_NAMES
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.uncertainty.weighting import combine_image_terms, combine_terms
+from dav_gswt.views.uncertainty import combine_terms
+
+AUTO = "auto"  # in the config: what `resolve_policy` says
+HIGHEST = 0.98  # quantile of all candidates' values at which colours of figures end
+POLICY_NAME = r"[a-z0-9-]+"  # what a policy's name is made of: it stands in paths between underscores
 
 
 @runtime_checkable
@@ -40,7 +45,7 @@ class SelectionInput:
     """What a policy reads beside the scores.
 
     captured: camera centres of the photos so far, relative to the exemplar's middle. k: number of poses to choose, at
-    most the number of candidates. lam: weight of LPIPS. information: for policies with `needs_field`, else None.
+    most the number of candidates. lam: weight of LPIPS. information: for policies that need the field, else None.
     """
 
     captured: Float[Array, "m 3"]
@@ -50,38 +55,81 @@ class SelectionInput:
     information: InformationGain | None = None
 
 
-Policy = Callable[[Scores, SelectionInput], list[int]]
+@dataclass(frozen=True)
+class Policy:
+    """A policy: a function that returns indices of candidates, best first, and what the workflow must know of it.
+
+    name: as in the config and in paths; small letters, digits and -. chooses: which poses, in words. needs: what it
+    reads beside the places of the candidates: `prior` (scores by a prior), `field` (it gets an `InformationGain`), and
+    for that object `photos` (the photos so far) or `truth` (true pictures of candidates, an oracle). fixed_zero: of the
+    prior's settings (p_drop, lam), those that have no effect and are 0 in paths.
+    Raises: ValueError: another character in the name.
+    """
+
+    name: str
+    chooses: str
+    choose: Callable[[Scores, SelectionInput], list[int]]
+    needs: tuple[str, ...] = ()
+    fixed_zero: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        if not re.fullmatch(POLICY_NAME, self.name):
+            raise ValueError(f"policy {self.name!r}: a name has small letters, digits and - only")
+
+    def describe_inputs(self) -> str:
+        """What the policy reads, in words."""
+        unread = f" (not {', '.join(f'`{key}`' for key in self.fixed_zero)})" if self.fixed_zero else ""
+        words = {"prior": f"prior{unread}", "truth": "true pictures"}
+        return ", ".join(words.get(need, need) for need in self.needs) or "poses"
+
+
 POLICIES: dict[str, Policy] = {}
 
 
-def policy(name: str) -> Callable[[Policy], Policy]:
-    """Register a function as the policy `name`. It returns indices of candidates, best first."""
-    if name not in POLICY_NAMES:
-        raise ValueError(f"{name}: describe the policy in policy_names.POLICY_SPECS first")
+def policy(name: str, chooses: str, needs: tuple[str, ...] = (), fixed_zero: tuple[str, ...] = ()) -> Callable:
+    """Register a function as a policy; see `Policy`."""
 
-    def register(function: Policy) -> Policy:
-        POLICIES[name] = function
+    def register(function: Callable[[Scores, SelectionInput], list[int]]) -> Callable:
+        POLICIES[name] = Policy(name, chooses, function, needs, fixed_zero)
         return function
 
     return register
 
 
-@policy("random")
+@policy("random", "k drawn at random")
 def random(scores: Scores, inputs: SelectionInput) -> list[int]:
     """k candidates drawn without replacement."""
     return [int(i) for i in inputs.rng.permutation(len(scores))[: inputs.k]]
 
 
-@policy("farthest")
+@policy("farthest", "greedily, the one farthest from all photos so far: farthest point sampling")
 def farthest(scores: Scores, inputs: SelectionInput) -> list[int]:
     """Farthest point sampling: the candidate farthest from all views so far; ties by index."""
     return select_farthest_poses(scores.poses, inputs.k, inputs.captured)
 
 
-@policy("coverage")
-@policy("coverage-error")
-@policy("coverage-w2")
-@policy("oracle")
+@policy(
+    "oracle",
+    "as `coverage`, each cell weighted by the true error at the candidates: what a perfect score would choose",
+    needs=("field", "truth"),
+)
+@policy(
+    "coverage-w2",
+    "as `coverage`, each cell weighted by W2 between the prior's samples",
+    needs=("prior", "field"),
+    fixed_zero=("lam",),
+)
+@policy(
+    "coverage-error",
+    "as `coverage`, each cell weighted by the error of the field in the photos so far",
+    needs=("field", "photos"),
+)
+@policy(
+    "coverage",
+    "greedily, the largest gain in directional coverage: every cell of the ground is to be seen large, and from many "
+    "sides",
+    needs=("field",),
+)
 def cover(scores: Scores, inputs: SelectionInput) -> list[int]:
     """Greedy choice of the largest gain; every choice lowers the gain of the others."""
     if (information := inputs.information) is None:
@@ -89,42 +137,106 @@ def cover(scores: Scores, inputs: SelectionInput) -> list[int]:
     return lazy_greedy(information.gains(), information.gain, information.take, inputs.k)
 
 
-@policy("grad-lpips")
-def grad_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
-    """The k candidates of greatest u_img, an ablation: texture of the expected picture, and lam LPIPS."""
-    gradient, lpips = scores.term("gradient"), scores.terms.get("lpips")
-    return top(combine_image_terms(gradient, lpips, inputs.lam, scores.scales, scores.names), inputs.k)
-
-
-@policy("w2")
-def w2(scores: Scores, inputs: SelectionInput) -> list[int]:
-    """The k candidates whose samples disagree most in latents."""
-    return top(scores.term("w2_sq"), inputs.k)
-
-
-@policy("single")
-def single(scores: Scores, inputs: SelectionInput) -> list[int]:
-    """The k candidates whose single sample, without dropout, differs most from the render."""
-    return top(scores.term("single"), inputs.k)
-
-
-@policy("w2-lpips")
-def w2_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
-    """The k candidates of greatest u = W2² + lam LPIPS, each over its frozen scale: the paper's Algorithm 1."""
-    return top(uncertainty(scores, inputs.lam), inputs.k)
-
-
-@policy("all")
+@policy("all", "all candidates, whatever `k` is")
 def everything(scores: Scores, inputs: SelectionInput) -> list[int]:
     """All candidates, whatever k is."""
     return list(range(len(scores)))
 
 
-def uncertainty(scores: Scores, lam: float) -> Float64[Array, "n"]:
-    """Return u = W2² + lam LPIPS of every candidate."""
-    return combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
+@policy(
+    "grad-lpips",
+    "the largest image gradient of the prior's mean sample plus `lam` LPIPS, each over its frozen scale (ablation)",
+    needs=("prior",),
+)
+def grad_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The k candidates of greatest u_img, an ablation: texture of the expected picture, and lam LPIPS."""
+    return top(uncertainty(scores, inputs.lam, "gradient"), inputs.k)
+
+
+@policy(
+    "w2-lpips", "the largest u = W2² + `lam` LPIPS, each over its frozen scale: the paper's top k", needs=("prior",)
+)
+def w2_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The k candidates of greatest u = W2² + lam LPIPS, each over its frozen scale: the paper's Algorithm 1."""
+    return top(uncertainty(scores, inputs.lam), inputs.k)
+
+
+@policy("w2", "the largest squared W2 of the prior's samples, in latents", needs=("prior",), fixed_zero=("lam",))
+def w2(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The k candidates whose samples disagree most in latents."""
+    return top(scores.term("w2_sq"), inputs.k)
+
+
+@policy(
+    "single",
+    "the largest LPIPS between one sample without dropout and the render (ablation)",
+    needs=("prior",),
+    fixed_zero=("p_drop", "lam"),
+)
+def single(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The k candidates whose single sample, without dropout, differs most from the render."""
+    return top(scores.term("single"), inputs.k)
+
+
+POLICY_NAMES = tuple(POLICIES)
+PRIOR_POLICIES, NEEDS_FIELD, NEEDS_PHOTOS, ORACLES = (
+    tuple(name for name, each in POLICIES.items() if need in each.needs)
+    for need in ("prior", "field", "photos", "truth")
+)
+ZERO_SETTINGS = {name: each.fixed_zero for name, each in POLICIES.items() if each.fixed_zero}
+
+
+def resolve_policy(policy: str, agent: str | None) -> str:
+    """The policy of a scene: the config's, `auto` by the scene's agent.
+
+    Of given photos (`replay`) the best choice is to spread; where new ones are taken, to go back where the field is
+    wrong. Measured: docs/active-views.md.
+    """
+    if policy != AUTO:
+        return policy
+    return "farthest" if agent == "replay" else "coverage-error"
+
+
+def uncertainty(scores: Scores, lam: float, term: str = "w2_sq") -> Float64[Array, "n"]:
+    """Return u = W2² + lam LPIPS of every candidate, or another term in place of W2²."""
+    lpips = scores.terms.get("lpips")
+    return combine_terms(scores.term(term), lpips, lam, scores.scales, scores.names, term)
+
+
+def candidate_values(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
+    """Label and values by which figures colour candidates.
+
+    The values are the uncertainty u, or without a prior or without dropout, where all samples agree, the gain in
+    coverage.
+    """
+    if scores.scales.by_term.get("w2_sq", 0.0) > 0:
+        lpips = f" + {lam:g} LPIPS" if lam and "lpips" in scores.terms else ""
+        return f"uncertainty u = W2{lpips}, in units of the scale frozen at round 1", uncertainty(scores, lam)
+    scale, values = scores.scales.by_term["coverage"], scores.term("coverage")
+    values = values / scale if scale > 0 else np.zeros(len(scores))
+    return "gain in coverage of the ground, in units of the scale frozen at round 1", values
 
 
 def top(values: Float[Array, "n"], k: int) -> list[int]:
     """The k largest; ties by index."""
     return [int(i) for i in np.argsort(-values, kind="stable")[:k]]
+
+
+def lazy_greedy(gains: Iterable[float], gain: Callable[[int], float], take: Callable[[int], None], k: int) -> list[int]:
+    """Choose the same k items as plain greedy, with fewer evaluations: gains only fall as items are chosen.
+
+    gains: of each item before any choice. gain: returns an item's current gain. take: records a choice. Ties by index.
+    Source: Minoux, Accelerated greedy algorithms for maximizing submodular set functions, 1978.
+    """
+    queue = [(-value, i) for i, value in enumerate(gains)]
+    heapq.heapify(queue)
+    chosen: list[int] = []
+    while queue and len(chosen) < k:
+        _, i = heapq.heappop(queue)
+        now = gain(i)
+        if queue and (-now, i) > queue[0]:
+            heapq.heappush(queue, (-now, i))
+            continue
+        chosen.append(i)
+        take(i)
+    return chosen

@@ -1,6 +1,13 @@
-"""Inputs of single policies beside the scores, computed only for the policies that need them."""
+"""Inputs of single policies beside the scores: the information gain, and true pictures of candidates for oracles.
 
-from jaxtyping import Float64
+True pictures exist for synthetic scenes and for photo sets, without a capture.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
@@ -8,14 +15,14 @@ from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import read_scene_frame
-from dav_gswt.photos.training_views import TrainingView, read_training_views
+from dav_gswt.images import image_files
+from dav_gswt.photos.training_views import WHOLE, TrainingView, read_training_views
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.reconstruction import ground, regression_guard
-from dav_gswt.views import oracle, pose_maps
+from dav_gswt.views import pose_maps
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.coverage import ERROR_WIDTH, DirectionalCoverage, GroundCells, measure_cell_errors
-from dav_gswt.views.policies import InformationGain
-from dav_gswt.views.policy_names import NEEDS_FIELD, NEEDS_PHOTOS, ORACLES, PRIOR_POLICIES
+from dav_gswt.views.policies import NEEDS_FIELD, NEEDS_PHOTOS, ORACLES, PRIOR_POLICIES, InformationGain
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import scoring_camera
 
@@ -25,11 +32,11 @@ Files = dict  # of the rule's inputs: a path, or for `captures` and `fits` a lis
 def build_information_gain(
     policy: str, scores: Scores, candidates: Candidates, taken: list[Camera], split: ViewSplit, files: Files, agent: str
 ) -> InformationGain | None:
-    """Build the information gain for policies with `needs_field`; None for others.
+    """Build the information gain for policies that need the field; None for others.
 
     taken: cameras of the photos so far. files: `field`, `ground`, `maps` and `frame`; `images`, `model`, `captures` and
-    `fits` for policies with `needs_photos`; `truth` (folder of true pictures of candidates), for a replayed scene
-    `images`, for those with `needs_truth`. Candidates are in the order of the scores.
+    `fits` for policies that need photos; `truth` (folder of true pictures of candidates), for a replayed scene
+    `images`, for oracles. Candidates are in the order of the scores.
     Raises: InputError: no true picture of a candidate is left.
     """
     if policy not in NEEDS_FIELD:
@@ -67,8 +74,43 @@ def _read_photos(split: ViewSplit, files: Files) -> list[TrainingView]:
 def _read_truth(candidates: Candidates, files: Files, agent: str) -> list[TrainingView]:
     """The true pictures of candidates, where they are known."""
     if agent == "replay":
-        return list(oracle.render_truth({"agent": agent}, candidates, files["images"]))
-    found = oracle.read_truth(candidates, files["truth"])[1]
+        return list(read_replayed(candidates, files["images"]))
+    found = read_truth(candidates, files["truth"])[1]
     if not found:
         raise InputError(f"{files['truth']}: shows no candidate that is left; make it again with more of them")
     return found
+
+
+def read_replayed(candidates: Candidates, folder: Path | str) -> Iterator[TrainingView]:
+    """Yield the photo of each candidate of a replayed scene at the scoring size; weight 0 where it is masked."""
+    for pose, camera in candidates:
+        yield shrink_view(pose.name, camera, *image_files.read_photo_and_alpha(Path(folder) / pose.name))
+
+
+def read_truth(candidates: Candidates, folder: Path | str) -> tuple[Candidates, list[TrainingView]]:
+    """Read the candidates whose pictures exist, and the pictures. Raises: InputError: a picture of another size."""
+    some = [(pose, camera) for pose, camera in candidates if (Path(folder) / f"{pose.name}.png").is_file()]
+    found = []
+    for pose, camera in some:
+        image = image_files.read_photo(path := Path(folder) / f"{pose.name}.png")
+        camera = scoring_camera(camera)
+        if image.shape != (camera.height, camera.width, 3):
+            raise InputError(
+                f"{path}: {image.shape[1]} x {image.shape[0]} pixels, not those of its pose; make it again"
+            )
+        found.append(TrainingView(pose.name, camera, image, np.ones(image.shape[:2], np.float32)))
+    return some, found
+
+
+def shrink_view(
+    name: str, camera: Camera, image: Float32[Array, "h w 3"], cover: Float32[Array, "h w"] | None = None
+) -> TrainingView:
+    """A true picture at the scoring size, named by its pose. cover: 0 where it is masked."""
+    camera = scoring_camera(camera)
+    size = camera.width, camera.height
+    weight = (
+        np.ones(size[::-1], bool)
+        if cover is None
+        else image_files.shrink_image(cover[..., None], *size)[..., 0] > WHOLE
+    )
+    return TrainingView(name, camera, image_files.shrink_image(image, *size), weight.astype(np.float32))

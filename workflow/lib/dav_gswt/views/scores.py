@@ -1,10 +1,11 @@
-"""Scores of candidate poses, one raw value per term, stored in scores.csv; policies combine the terms.
+"""Scores of candidate poses: scores.csv, and scores.json with the scales that the first round fixes.
 
-The column of a term that is not available (no prior, no LPIPS weights) is empty.
+scores.csv has one raw value per term; policies combine the terms. The column of a term that is not available (no prior,
+no LPIPS weights) is empty.
 """
 
 import csv
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,18 +13,21 @@ from jaxtyping import Float64, Int
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.files import atomic_file
+from dav_gswt.files import atomic_file, read_json, write_json
 from dav_gswt.geometry.poses import Pose
-from dav_gswt.views.uncertainty.weighting import Scales
+from dav_gswt.provenance import record_provenance
+from dav_gswt.views.uncertainty import Quantiles, Scales
 
-TERMS = ("opacity", "coverage", "w2_sq", "lpips", "gradient", "single", "residual")
-FIELDS = ("pose", "elevation", "azimuth", "radius", *TERMS, "steps", *(f"{term}_scale" for term in TERMS))
+PLACE = "elevation", "azimuth", "radius"
 
 
 @dataclass(frozen=True)
 class Scores:
-    """Scores of n candidates. terms: the available ones of TERMS. scales: divisor of each term, fixed in the first
-    round. steps: denoising steps behind the prior terms of a candidate; 0 without a prior."""
+    """Scores of n candidates.
+
+    terms: the available ones of `terms.TERMS`. scales: divisor of each term, fixed in the first round. steps: denoising
+    steps behind the prior terms of a candidate; 0 without a prior.
+    """
 
     poses: list[Pose]
     terms: dict[str, Float64[Array, "n"]]
@@ -40,28 +44,30 @@ class Scores:
     def term(self, name: str) -> Float64[Array, "n"]:
         """Return a term. Raises: InputError: it is not available."""
         if name not in self.terms:
-            raise InputError(f"{name}: the poses were scored without it; it needs {_describe_requirement(name)}")
+            raise InputError(f"{name}: the poses were scored without it; it needs {_list_terms()[name].requires}")
         return self.terms[name]
 
 
-def _describe_requirement(name: str) -> str:
-    """What a term needs, and where that is documented."""
-    if name == "single":
-        return (
-            "a prior without dropout (p_drop 0), and the config's `lpips` as `installed` or a path "
-            "(docs/reference/config.md)"
-        )
-    return "a prior (docs/prior.md)"
+def _list_terms() -> dict:
+    from dav_gswt.views.terms import TERMS  # deferred: the workflow reads this module before any job
+
+    return TERMS
+
+
+def list_columns() -> tuple[str, ...]:
+    """The columns of scores.csv."""
+    names = _list_terms()
+    return ("pose", *PLACE, *names, "steps", *(f"{name}_scale" for name in names))
 
 
 def write_scores(path: Path | str, scores: Scores) -> None:
     """Write scores.csv, one row per candidate; numbers are written exactly."""
     with atomic_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, FIELDS)
+        table = csv.DictWriter(file, list_columns())
         table.writeheader()
         for i, pose in enumerate(scores.poses):
             row = {"pose": pose.name, "steps": int(scores.steps[i])}
-            row |= {k: repr(getattr(pose, k)) for k in ("elevation", "azimuth", "radius")}
+            row |= {k: repr(getattr(pose, k)) for k in PLACE}
             row |= {name: repr(float(values[i])) for name, values in scores.terms.items()}
             row |= {f"{name}_scale": repr(scores.scales.by_term[name]) for name in scores.terms}
             table.writerow(row)
@@ -72,8 +78,8 @@ def read_scores(path: Path | str) -> Scores:
     try:
         with Path(path).open(newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
-        poses = [Pose(r["pose"], *(float(r[k]) for k in ("elevation", "azimuth", "radius"))) for r in rows]
-        known = [name for name in TERMS if rows and rows[0][name]]
+        poses = [Pose(r["pose"], *(float(r[k]) for k in PLACE)) for r in rows]
+        known = [name for name in _list_terms() if rows and rows[0][name]]
         terms = {name: np.array([float(r[name]) for r in rows]) for name in known}
         scales = Scales({name: float(rows[0][f"{name}_scale"]) for name in known})
         steps = np.array([int(r["steps"]) for r in rows], int)
@@ -85,3 +91,35 @@ def read_scores(path: Path | str) -> Scores:
     if bad:
         raise InputError(f"{path}: the scores of {', '.join(poses[i].name for i in bad[:5])} are not finite")
     return Scores(poses, terms, scales, steps)
+
+
+@dataclass(frozen=True)
+class FrozenScales:
+    """What the first round of a scene fixes for all later rounds.
+
+    scales: of the terms. pixels: values of w2_sq maps that become 0 and 1 in uncertainties of Gaussians; None without a
+    prior.
+    """
+
+    scales: Scales
+    pixels: Quantiles | None
+
+
+def read_frozen_scales(path: Path | str) -> FrozenScales:
+    """Read scores.json. Raises: InputError: not that of a first round."""
+    found = read_json(path)
+    try:
+        pixels = found["pixels"] and Quantiles(float(found["pixels"]["low"]), float(found["pixels"]["high"]))
+        return FrozenScales(Scales({name: float(scale) for name, scale in found["scales"].items()}), pixels)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InputError(
+            f"{path}: does not hold the scales of a first round ({summarize_error(error)}); make it again"
+        ) from error
+
+
+def write_frozen_scales(
+    path: Path | str, frozen: FrozenScales, facts: dict, inputs: dict[str, Path | str | list], parameters: dict
+) -> None:
+    """Write scores.json. facts: summary of the scoring, see `ScoringResult.describe`."""
+    scales, pixels = frozen.scales.by_term, frozen.pixels and asdict(frozen.pixels)
+    write_json(path, facts | {"scales": scales, "pixels": pixels, "provenance": record_provenance(inputs, parameters)})

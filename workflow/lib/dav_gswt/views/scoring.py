@@ -10,28 +10,29 @@ from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import select_farthest_poses
 from dav_gswt.geometry.scene_frame import SceneFrame
+from dav_gswt.images.image_files import enlarge_map
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
-from dav_gswt.raster import Rasterizer
+from dav_gswt.raster import Rasterizer, make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.reconstruction.opacity_uncertainty import render_uncertainty
 from dav_gswt.reconstruction.top_view import render_top_view
 from dav_gswt.views import prior_sampling
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.coverage import DirectionalCoverage, GroundCells
-from dav_gswt.views.frozen_scales import FrozenScales
+from dav_gswt.views.coverage import GroundCells
 from dav_gswt.views.pose_maps import Part, PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
-from dav_gswt.views.scores import Scores
-from dav_gswt.views.uncertainty.backprojection import backproject_maps
-from dav_gswt.views.uncertainty.weighting import Quantiles, Scales, normalise
+from dav_gswt.views.scores import FrozenScales, Scores
+from dav_gswt.views.terms import Renders, compute_terms
+from dav_gswt.views.uncertainty import Quantiles, Scales, normalise
 
 WIDTH = 96  # pixels along the longer side of a picture for scoring
 PHOTO_WIDTH = 384  # pixels across a captured photo that conditions a prior, before cropping and shrinking
 UNSEEN = 0.99  # uncertainty of a Gaussian from which on no photo so far shows it
 SHOWN = 16  # candidates whose maps are written for display
+SIDE = 64  # pixels of the pictures from which blend weights are computed
+SEEN = 0.05  # total blend weight, in pixels, from which a Gaussian counts as seen
 
 
 @dataclass(frozen=True)
@@ -78,17 +79,18 @@ def score_poses(
 
     taken: the photos so far. prior: None for geometric terms only. frozen: of the first round; None in the first round.
     """
-    terms, opacity, cells = _score_geometry(field, grid, candidates, [scoring_camera(v.camera) for v in taken])
-    steps, w2_sq = np.zeros(len(candidates), int), None
+    renders = _render_candidates(field, grid, candidates, [scoring_camera(v.camera) for v in taken])
+    terms, steps, w2_sq = compute_terms(renders), np.zeros(len(candidates), int), None
+    poses, names = [pose for pose, _ in candidates], [pose.name for pose, _ in candidates]
     if prior is not None and candidates:
         condition, masks = build_conditions(field, grid, candidates, taken, frame, prior.model.size)
-        sampled, steps = prior_sampling.sample_terms(prior, condition, [pose.name for pose, _ in candidates], masks)
-        terms |= {name: values.astype(np.float64) for name, values in sampled.by_name().items()}
-        w2_sq = sampled.maps
-    poses, names = [pose for pose, _ in candidates], [pose.name for pose, _ in candidates]
+        sampled, steps = prior_sampling.sample_terms(prior, condition, names, masks)
+        w2_sq = sampled.pop("maps")
+        terms |= {name: values.astype(np.float64) for name, values in sampled.items()}
     frozen = frozen or _freeze_scales(terms, w2_sq, names)
-    scores, maps = Scores(poses, terms, frozen.scales, steps), PoseMaps(names, opacity, w2_sq, cells)
-    return ScoringResult(scores, maps, frozen, _gaussian_uncertainty(field, candidates, w2_sq, frozen))
+    maps = PoseMaps(names, _stack_maps(renders.uncertainty), w2_sq, renders.seen.pixels)
+    gaussians = _gaussian_uncertainty(field, candidates, w2_sq, frozen)
+    return ScoringResult(Scores(poses, terms, frozen.scales, steps), maps, frozen, gaussians)
 
 
 def build_conditions(
@@ -104,24 +106,22 @@ def build_conditions(
     return conditions.build_condition(shown, candidates, known, frame.flying_height, size), masks
 
 
-def _score_geometry(
-    field: GaussianField, grid: Ground, candidates: Candidates, taken: list[Camera]
-) -> tuple[dict[str, Float64[Array, "n"]], Float32[Array, "n h w"], Float32[Array, "n cells"]]:
-    """Geometric terms, opacity maps, and the pixels that show each cell of the ground: all from one render a candidate.
-
-    opacity: mean of the map over pixels on the modelled ground; 0 if there are none.
-    """
-    raster, cells = Rasterizer(), GroundCells(field, grid)
-    cameras, opacity = [scoring_camera(camera) for _, camera in candidates], np.zeros(len(candidates))
+def _render_candidates(field: GaussianField, grid: Ground, candidates: Candidates, taken: list[Camera]) -> Renders:
+    """One render a candidate: its rendered uncertainty, and the pixels that show each cell of the ground."""
+    raster, cells = make_rasterizer(), GroundCells(field, grid)
+    cameras = [scoring_camera(camera) for _, camera in candidates]
     maps, pixels = [], []
-    for i, camera in enumerate(progress(cameras, "score poses")):
+    for camera in progress(cameras, "score poses"):
         maps.append(render_uncertainty(field, camera, raster))
         pixels.append(cells.count_pixels(raster))
-        weight = ground_mask(grid, camera)
-        opacity[i] = float((maps[-1] * weight).sum() / max(1.0, weight.sum()))
-    seen = cells.gather_views(cameras, pixels)
-    coverage = np.array(DirectionalCoverage(cells, cells.view(taken), seen).gains())
-    return {"opacity": opacity, "coverage": coverage}, _stack_maps(maps), seen.pixels
+    masks = [ground_mask(grid, camera) for camera in cameras]
+    return Renders(maps, masks, cells, cells.gather_views(cameras, pixels), cells.view(taken))
+
+
+def render_uncertainty(field: GaussianField, camera: Camera, raster: Rasterizer) -> Float32[Array, "h w"]:
+    """Uncertainty of each pixel: blend-weighted, plus the transmittance, where nothing is known."""
+    seen = raster.forward(**to_raster_arrays(field, field.uncertainty[:, None]), camera=camera)
+    return np.clip(seen.colour[..., 0] + 1 - seen.alpha, 0, 1)
 
 
 def _stack_maps(maps: list[Float32[Array, "_ _"]]) -> Float32[Array, "n h w"]:
@@ -156,3 +156,21 @@ def _gaussian_uncertainty(
     cameras = [conditions.crop_camera(camera) for _, camera in candidates]
     backprojected = backproject_maps(field, cameras, normalise(w2_sq, frozen.pixels))
     return np.where(np.isnan(backprojected), field.uncertainty, backprojected).astype(np.float32)
+
+
+def backproject_maps(
+    field: GaussianField, cameras: list[Camera], maps: Float32[Array, "n h w"]
+) -> Float32[Array, "gaussians"]:
+    """Mean of u over cameras and pixels, weighted by blend weight: sum of w_i(p) u(p) / sum of w_i(p).
+
+    cameras: of square pictures, which the maps cover at any resolution. Rendered like a colour, the result gives the
+    uncertainty of any other view. Returns: NaN for Gaussians that are not seen.
+    """
+    raster = make_rasterizer()
+    total = np.zeros((2, len(field)))
+    for camera, u in zip(cameras, maps, strict=True):
+        raster.forward(**to_raster_arrays(field), camera=camera.resized(SIDE, SIDE))
+        found = raster.contributions(enlarge_map(u, SIDE, SIDE)[..., None])
+        total += found.mapped[:, 0], found.total
+    weighted, weight = total
+    return np.where(weight > SEEN, weighted / np.maximum(weight, SEEN), np.nan).astype(np.float32)

@@ -45,7 +45,7 @@ def select_poses(policy: str, scores: Scores, inputs: SelectionInput) -> list[Po
     if inputs.k > len(scores):
         _log.warning("%d poses were asked for; all candidates that are left are taken: %d", inputs.k, len(scores))
         inputs = replace(inputs, k=len(scores))
-    return [scores.poses[i] for i in POLICIES[policy](scores, inputs)[: inputs.k]]
+    return [scores.poses[i] for i in POLICIES[policy].choose(scores, inputs)[: inputs.k]]
 
 
 def write_pose_selection(path: Path | str, selection: PoseSelection) -> None:

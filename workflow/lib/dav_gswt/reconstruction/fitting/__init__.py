@@ -1,4 +1,1 @@
-"""Fitting of a Gaussian field to photos, without knowledge of grounds.
-
-`trainer.fit_field` is the training loop; the caller's `constraints` say where Gaussians may be and how they may look.
-"""
+"""Fitting of a Gaussian field to photos. `trainer.fit_field` is the training loop."""

@@ -1,12 +1,12 @@
 """A step of a fit: forward, loss, backward and Adam on one photo; here with arrays in memory.
 
-For the backends `cpu` and `torch`; `device_descent` does the same on a GPU.
+For the backends `cpu` and `torch`; `device_descent` has a subclass for a GPU.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
@@ -17,13 +17,11 @@ from dav_gswt.field import SH0
 from dav_gswt.images import channels
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import Gradients
-from dav_gswt.reconstruction.fitting import densification, exposure, pose_refinement
-from dav_gswt.reconstruction.fitting.constraints import Constraints
-from dav_gswt.reconstruction.fitting.plan import FitPlan, FitReport
-from dav_gswt.reconstruction.fitting.residual import Residual
-from dav_gswt.reconstruction.fitting.schedule import Schedule
+from dav_gswt.reconstruction.fitting import densification, exposure
+from dav_gswt.reconstruction.fitting.plan import FitPlan, Schedule
 from dav_gswt.reconstruction.fitting.state import State
 from dav_gswt.reconstruction.ground import smooth
+from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 
 STRUCTURE = 0.2  # weight of D-SSIM against L1
 RATES = {"log_scales": 6e-2, "quats": 1.2e-2, "opacity_logits": 0.1}  # a step, at the start
@@ -39,33 +37,33 @@ PARTS = "values", "first", "second"  # of `State`
 
 @dataclass
 class TrainingState:
-    """All that changes from step to step; a snapshot stores it."""
+    """All that changes from step to step.
+
+    errors: squared errors of the last photos, projected back onto the Gaussians by blend weights; None before the first
+    photo that counts. turn: the photos of this epoch that are yet to come.
+    """
 
     state: State
-    report: FitReport
     rng: np.random.Generator
     exposures: exposure.ExposureTracker
-    poses: pose_refinement.PoseCorrections
-    residual: Residual
-    turn: list[int]
+    errors: Float32[Array, "n"] | None = None
+    turn: list[int] = field(default_factory=list)
     step: int = 0
+
+    def add_errors(self, found: Float32[Array, "n"]) -> None:
+        """Add the errors that a photo projects back."""
+        self.errors = found if self.errors is None else self.errors + found
 
 
 @dataclass(frozen=True)
 class TrainingTask:
-    """All that stays the same. halves: the views at half their size, for the first steps. held: see `held_out`."""
+    """All that stays the same."""
 
     views: list[TrainingView]
-    halves: list[TrainingView]
-    held: list[Array] | None
     plan: FitPlan
     schedule: Schedule
-    constraints: Constraints
+    constraints: GroundConstraints
     raster: raster.Rasterizer
-
-    def is_early(self, step: int) -> bool:
-        """Whether this step sees photos of half the size."""
-        return step < self.plan.half_share * self.plan.steps
 
     def collects_errors(self, step: int) -> bool:
         """Whether the error after this step says where to grow."""
@@ -82,73 +80,45 @@ class TrainingTask:
         return rates
 
 
-@runtime_checkable
-class Descent(Protocol):
-    """How steps are done. Parameters may be elsewhere than in `run.state`; `pull` and `push` copy them."""
+class Descent:
+    """How steps are done: here with parameters in `run.state`. Where a subclass has them elsewhere, it copies them."""
 
     def descend(self, run: TrainingState, task: TrainingTask, index: int) -> None:
-        """One step on a photo: gradients, exposure, errors that say where to grow, Adam, the camera's correction."""
-        ...
-
-    def perturb(self, run: TrainingState, task: TrainingTask) -> None:
-        """See `densification.perturb`, after the step `run.step`."""
-        ...
-
-    def pull(self, run: TrainingState, parts: Parts = PARTS) -> None:
-        """Bring these parts of `run.state` up to date."""
-        ...
-
-    def push(self, run: TrainingState, parts: Parts = PARTS) -> None:
-        """Go on from these parts of `run.state`, which were changed."""
-        ...
-
-
-@contextmanager
-def on_host(descent: Descent, run: TrainingState, parts: Parts = PARTS) -> Iterator[None]:
-    """Change these parts of `run.state` in the block."""
-    descent.pull(run, parts)
-    yield
-    descent.push(run, parts)
-
-
-class HostDescent:
-    """See `Descent`. Parameters are in `run.state`."""
-
-    def descend(self, run: TrainingState, task: TrainingTask, index: int) -> None:
-        """See `Descent.descend`."""
-        early = task.is_early(run.step)
-        view = (task.halves if early else task.views)[index]
-        weight = view.weight
-        if task.held is not None and not early:
-            weight = np.where(task.held[index], np.float32(0), weight)
-            view = replace(view, weight=weight)
-        camera = run.poses.correct(index, view.camera)
-        seen = task.raster.forward(**run.state.values, camera=camera)
+        """One step on a photo: gradients, exposure, errors that say where to grow, Adam."""
+        view = task.views[index]
+        seen = task.raster.forward(**run.state.values, camera=view.camera)
         behind = background(view, run.rng.uniform(0, 1, 3).astype(np.float32))
         image = channels.composite(seen.colour, seen.alpha, behind)
-        run.exposures.update(index, image, view)
+        sample = exposure.sample_photo(view.image, view.weight)
+        run.exposures.learn(index, exposure.thin(image, view.weight.size), sample)
         gain, offset = run.exposures.gain_and_offset(index)
         exposed = channels.scale_channels(image, gain, offset)
         if task.collects_errors(run.step):
-            run.residual.add(task.raster, exposed - view.image, weight)
-        _, gradient = raster.loss(exposed, view.image, weight, STRUCTURE)
+            squared = channels.mean_squares(exposed - view.image) * view.weight
+            run.add_errors(task.raster.contributions(squared[..., None]).mapped[:, 0])
+        _, gradient = raster.loss(exposed, view.image, view.weight, STRUCTURE)
         gradient = channels.scale_channels(gradient, gain)
         gradients = task.raster.backward(gradient, -BACKDROP * channels.sum_products(gradient, behind))
-        hold_ground(gradients, task.constraints)
+        hold_ground(vars(gradients), task.constraints)
         self._step_adam(run, task, gradients)
         view.release()
-        if task.plan.pose_rate:
-            run.poses.descend(index, gradients.camera, task.plan.pose_rate * task.schedule.rate(run.step), camera)
 
     def perturb(self, run: TrainingState, task: TrainingTask) -> None:
-        """See `Descent.perturb`."""
+        """See `densification.perturb`, after the step `run.step`."""
         densification.perturb(run.state.values, task.constraints.fixed, perturbation(run, task), run.rng)
 
     def pull(self, run: TrainingState, parts: Parts = PARTS) -> None:
-        """Nothing to do."""
+        """Bring these parts of `run.state` up to date."""
 
     def push(self, run: TrainingState, parts: Parts = PARTS) -> None:
-        """Nothing to do."""
+        """Go on from these parts of `run.state`, which were changed."""
+
+    @contextmanager
+    def on_host(self, run: TrainingState, parts: Parts = PARTS) -> Iterator[None]:
+        """Change these parts of `run.state` in the block."""
+        self.pull(run, parts)
+        yield
+        self.push(run, parts)
 
     def _step_adam(self, run: TrainingState, task: TrainingTask, gradients: Gradients) -> None:
         """One step of Adam for the visible Gaussians; the others keep their values and moments."""
@@ -165,15 +135,17 @@ def background(view: TrainingView, colour: Float32[Array, "3"]) -> Float32[Array
     return colour if view.behind is None else channels.fill_unknown(view.behind, colour)
 
 
-def hold_ground(gradients: Gradients, constraints: Constraints) -> None:
-    """Change gradients in place: discs turn with the surface (see `project_parameters`), their heights move together,
-    and the underlay follows them."""
+def hold_ground(gradients: dict[str, Any], constraints: GroundConstraints, blur: Callable = smooth) -> None:
+    """Change gradients (arrays or tensors) in place, as the ground's constraints say.
+
+    Discs turn with the surface (see `project_parameters`), their heights move together, and the underlay follows them.
+    """
     n, held = constraints.discs, slice(constraints.discs, constraints.fixed)
-    up = gradients.means[:n, 2].reshape(constraints.shape)
-    gradients.means[:n, 2] = 0 if constraints.smoothing is None else smooth(up, constraints.smoothing).ravel()
-    gradients.quats[:n] = 0
-    for name, part in vars(gradients).items():
-        if part is not None and name != "camera":
+    up = gradients["means"][:n, 2].reshape(constraints.shape)
+    gradients["means"][:n, 2] = 0 if constraints.smoothing is None else blur(up, constraints.smoothing).reshape(-1)
+    gradients["quats"][:n] = 0
+    for part in gradients.values():
+        if part is not None:
             part[held] = 0
 
 

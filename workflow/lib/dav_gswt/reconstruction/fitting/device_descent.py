@@ -16,15 +16,16 @@ from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import cuda
 from dav_gswt.raster.torch import differentiate_loss
 from dav_gswt.reconstruction.fitting import densification, exposure
-from dav_gswt.reconstruction.fitting.constraints import Constraints
 from dav_gswt.reconstruction.fitting.descent import (
     BACKDROP,
     BETAS,
     PARTS,
     STRUCTURE,
+    Descent,
     Parts,
     TrainingState,
     TrainingTask,
+    hold_ground,
     perturbation,
 )
 
@@ -49,15 +50,15 @@ class Photo:
         return sum(part.nelement() * part.element_size() for part in parts if part is not None)
 
 
-class DeviceDescent:
-    """See `Descent`. Between `push` and `pull` the parameters are on the device."""
+class DeviceDescent(Descent):
+    """Between `push` and `pull` the parameters are on the device."""
 
     def __init__(self, rasterizer: cuda.Rasterizer):
         self.raster, self.device = rasterizer, rasterizer.device
         self.values: dict[str, Tensor] = {}
         self.first: dict[str, Tensor] = {}
         self.second: dict[str, Tensor] = {}
-        self._photos: dict[tuple[bool, int], Photo] = {}
+        self._photos: dict[int, Photo] = {}
         self._cached = 0
 
     def pull(self, run: TrainingState, parts: Parts = PARTS) -> None:
@@ -73,10 +74,8 @@ class DeviceDescent:
 
     def descend(self, run: TrainingState, task: TrainingTask, index: int) -> None:
         """See `Descent.descend`."""
-        early = task.is_early(run.step)
-        view, photo = (task.halves if early else task.views)[index], self._find_photo(task, early, index)
-        camera = run.poses.correct(index, view.camera)
-        last = self.raster.draw(self.values, camera)
+        view, photo = task.views[index], self._find_photo(task.views[index], index)
+        last = self.raster.draw(self.values, view.camera)
         picture, alpha = last.picture.detach()[0, ..., :3], last.alpha.detach()[0]
         colour = torch.tensor(run.rng.uniform(0, 1, 3).astype(np.float32), device=self.device)
         behind = colour if photo.behind is None else torch.where(photo.behind.isnan(), colour, photo.behind)
@@ -86,16 +85,13 @@ class DeviceDescent:
         exposed = gain * image + offset
         if task.collects_errors(run.step):
             squared = (exposed - photo.image).square().mean(2) * photo.weight
-            run.residual.add_found(cuda.download(self.raster.contribute(last, squared[..., None])[2][:, 0]))
+            run.add_errors(cuda.download(self.raster.contribute(last, squared[..., None])[2][:, 0]))
         _, gradient = differentiate_loss(exposed, photo.image, photo.weight, STRUCTURE)
         gradient = gain * gradient
         gradients = self.raster.differentiate(last, gradient, -BACKDROP * (gradient * behind).sum(2))
-        hold_ground(gradients, task.constraints)
-        self._step_adam(run, task, gradients, cuda.find_visible(last))
+        hold_ground(gradients, task.constraints, smooth)
+        self._move_parameters(run, task, gradients, cuda.find_visible(last))
         view.release()
-        if task.plan.pose_rate:
-            rate = task.plan.pose_rate * task.schedule.rate(run.step)
-            run.poses.descend(index, cuda.download(gradients["camera"]), rate, camera)
 
     def perturb(self, run: TrainingState, task: TrainingTask) -> None:
         """See `Descent.perturb`: of the few that are nearly transparent, on a copy."""
@@ -105,14 +101,15 @@ class DeviceDescent:
         densification.perturb(loose, 0, perturbation(run, task), run.rng)
         self.values["means"][rows] = cuda.upload(loose["means"], self.device)
 
-    def _step_adam(
+    def _move_parameters(
         self, run: TrainingState, task: TrainingTask, gradients: dict[str, Tensor], rows: Bool[Tensor, "n"]
     ) -> None:
-        """As `HostDescent._step_adam`."""
+        """As `Descent._step_adam`."""
         rates = task.rates(run.step, self.values["colours"].shape[1])
         unbiased = [1 - beta ** (run.step + 1) for beta in BETAS]
         for name, value in self.values.items():
-            value, g, m, v = (t.flatten(1) if t.ndim > 1 else t[:, None] for t in self._columns(name, gradients))
+            four = value, gradients[name], self.first[name], self.second[name]
+            value, g, m, v = (t.flatten(1) if t.ndim > 1 else t[:, None] for t in four)
             which = rows[:, None]
             m.copy_(torch.where(which, m.lerp(g, 1 - BETAS[0]), m))
             v.copy_(torch.where(which, v.lerp(g * g, 1 - BETAS[1]), v))
@@ -120,36 +117,16 @@ class DeviceDescent:
             rate = torch.tensor(np.asarray(rates[name], np.float32), device=self.device)
             value.sub_(torch.where(which, rate * move, 0))
 
-    def _columns(self, name: str, gradients: dict[str, Tensor]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        return self.values[name], gradients[name], self.first[name], self.second[name]
-
-    def _find_photo(self, task: TrainingTask, early: bool, index: int) -> Photo:
-        """A view on the device, less what is held out; kept there while there is room."""
-        if (photo := self._photos.get((early, index))) is None:
-            held = None if early or task.held is None else task.held[index]
-            photo = self._copy_photo((task.halves if early else task.views)[index], held)
+    def _find_photo(self, view: TrainingView, index: int) -> Photo:
+        """A view on the device; kept there while there is room."""
+        if (photo := self._photos.get(index)) is None:
+            image, weight = (cuda.upload(np.ascontiguousarray(a), self.device) for a in (view.image, view.weight))
+            behind = None if view.behind is None else cuda.upload(np.ascontiguousarray(view.behind), self.device)
+            photo = Photo(image, weight, behind, exposure.sample_photo(view.image, view.weight))
             if self._cached + photo.size <= CACHE:
-                self._photos[early, index] = photo
+                self._photos[index] = photo
                 self._cached += photo.size
         return photo
-
-    def _copy_photo(self, view: TrainingView, held: Bool[np.ndarray, "h w"] | None) -> Photo:
-        weight = view.weight if held is None else np.where(held, np.float32(0), view.weight)
-        image, thick = (cuda.upload(np.ascontiguousarray(a), self.device) for a in (view.image, weight))
-        behind = None if view.behind is None else cuda.upload(np.ascontiguousarray(view.behind), self.device)
-        return Photo(image, thick, behind, exposure.sample_photo(view.image, weight))
-
-
-def hold_ground(gradients: dict[str, Tensor], constraints: Constraints) -> None:
-    """As `descent.hold_ground`."""
-    n, held = constraints.discs, slice(constraints.discs, constraints.fixed)
-    up = gradients["means"][:n, 2].reshape(constraints.shape)
-    up = torch.zeros_like(up) if constraints.smoothing is None else smooth(up, constraints.smoothing)
-    gradients["means"][:n, 2] = up.flatten()
-    gradients["quats"][:n] = 0
-    for name, part in gradients.items():
-        if name != "camera":
-            part[held] = 0
 
 
 def smooth(values: Float32[Tensor, "rows columns"], cells: float) -> Float32[Tensor, "rows columns"]:

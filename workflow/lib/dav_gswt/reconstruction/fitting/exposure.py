@@ -13,7 +13,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.images import channels
 from dav_gswt.photos.training_views import TrainingView, one_by_one
-from dav_gswt.reconstruction.fitting.photo_colours import nan_median, sample_colours
+from dav_gswt.reconstruction.photo_colours import nan_median, sample_colours
 
 MAX_GAIN = 1.6  # of a photo against the set
 MAX_STEP_GAIN = 1.25  # during the fit
@@ -136,10 +136,6 @@ class ExposureTracker:
 
     def __init__(self, views: int):
         self.gains, self.offsets = np.ones((views, 3), np.float32), np.zeros((views, 3), np.float32)
-
-    def update(self, index: int, picture: Float32[Array, "h w 3"], view: TrainingView) -> None:
-        """Update a photo's values from the field's picture at its pose."""
-        self.learn(index, thin(picture, view.weight.size), sample_photo(view.image, view.weight))
 
     def learn(self, index: int, picture: Float32[Array, "r c 3"], photo: Sample) -> None:
         """Update a photo's values from the thinned picture of the field (`thin`)."""

@@ -1,67 +1,122 @@
-"""What a fit may spend, and its report."""
+"""The plan of a fit: what a preset lets it spend, and what happens at which step."""
 
-from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
 
-AUTO = "auto"
-Count = int | Literal["auto"]  # a number, or as many as the photos ask for
+from dav_gswt.reconstruction import underlay
 
-STEPS_PER_PHOTO = 38  # of a first fit with "auto"
-STEPS_PER_NEW_PHOTO = 40  # of an update with "auto"; the paper takes 5000 steps
 FEW_PHOTOS = 8  # that the steps of a preset are for; each further photo has steps of its own
-MAX_GAUSSIANS = 2_000_000  # of a fit that finds its own number
-MAX_SH_DEGREE = 3  # that a PLY can hold
-TRIED_SH_DEGREE = 1  # by a fit that finds its own
+FINAL_RATE = 0.1  # of the learning rates at the end of a fit, as a share of the full rates
+EVENTS = 10  # of growth
+GROWTH_END = 0.7  # of the steps
+PRUNE_AT = 0.8  # of the steps; the rest makes up for what is pruned
+# Learning rates of an update at its first step, as a share of a first fit's: the field is nearly right, and full rates
+# would undo its detail faster than a round's few steps make it again (docs/active-views.md)
+UPDATE_RATE = 0.3
+GROUND_SHARE = 0.9  # of the Gaussians, that the ground may take with its underlay; objects get the rest
 
 
-def count_first_steps(steps: Count, steps_per_photo: Count, photos: int) -> int:
-    """Steps of a first fit to so many photos, by a preset's `steps` and `steps_per_photo`.
-
-    `steps` are for FEW_PHOTOS; each photo more adds as many steps as a new photo of a round.
-    """
-    if steps == AUTO:
-        return STEPS_PER_PHOTO * photos
-    further = STEPS_PER_NEW_PHOTO if steps_per_photo == AUTO else int(steps_per_photo)
-    return int(steps) + further * max(0, photos - FEW_PHOTOS)
+def count_first_steps(steps: int, steps_per_photo: int, photos: int) -> int:
+    """Steps of a first fit: `steps` for FEW_PHOTOS photos, and `steps_per_photo` for each photo more."""
+    return steps + steps_per_photo * max(0, photos - FEW_PHOTOS)
 
 
 @dataclass(frozen=True)
 class FitPlan:
     """What a fit may spend.
 
-    steps: of the optimiser, one photo each. max_gaussians: approached where the residual asks for more; with "auto"
-    their number grows as long as errors are visible (see `schedule.Schedule.max_gaussians`), up to `limit`.
-    sh_degree: of the spherical harmonics, added degree by degree; with "auto" the lowest that held-out pixels need.
-    half_share: share of the steps at half the resolution. pose_rate: radians (and distances over the mean depth) that a
-    camera may turn a step, at the start; 0: cameras stay. first_rate: share of full learning rates to begin with.
+    steps: of the optimiser, one photo each. max_gaussians: approached where the errors ask for more. sh_degree: of the
+    spherical harmonics, added degree by degree. first_rate: share of the full learning rates to begin with.
     """
 
     steps: int
-    max_gaussians: Count
-    sh_degree: Count = 0
-    half_share: float = 0.0
-    pose_rate: float = 0.0
-    limit: int = MAX_GAUSSIANS
+    max_gaussians: int
+    sh_degree: int = 0
     first_rate: float = 1.0
 
-    def __post_init__(self):
-        if self.steps < 0:
-            raise ValueError(f"steps is {self.steps}; give a whole number from 0")
-        for name, most in (("max_gaussians", None), ("sh_degree", MAX_SH_DEGREE)):
-            value = getattr(self, name)
-            if value != AUTO and (value < 0 or (most is not None and value > most)):
-                raise ValueError(
-                    f"{name} is {value}; give {AUTO!r} or a whole number" + (f" to {most}" if most else "")
-                )
-        if not 0 < self.first_rate <= 1:
-            raise ValueError(f"first_rate is {self.first_rate}; give a share above 0, at most 1")
-        if not 0 <= self.half_share < 1 or not self.pose_rate >= 0:
-            raise ValueError(f"half_share is {self.half_share}, pose_rate {self.pose_rate}: shares and rates from 0")
+
+@dataclass(frozen=True, kw_only=True)
+class FitSettings:
+    """The keys of a preset that the first fit and its updates read.
+
+    size: longer side of the photos, pixels. spacing: of the discs, in sizes of a photo's pixel on the ground. steps: of
+    the first fit. steps_per_photo: of the first fit for each photo beyond FEW_PHOTOS, and of an update for each
+    new photo. first_rate: of an update; not a key of presets.
+    """
+
+    size: int
+    spacing: float
+    max_gaussians: int
+    steps: int
+    steps_per_photo: int = 0
+    sh_degree: int = 0
+    first_rate: float = UPDATE_RATE
+
+    @staticmethod
+    def from_preset(preset: Mapping[str, Any]) -> "FitSettings":
+        """The settings of a preset, which may have keys for other stages."""
+        names = [each.name for each in fields(FitSettings) if each.name != "first_rate"]
+        return FitSettings(**{name: preset[name] for name in names if name in preset})
+
+    def from_scratch(self, start: int, photos: int) -> "FitSettings":
+        """The settings of one fit with as many steps as a fit to `start` photos and updates to `photos` take."""
+        steps = self.plan_coarse_fit(start).steps + self.steps_per_photo * max(0, photos - start)
+        return replace(self, steps=steps, steps_per_photo=0)
+
+    def plan_coarse_fit(self, photos: int) -> FitPlan:
+        """The plan of the first fit, to so many photos."""
+        steps = count_first_steps(self.steps, self.steps_per_photo, photos)
+        return FitPlan(steps, self.max_gaussians, self.sh_degree)
+
+    def plan_update(self, earlier: int, new: int) -> FitPlan:
+        """The plan of an update of a field from so many earlier photos with so many new ones."""
+        first_rate = self.first_rate if earlier else 1.0
+        return FitPlan(self.steps_per_photo * new, self.max_gaussians, self.sh_degree, first_rate)
+
+
+def limit_discs(max_gaussians: int) -> int:
+    """Most cells of the ground's grid in a field of so many Gaussians."""
+    return int(GROUND_SHARE * max_gaussians / (1 + 1 / underlay.STRIDE**2))
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """What happens at which step of a fit that begins with `start` Gaussians.
+
+    If these are `max_gaussians` or more, no Gaussian is moved, added or pruned, as in the fit of a level.
+    """
+
+    plan: FitPlan
+    start: int
+
+    def rate(self, step: int) -> float:
+        """Factor of all learning rates: the plan's first, falling to FINAL_RATE."""
+        first = self.plan.first_rate
+        return first * (FINAL_RATE / first) ** (step / max(1, self.plan.steps))
+
+    def to_growth(self, step: int) -> int | None:
+        """Steps to the next growth event; 0: it is due now; None: there is none left."""
+        due = max(1, -(-step // self._every)) * self._every
+        return due - step if self._grows and due <= GROWTH_END * self.plan.steps else None
+
+    def prunes(self, step: int) -> bool:
+        """Whether Gaussians are pruned at this step."""
+        return self._grows and step == int(PRUNE_AT * self.plan.steps)
+
+    def max_gaussians(self, step: int, now: int) -> int:
+        """Number of Gaussians allowed after the growth event at this step, which begins with `now`."""
+        events = int(self.plan.steps * GROWTH_END) // self._every
+        left = max(1, events - step // self._every + 1)
+        return now + max(0, self.plan.max_gaussians - now) // left
 
     @property
-    def max_sh_degree(self) -> int:
-        """Degree that the fit reaches, whether it is kept or not."""
-        return TRIED_SH_DEGREE if self.sh_degree == AUTO else int(self.sh_degree)
+    def _grows(self) -> bool:
+        return self.plan.max_gaussians > self.start
+
+    @property
+    def _every(self) -> int:
+        return max(1, int(self.plan.steps * GROWTH_END) // EVENTS)
 
 
 @dataclass
@@ -70,48 +125,7 @@ class FitReport:
 
     steps: int = 0
     gaussians: int = 0
-    degree: int | None = 0  # of the spherical harmonics; None without a fit
-    choices: list[dict[str, Any]] = field(default_factory=list)  # what, value, why
-    held_out: list[dict[str, Any]] = field(default_factory=list)  # degree, psnr
-
-    def note_choice(self, what: str, value: Any, why: str) -> None:
-        self.choices.append({"what": what, "value": value, "why": why})
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON. Without a fit there is no degree."""
-        found = asdict(self)
-        if self.degree is None:
-            del found["degree"]
-        return found
-
-
-@dataclass(frozen=True)
-class EarlierViews:
-    """How an update changed the PSNR (dB) of the photos before it."""
-
-    photos: int
-    psnr_before: float | None
-    psnr_after: float | None
-    psnr_of_fits: list[float | None]
-    lost: float
-    bound: float
-    handed_on: str
-
-
-@dataclass(frozen=True)
-class NewViews:
-    """How an update changed the PSNR (dB) of its own photos. taken: whether the field was fitted to them."""
-
-    photos: int
-    taken: bool
-    psnr_before: float | None
-    psnr_after: float | None
-    views: list[dict[str, Any]]  # view, psnr_before, psnr_after
-
-
-@dataclass
-class UpdateReport(FitReport):
-    """What an update did, over all its fits."""
-
-    earlier_views: EarlierViews | None = None  # None without new photos
-    new_views: NewViews | None = None
+        """For JSON."""
+        return asdict(self)

@@ -27,10 +27,6 @@ class State:
         """Degree of the spherical harmonics."""
         return int(np.sqrt(self.values["colours"].shape[1])) - 1
 
-    def copy(self) -> "State":
-        """A deep copy."""
-        return State(*({k: v.copy() for k, v in part.items()} for part in vars(self).values()))
-
     def select(self, rows: Array) -> None:
         """Keep these rows (mask or indices), in that order."""
         for part in vars(self).values():
@@ -69,15 +65,7 @@ def from_field(field: GaussianField) -> State:
 
 def to_field(state: State, ground: int, keep: Bool[Array, "n"] | None = None) -> GaussianField:
     """The field of a state: its first `ground` Gaussians are discs of the ground; its uncertainty is 0."""
-    n = len(state)
-    values = state.values
-    field = GaussianField(
-        values["means"],
-        values["log_scales"],
-        values["quats"],
-        values["opacity_logits"],
-        values["colours"],
-        np.zeros(n, np.float32),
-        np.arange(n) < ground,
-    )
+    n, (means, log_scales, quats, logits, sh) = len(state), (state.values[name] for name in NAMES)
+    certain = np.zeros(n, np.float32)
+    field = GaussianField(means, log_scales, quats, logits, sh, certain, np.arange(n) < ground)
     return field if keep is None else field[keep]

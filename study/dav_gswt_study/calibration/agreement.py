@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.views.uncertainty.finite import require_finite
+from dav_gswt.views.uncertainty import require_finite
 
 LEAST = 0.1  # least unit of an interval's width, in mean expected errors
 

@@ -1,6 +1,7 @@
 """Two stages of scoring: what is scored in full, what it saves, and that the best are still the best."""
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -9,10 +10,8 @@ from fixtures import lpips_arrays
 from dav_gswt.prior.interface import Condition, DecodedViews
 from dav_gswt.prior.networks import SIZE, Network
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.views import prior_sampling
-from dav_gswt.views.prior_sampling import BATCH, PriorConfig
-from dav_gswt.views.uncertainty import staging
-from dav_gswt.views.uncertainty.staging import TOP, PriorTerms
+from dav_gswt.views import prior_sampling, terms
+from dav_gswt.views.prior_sampling import BATCH, TOP, PriorConfig
 
 N = 100
 NAMES = [f"p{i}" for i in range(N)]
@@ -21,11 +20,11 @@ ALL = np.ones((N, 32, 32), np.float32)  # every pixel counts
 
 def terms_of(w2, lpips=None):
     maps = np.broadcast_to(w2[:, None, None], (len(w2), 2, 2)).astype(np.float32)
-    return PriorTerms(w2, lpips, w2 / 2, maps)
+    return {"w2_sq": w2, "gradient": w2 / 2, "maps": maps} | ({} if lpips is None else {"lpips": lpips})
 
 
-def pick(terms, rows):
-    return PriorTerms(*(None if v is None else v[rows] for v in vars(terms).values()))
+def pick(found, rows):
+    return {name: values[rows] for name, values in found.items()}
 
 
 def made(noise=0.1, seed=0):
@@ -42,7 +41,7 @@ def run(full, cheap):
         asked.append(rows)
         return pick(full, rows)
 
-    found, done = staging.score_in_stages(len(full.w2_sq), lambda rows: pick(cheap, rows), fully)
+    found, done = prior_sampling.score_in_stages(len(full["w2_sq"]), lambda rows: pick(cheap, rows), fully)
     assert sorted(np.concatenate(asked)) == list(np.flatnonzero(done))  # none twice
     return found, done
 
@@ -56,20 +55,21 @@ def test_the_best_are_found_for_less_unless_cheap_scores_say_nothing():
     found, done = run(full, cheap)
     assert done.sum() < 0.5 * len(done)
     for name in ("w2_sq", "lpips"):
-        assert len(best(getattr(found, name)) & best(getattr(full, name))) >= 0.9 * TOP
+        assert len(best(found[name]) & best(full[name])) >= 0.9 * TOP
     found, done = run(full, made(seed=99)[1])
-    assert done.mean() > 0.9 and np.array_equal(found.w2_sq[done], full.w2_sq[done])
+    assert done.mean() > 0.9 and np.array_equal(found["w2_sq"][done], full["w2_sq"][done])
 
 
 def test_those_left_cheap_are_brought_to_the_level_of_the_others_maps_too_and_zeros_settle_at_once():
     full, cheap = made(noise=0.0)
     found, done = run(full, cheap)
     assert not done.all()
-    np.testing.assert_allclose(found.w2_sq, full.w2_sq, rtol=1e-12)
-    np.testing.assert_allclose(found.maps[:, 0, 0], full.w2_sq, rtol=1e-6)
+    for name in ("w2_sq", "lpips", "gradient"):
+        np.testing.assert_allclose(found[name], full[name], rtol=1e-12)
+    np.testing.assert_allclose(found["maps"][:, 0, 0], full["w2_sq"], rtol=1e-6)
     zero = terms_of(np.zeros(100))
     found, done = run(zero, zero)
-    assert done.sum() == TOP + staging.BATCH and not found.w2_sq.any()
+    assert done.sum() == TOP + prior_sampling.STAGE and not found["w2_sq"].any()
 
 
 class Counting:
@@ -104,15 +104,17 @@ def sampled(config, n=N, masks=ALL):
     return prior_sampling.sample_terms(config, condition(n), NAMES[:n], masks[:n])
 
 
-def test_sampling_in_stages_costs_less_and_says_how_much_and_few_poses_are_sampled_in_full_at_once(caplog):
+def test_sampling_in_stages_costs_less_and_says_how_much_and_few_poses_are_sampled_in_full_at_once(caplog, monkeypatch):
     whole, staged, few, n = Counting(), Counting(), Counting(), prior_sampling.FEW
     with caplog.at_level(logging.INFO):
-        full, steps = sampled(PriorConfig(whole, 2, 8, 0.1, staged=False))
         some, spent = sampled(PriorConfig(staged, 2, 8, 0.1))
+        monkeypatch.setattr(prior_sampling, "FEW", N)
+        full, steps = sampled(PriorConfig(whole, 2, 8, 0.1))
+        monkeypatch.undo()
     assert whole.evaluations == N * 2 * 8 and (steps == 8).all()
     assert staged.evaluations == N * 2 * 2 + (spent == 8).sum() * 2 * 8 < 0.7 * whole.evaluations
     assert "of 100 poses were sampled in full" in caplog.text
-    assert best(full.w2_sq) == best(some.w2_sq)
+    assert best(full["w2_sq"]) == best(some["w2_sq"])
     _, steps = sampled(PriorConfig(few, 2, 8, 0.1), n)
     assert few.evaluations == n * 2 * 8 and (steps == 8).all()
 
@@ -121,14 +123,15 @@ def test_what_does_not_look_at_the_ground_does_not_count():
     maps = np.arange(8, dtype=np.float32).reshape(2, 2, 2)
     counts = np.zeros((2, 4, 4), np.float32)
     counts[0, :2, :2] = counts[0, 3, 3] = 1  # a whole cell, and a quarter of another
-    np.testing.assert_allclose(prior_sampling.weighted_mean(maps, counts), [(0 * 1 + 3 * 0.25) / 1.25, 0])
+    np.testing.assert_allclose(terms.weighted_mean(maps, counts), [(0 * 1 + 3 * 0.25) / 1.25, 0])
 
 
 def test_without_dropout_the_one_sample_is_compared_with_the_render():
     alone = PriorConfig(Counting(), 2, 2, 0.0, weights=lpips_arrays.random())
-    assert (sampled(alone, 3)[0].single > 0).all()  # grey is not the black that the render shows
-    assert not sampled(alone, 3, 0 * ALL)[0].single.any()
-    assert sampled(PriorConfig(Counting(), 2, 2, 0.1), 3)[0].single is None
+    assert (sampled(alone, 3)[0]["single"] > 0).all()  # grey is not the black that the render shows
+    assert not sampled(alone, 3, 0 * ALL)[0]["single"].any()
+    assert "single" not in sampled(replace(alone, p_drop=0.1), 3)[0]
+    assert "single" not in sampled(replace(alone, independent_noise=True), 3)[0]
 
 
 def test_terms_do_not_depend_on_the_number_of_threads_which_pytorch_keeps(monkeypatch):
@@ -145,4 +148,4 @@ def test_terms_do_not_depend_on_the_number_of_threads_which_pytorch_keeps(monkey
         found.append(prior_sampling.sample_terms(config, seen, NAMES[:count], masks)[0])
         assert torch.get_num_threads() == before
     for name in ("w2_sq", "lpips", "gradient", "maps", "residual"):
-        np.testing.assert_array_equal(*(getattr(each, name) for each in found), err_msg=name)
+        np.testing.assert_array_equal(*(each[name] for each in found), err_msg=name)

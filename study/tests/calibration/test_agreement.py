@@ -1,0 +1,86 @@
+"""Agreement of scores with errors: ranks, sparsification, and conformal intervals."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import spearmanr
+
+from dav_gswt_study.calibration import agreement as un
+
+
+def test_spearman_is_scipys_and_none_where_a_rank_means_nothing():
+    rng = np.random.default_rng(0)
+    u, error = rng.normal(size=(2, 50)).round(1)
+    assert un.spearman(u, error) == pytest.approx(float(spearmanr(u, error).statistic))
+    assert un.spearman(u, np.exp(u)) == pytest.approx(1) and un.spearman(u, -u) == pytest.approx(-1)
+    assert un.spearman(u, np.ones(50)) is None and un.spearman(u[:1], error[:1]) is None
+    with pytest.raises(ValueError, match="not finite: the error"):
+        un.spearman(u, np.where(np.arange(50) == 4, np.nan, error))
+
+
+def test_ause_by_hand_at_the_extremes_and_of_nonsense():
+    error = np.array([1.0, 2.0, 3.0])
+    # left of all: 2; oracle leaves out 3, then 2: 1.5 and 1. A score the wrong way round: 2.5 and 3.
+    oracle, wrong = np.array([2, 1.5, 1]) / 2, np.array([2, 2.5, 3]) / 2
+    assert un.ause(-error, error) == pytest.approx(np.trapezoid(wrong - oracle, dx=1 / 3))
+    # a score that is constant: each sample counts with the mean error
+    assert un.ause(np.zeros(3), error) == pytest.approx(np.trapezoid(1 - oracle, dx=1 / 3))
+    u = np.arange(4.0)
+    assert un.ause(u, np.zeros(4)) == 0 and un.ause(u[:1], np.ones(1)) == 0
+    assert un.ause(u, u[::-1] * 1e307) == pytest.approx(un.ause(u, u[::-1]))
+    for bad in (np.zeros(0), -np.ones(4)):
+        with pytest.raises(ValueError, match="sparsification needs"):
+            un.ause(u[: len(bad)], bad)
+
+
+def test_ause_is_0_for_the_oracle_never_less_and_blind_to_order_and_units():
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        u, error = rng.integers(0, 6, 30).astype(float), rng.uniform(0, 9, 30)
+        value, order = un.ause(u, error), rng.permutation(30)
+        assert un.ause(error, error) == 0 and value >= -1e-9
+        assert un.ause(u[order], error[order]) == pytest.approx(value, abs=1e-9)
+        assert un.ause(np.exp(u), 1e-3 * error) == pytest.approx(value, abs=1e-6)
+
+
+@pytest.mark.parametrize("n, level", [(1, 0.5), (9, 0.9), (10, 0.7), (19, 0.95), (50, 0.9)])
+def test_the_conformal_quantile_covers_exactly_its_rank_of_exchangeable_samples(n, level):
+    """Each of n + 1 samples in turn is the new one: all turns are equally probable, so their share is the coverage."""
+    values = np.random.default_rng(n).normal(size=n + 1)
+    covered = sum(v <= un.conformal_quantile(np.delete(values, i), level) for i, v in enumerate(values))
+    rank = math.ceil(round((n + 1) * level, 9))
+    assert covered == min(rank, n + 1) and covered >= level * (n + 1) - 1e-9
+
+
+def test_too_few_samples_for_a_level_give_no_bound_and_a_level_is_a_probability():
+    assert un.conformal_quantile(np.arange(8.0), 0.9) == np.inf and un.conformal_quantile(np.arange(9.0), 0.9) == 8
+    for level in (0.0, 1.0, math.nan):
+        with pytest.raises(ValueError, match="level of an interval"):
+            un.conformal_quantile(np.arange(9.0), level)
+
+
+@pytest.mark.parametrize("informative", [True, False], ids=["u tells the error", "u tells nothing"])
+def test_intervals_hold_their_level_on_held_out_samples_whatever_u_is_worth(informative):
+    rng, covered, widths = np.random.default_rng(0), [], []
+    for _ in range(100):
+        u = rng.uniform(0, 1, 240)
+        error = np.abs(rng.normal(0, 0.05 + u)) if informative else rng.exponential(1, 240)
+        intervals = un.calibrate_intervals(u[:199], error[:199], rng, 0.9)
+        low, high = intervals.bounds(u[199:])
+        covered.append(((low <= error[199:]) & (error[199:] <= high)).mean())
+        widths.append(np.corrcoef(u[199:], high)[0, 1] if informative else 0)
+        assert (low >= 0).all() and (high >= low).all()
+    # 100 calibrate: expected coverage ceil(101 x 0.9) / 101 = 0.901; its standard error over 100 trials is 0.006
+    assert np.mean(covered) == pytest.approx(91 / 101, abs=0.02)
+    assert not informative or np.mean(widths) > 0.8  # intervals widen with u where errors do
+
+
+def test_intervals_of_errors_that_are_all_0_and_of_few_samples():
+    rng = np.random.default_rng(0)
+    low, high = un.calibrate_intervals(np.arange(60.0), np.zeros(60), rng).bounds(np.array([3.0, 1e9]))
+    assert (low == 0).all() and (high == 0).all()
+    low, high = un.calibrate_intervals(np.arange(6.0), np.ones(6), rng).bounds(np.array([3.0]))
+    assert low[0] == 0 and high[0] == np.inf
+    with pytest.raises(ValueError, match="at least 2 samples"):
+        un.calibrate_intervals(np.zeros(1), np.zeros(1), rng)

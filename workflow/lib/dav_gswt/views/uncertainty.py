@@ -1,0 +1,218 @@
+"""Uncertainty of views from samples of a prior: the terms' formulas, how terms are combined, and gamma.
+
+Each term is divided by a scale that the first round fixes. Only raw terms are stored; lam enters when poses are
+selected, so that a sweep over lam shares the scoring.
+"""
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Float64
+from numpy import ndarray as Array
+from scipy.special import expit
+
+_log = logging.getLogger(__name__)
+
+NAMED = 5  # poses named in a message
+LUMINANCE = 0.2126, 0.7152, 0.0722  # of Rec. 709's red, green and blue
+
+
+def reject_poses(bad: Bool[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
+    """Raises: ValueError: any pose is bad; the message names the poses, or their indices without names."""
+    if bad.any():
+        raise ValueError(f"{what} of pose {format_names(bad, names)}")
+
+
+def format_names(bad: Bool[Array, "n"], names: Sequence[str] | None = None) -> str:
+    """Format the first bad poses by name, or by index without names, and the number of others."""
+    found = [names[i] if names is not None else str(i) for i in np.flatnonzero(bad).tolist()]
+    more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
+    return ", ".join(found[:NAMED]) + more
+
+
+def require_finite(values: Float[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
+    """Raises: ValueError: a value that is NaN or infinite, naming the poses."""
+    reject_poses(~np.isfinite(values), f"not finite: {what}", names)
+
+
+def w2_sq(
+    means: Float32[Array, "n m c h w"],
+    variances: Float32[Array, "n m c h w"] | None = None,
+    names: Sequence[str] | None = None,
+) -> tuple[Float64[Array, "n"], Float32[Array, "n h w"]]:
+    """Mean squared 2-Wasserstein distance between the pairs of m latent samples: of each pose, and of each pixel.
+
+    A latent is a diagonal Gaussian a pixel, so the distance of a pair is |mu_i - mu_j|^2 + |s_i - s_j|^2 with the
+    standard deviations s. Its mean over all pairs is 2 var(ddof=1) of mu and of s, summed over channels: O(m), and no
+    difference of large squares. Samples are taken relative to the first one, so a common shift costs no digits.
+
+    Args:   variances: of each latent; None: each is a point (deviations 0). names: of the poses, for errors.
+    Returns: the mean over pixels, and the map, both in squared latent units; exactly 0 where all samples agree.
+    Raises: ValueError: m < 2 (no pair), a value that is not finite or whose square is not, a variance below 0, naming
+            the poses.
+    Source: DAV-GSWT, Eq. (w2_pixel), in a form that float32 holds.
+    """
+    if (m := means.shape[1]) < 2:
+        raise ValueError(f"disagreement needs at least 2 samples of a pose, not {m}: one has no pair")
+    with np.errstate(over="ignore", invalid="ignore"):  # rejected below
+        maps = _twice_the_variance(means)
+        if variances is not None:
+            reject_poses(np.any(variances < 0, axis=(1, 2, 3, 4)), "variance below 0", names)
+            maps = maps + _twice_the_variance(np.sqrt(variances, dtype=np.float64))
+        scores = maps.mean((1, 2), dtype=np.float64)
+    require_finite(scores, "the latents, or their squared distance,", names)
+    return scores, maps.astype(np.float32)
+
+
+def _twice_the_variance(samples: Float[Array, "b m c h w"]) -> Float[Array, "b h w"]:
+    """2 var(ddof=1) over m, summed over channels: the mean of |x_i - x_j|^2 over the pairs."""
+    apart = samples - samples[:, :1]  # exact for near values, and exactly 0 for equal ones
+    apart -= apart.mean(1, keepdims=True)
+    return np.einsum("bmchw,bmchw->bhw", apart, apart) * samples.dtype.type(2 / (samples.shape[1] - 1))
+
+
+def image_gradient(pictures: Float32[Array, "n m h w 3"], names: Sequence[str] | None = None) -> Float64[Array, "n"]:
+    """Mean over pixels of the gradient's 2-norm, of the mean of the m pictures decoded at each pose; per pixel step.
+
+    Returns: 0 for a constant picture; a times as much for pictures times a.
+    Raises: ValueError: no picture, a side under 2 pixels, a value that is not finite, naming the poses.
+    Source: DAV-GSWT, Eq. (uncert_img), its first term.
+    """
+    _, m, h, w, _ = pictures.shape
+    if m < 1 or min(h, w) < 2:
+        raise ValueError(f"a gradient needs at least one picture of 2 x 2 pixels, not {m} of {w} x {h}")
+    with np.errstate(invalid="ignore"):  # rejected below
+        found = gradient_map(pictures.mean(1, dtype=np.float64) @ np.array(LUMINANCE)).mean((1, 2))
+    require_finite(found, "the decoded pictures", names)
+    return found
+
+
+def gradient_map(values: Float64[Array, "n h w"]) -> Float64[Array, "n h w"]:
+    """Norm of the gradient by the Sobel operator over 8, with reflection at the border."""
+    from scipy.ndimage import correlate1d  # deferred: the workflow reads this module before any job
+
+    slopes = []
+    for along, across in ((2, 1), (1, 2)):
+        difference = correlate1d(values, [-1, 0, 1], along, mode="mirror")
+        slopes.append(correlate1d(difference, [1 / 8, 2 / 8, 1 / 8], across, mode="mirror"))
+    return np.hypot(*slopes)
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Divisor of each term of a scene, fixed in the first round. 0: the term was 0 everywhere, and has no weight."""
+
+    by_term: dict[str, float]
+
+    def __post_init__(self):
+        if bad := [name for name, scale in self.by_term.items() if not 0 <= scale < np.inf]:
+            raise ValueError(f"the scale of {', '.join(bad)} is not a number of at least 0")
+
+    @staticmethod
+    def from_terms(terms: Mapping[str, Float[Array, "n"]], names: Sequence[str] | None = None) -> "Scales":
+        """Compute robust scales of the terms of all candidates. A term that is 0 everywhere is logged.
+
+        Raises: ValueError: a value that is not finite, naming the poses.
+        """
+        for name, values in terms.items():
+            require_finite(values, name, names)
+        scales = Scales({name: robust_scale(values) for name, values in terms.items()})
+        for name in (n for n, scale in scales.by_term.items() if scale == 0):
+            _log.warning("%s is 0 at every candidate: the term has no weight", name)
+        return scales
+
+
+@dataclass(frozen=True)
+class Quantiles:
+    """Uncertainties that are mapped to 0 and 1, fixed in the first round."""
+
+    low: float
+    high: float
+
+    def __post_init__(self):
+        if not self.low <= self.high:
+            raise ValueError(f"the low quantile {self.low} is not below the high one {self.high}")
+
+    @staticmethod
+    def from_values(u: Float[Array, "n"], low: float = 0.05, high: float = 0.95) -> "Quantiles":
+        """Quantiles of all candidates' uncertainties. Raises: ValueError: no value, or one that is not finite."""
+        if not len(u):
+            raise ValueError("quantiles need at least one value")
+        require_finite(u, "the uncertainty")
+        return Quantiles(*(float(q) for q in np.quantile(u.astype(np.float64), [low, high])))
+
+
+def robust_scale(values: Float[Array, "n"]) -> float:
+    """Median absolute value of the values that are not 0; 0 if all are.
+
+    Zeros are excluded since a term can be exactly 0 at most poses, where all samples agree.
+    """
+    size = np.abs(values.astype(np.float64))
+    return float(np.median(size[size > 0])) if (size > 0).any() else 0.0
+
+
+def combine_terms(
+    first: Float[Array, "n"],
+    lpips: Float[Array, "n"] | None,
+    lam: float,
+    scales: Scales,
+    names: Sequence[str] | None = None,
+    name: str = "w2_sq",
+) -> Float64[Array, "n"]:
+    """u = W2² + lam LPIPS, each over its frozen scale (`w2_sq`, `lpips`). lpips: None where its weights are missing.
+
+    lam = 0 ranks by W2, a large lam by LPIPS; the units of the latent space do not matter. Without LPIPS its term is
+    left out, with a warning if lam > 0. name: `gradient` for u_img, an ablation, with the picture's gradient in place
+    of W2; the appendix's aggregate of both is their sum.
+    Raises: ValueError: lam below 0 or not finite; a term without scale; a value that is not finite, naming the poses.
+    Source: DAV-GSWT, Eq. (uncert_latent), Eq. (uncert_img).
+    """
+    if not 0 <= lam < np.inf:
+        raise ValueError(f"lam must be a number of at least 0, not {lam}")
+    total = _divide_by_scale(name, first, scales, names)
+    if lpips is not None:
+        return total + lam * _divide_by_scale("lpips", lpips, scales, names)
+    if lam > 0:
+        _log.warning(
+            "the scores lack LPIPS, its term is left out: the uncertainty is %s alone; "
+            "set the config's `lpips` to `installed` or to a path (docs/reference/config.md)",
+            name,
+        )
+    return total
+
+
+def _divide_by_scale(name: str, values: Float[Array, "n"], scales: Scales, names) -> Float64[Array, "n"]:
+    if name not in scales.by_term:
+        raise ValueError(f"{name} has no frozen scale")
+    require_finite(values, name, names)
+    scale = scales.by_term[name]
+    return values.astype(np.float64) / scale if scale > 0 else np.zeros(len(values))
+
+
+def normalise(
+    u: Float[Array, "..."], quantiles: Quantiles, names: Sequence[str] | None = None
+) -> Float32[Array, "..."]:
+    """Map u linearly to [0, 1], 0 at the low quantile and below, 1 at the high one and above.
+
+    If both quantiles are equal, values above them become 1, the others 0.
+    Raises: ValueError: a value that is not finite, naming the poses (the first axis).
+    """
+    finite = np.isfinite(u).reshape(u.shape[0] if u.ndim else 1, -1)
+    reject_poses(~np.all(finite, axis=1), "not finite: the uncertainty", names)
+    wide = u.astype(np.float64)
+    span = quantiles.high - quantiles.low
+    share = (wide - quantiles.low) / span if span > 0 else wide > quantiles.high
+    return np.clip(share, 0, 1).astype(np.float32)
+
+
+def gamma(u: Float[Array, "..."], slope: float = 2.0) -> Float[Array, "..."]:
+    """Weight of colour against semantics in a seam: 1 - sigmoid(slope (u - 1/2)), which is expit(1 - 2 u) as printed.
+
+    u: normalised to [0, 1]. 1/2 at u = 1/2 and gamma(u) + gamma(1 - u) = 1 for every slope; finite for every u.
+    Raises: ValueError: u is NaN. Source: DAV-GSWT, Eq. (gamma), slope 2.
+    """
+    if np.isnan(u).any():
+        raise ValueError("gamma of an uncertainty that is not a number")
+    return expit(u.dtype.type(slope) * (u.dtype.type(0.5) - u))
