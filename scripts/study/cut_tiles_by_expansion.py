@@ -18,6 +18,4 @@ with logging_to(snakemake.log[0]):
     tiles = expansion.cut_by_expansion(made, options, build.make_generator(snakemake.params.seed, tiling))
     inputs = {f"level{number}": Path(paths.levels, f"level{number}.ply") for number in range(len(made.fields))}
     inputs |= {name: paths[name] for name in ("lpips", "sam2") if paths.get(name)}
-    store.write_tiles(
-        [tiles], snakemake.output.tiles, snakemake.output.seams, record_provenance(inputs, dict(tiling))
-    )
+    store.write_tiles([tiles], snakemake.output.tiles, snakemake.output.seams, record_provenance(inputs, dict(tiling)))
