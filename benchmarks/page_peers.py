@@ -31,9 +31,8 @@ from dav_gswt.study.terrain.browser import FLAGS, chromium_path, served
 from dav_gswt.study.terrain.frames import VISIT
 from dav_gswt.terrain import endless, stills, visibility
 from dav_gswt.terrain.backdrop import Backdrop
-from dav_gswt.terrain.object_placement import group_by_cell
 from dav_gswt.terrain.page import write_page
-from dav_gswt.terrain.placement import place_cell
+from dav_gswt.terrain.placement import group_by_cell, place_cell
 
 GPU = "--gpu" in sys.argv
 GPU_FLAGS = [  # Chromium's way to a graphics card without a screen

@@ -4,11 +4,11 @@ from pathlib import Path
 
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
-from dav_gswt.terrain import heights, page, page_front, page_story
+from dav_gswt.terrain import heights, page, page_story
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     surface = heights.surface_from_config(params.heights, read_json(given.manifest)["tile_side"])
-    front = page_front.front_of_scene(snakemake.wildcards.scene, page_story.tell_story(given), given.still)
+    front = page.front_of_scene(snakemake.wildcards.scene, page_story.tell_story(given), given.still)
     viewer = page.find_viewer(given.viewer)
     page.write_page(Path(given.manifest).parent, viewer, snakemake.output.page, surface, params.classes, front)

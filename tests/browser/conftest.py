@@ -11,8 +11,7 @@ from fixtures.page_visit import VIEWER, Visit
 from dav_gswt.files import read_json, write_json
 from dav_gswt.images.jpeg import encode_jpeg
 from dav_gswt.study.terrain.browser import served
-from dav_gswt.terrain.page import write_page
-from dav_gswt.terrain.page_front import Front
+from dav_gswt.terrain.page import Front, write_page
 
 
 @pytest.fixture(scope="session")

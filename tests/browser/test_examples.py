@@ -26,7 +26,7 @@ from dav_gswt.images.metrics import psnr
 from dav_gswt.raster import render
 from dav_gswt.study.terrain import exits
 from dav_gswt.terrain import stills
-from dav_gswt.terrain.finished import terrain_from_page
+from dav_gswt.terrain.endless import terrain_from_page
 from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page
 

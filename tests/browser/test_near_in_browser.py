@@ -6,8 +6,7 @@ import pytest
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.terrain import splats
-from dav_gswt.terrain.displacement import displace_means
-from dav_gswt.terrain.heights import surface_from_config
+from dav_gswt.terrain.heights import displace_means, surface_from_config
 
 SIDE, COUNT, NEAR = 4.0, 1000, 0.05
 DEVIATIONS = np.geomspace(0.005, 0.5, 16)

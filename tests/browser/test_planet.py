@@ -14,7 +14,7 @@ from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain import endless, stills
-from dav_gswt.terrain.sphere import make_sphere
+from dav_gswt.terrain.heights import make_sphere
 
 GROUND = Ground(levels=3, speckle=40, things=4)
 SMALL, LARGE = 6.0, 1e7  # radii in tile sides

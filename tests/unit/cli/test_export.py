@@ -14,9 +14,8 @@ from dav_gswt.config.exports import Export
 from dav_gswt.export import terrain_files
 from dav_gswt.field import read_field
 from dav_gswt.terrain import endless
-from dav_gswt.terrain.heights import Hills
+from dav_gswt.terrain.heights import Hills, make_sphere
 from dav_gswt.terrain.page import write_page
-from dav_gswt.terrain.sphere import make_sphere
 from dav_gswt.tiles.store import write_material_tiles
 
 HILLS = Hills(2.0, 30.0, 3, 5)

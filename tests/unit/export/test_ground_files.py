@@ -22,7 +22,7 @@ from dav_gswt.images import image_files
 from dav_gswt.raster import render
 from dav_gswt.terrain import endless, finite
 from dav_gswt.terrain.finite import Area
-from dav_gswt.terrain.sphere import make_sphere
+from dav_gswt.terrain.heights import make_sphere
 
 PLACE = Georeference(47.1, 11.3, 600.0, 20.0, metres_per_unit=1.0)
 AREA = Area(0, -1, 6, 5)

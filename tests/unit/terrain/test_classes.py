@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dav_gswt.terrain.painted import Painted, paint_lead
 from fixtures.land_covers import SIDE, gaussians, two_classes
 
 from dav_gswt.bundle.land_cover import ClassesEntry, ImageTerm, RangeTerm, find_run_fault
 from dav_gswt.files import parse_record
 from dav_gswt.terrain.classes import LATTICE, Classes
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills
-from dav_gswt.terrain.painted import Painted, paint_lead
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "classes.json").read_text())["terrains"]
 

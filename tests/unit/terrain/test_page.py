@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dav_gswt.terrain.page_front import Front, fill_front, front_of_scene
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
@@ -14,7 +15,6 @@ from dav_gswt.photos.taken_photos import TakenPhoto
 from dav_gswt.terrain import page, page_front, page_story
 from dav_gswt.terrain.heights import HeightMap
 from dav_gswt.terrain.page import write_page
-from dav_gswt.terrain.page_front import Front, fill_front, front_of_scene
 from dav_gswt.terrain.page_story import Story, tell_story
 from dav_gswt.terrain.sphere import make_sphere
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dav_gswt.terrain.ground_mapping import camera_on
+from dav_gswt.terrain.sphere_edges import is_covered
 from fixtures.terrains import two_level_terrain
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,9 +15,7 @@ from hypothesis import strategies as st
 from dav_gswt.errors import InputError
 from dav_gswt.terrain import sphere, sphere_cells, sphere_edges
 from dav_gswt.terrain.choice import tiles_at
-from dav_gswt.terrain.ground_mapping import camera_on
 from dav_gswt.terrain.sphere import EAST, FACES, NORTH, SOUTH, WEST, Sphere, bend, directions, make_sphere
-from dav_gswt.terrain.sphere_edges import is_covered
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "sphere.json").read_text())
 ORDERS = GOLDEN["orders"]

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dav_gswt.terrain.ground_mapping import camera_on, mapping_of
+from dav_gswt.terrain.sphere_placement import place_on_sphere
 from fixtures.terrains import MAGENTA, SIDE, SKY, two_level_terrain
 
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.errors import InputError
 from dav_gswt.terrain import finite, stills
 from dav_gswt.terrain.backdrop import Backdrop
-from dav_gswt.terrain.ground_mapping import camera_on, mapping_of
 from dav_gswt.terrain.sphere import frame_at, make_sphere
-from dav_gswt.terrain.sphere_placement import place_on_sphere
 
 PINK = Sky(MAGENTA, MAGENTA)
 

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from dav_gswt.terrain.weights import crossfade_opacity, finer_share, level_weights
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "weights.json").read_text())

@@ -10,7 +10,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.materials import build as materials
 from dav_gswt.materials import store as material_store
-from dav_gswt.terrain import fit_classes, fit_scatter
+from dav_gswt.terrain import fit_cover
 from dav_gswt.terrain.fit_cover import gather_content
 from dav_gswt.tiles import build, store
 from dav_gswt.tiles.build import TilingOptions
@@ -72,8 +72,8 @@ def test_tiles_of_several_materials_are_written_and_read(tiles, tmp_path):
 
 def test_a_bundle_is_made_of_tiles_materials_and_objects(found, tiles, tmp_path, monkeypatch):
     for name, few in (("SAMPLES", 4000), ("LINES", 8), ("PASSES", 1), ("WINDOWS", 1)):
-        monkeypatch.setattr(fit_classes, name, few)
-    monkeypatch.setattr(fit_scatter, "WANTED", 30.0)
+        monkeypatch.setattr(fit_cover, name, few)
+    monkeypatch.setattr(fit_cover, "WANTED", 30.0)
     material_store.write_materials(found, tmp_path / "materials", {})
     content = gather_content(tiles, tmp_path / "materials", 7)
     assert [each.name for each in content.materials] == ["material0", "material1"]

@@ -101,7 +101,7 @@ def find_terrain(path: Path) -> Path:
 def _export(options: argparse.Namespace, settings: dict[str, Any], ground: bool) -> None:
     from dav_gswt.bundle import store  # below the options: they load what is slow to load
     from dav_gswt.export import ground_files, terrain_files
-    from dav_gswt.terrain.finished import terrain_from_page
+    from dav_gswt.terrain.endless import terrain_from_page
 
     source = find_terrain(options.path)
     wanted = ["terrain"] * bool(settings["formats"]) + ["ground"] * ground

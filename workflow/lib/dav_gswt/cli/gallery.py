@@ -8,7 +8,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.logs import describe_os_error
 from dav_gswt.paths import RESULTS
 from dav_gswt.terrain.gallery import write_gallery
-from dav_gswt.terrain.page_front import FRONT
+from dav_gswt.terrain.page import FRONT
 
 TEMPLATES = Path("workflow/gallery")
 

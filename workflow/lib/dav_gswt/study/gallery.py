@@ -18,7 +18,7 @@ from dav_gswt.study.cover import crop_and_shrink
 from dav_gswt.study.markdown import format_number, format_table
 from dav_gswt.study.sweeps.tables import MEGA
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.page_front import name_of_scene
+from dav_gswt.terrain.page import name_of_scene
 
 HEIGHT, GAP = 300, 4  # pixels: of a row of pictures, and between two of them
 ASPECTS = (4 / 3, 1.0, 16 / 9)  # of a photo, the terrain from above, what a walker sees

@@ -1,4 +1,4 @@
-"""Backdrop of the terrain: sky, far ground, and the transition of the last tiles into it."""
+"""Backdrop of the terrain: sky, far ground, and the transition of the last tiles into it; on a plane and a planet."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,10 +9,15 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.field import GaussianField, rgb_to_sh
+from dav_gswt.terrain.choice import Vector
+from dav_gswt.terrain.draw_order import finer_share
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.weights import finer_share
+from dav_gswt.terrain.heights import Sphere
 
 FADE = 0.5  # share of the reach at which the transition begins
+CLIMB = 3.0  # times the reach on the ground by which the reach grows with the eye's height over a planet, at most
+AIR = 0.12  # height at which the sky of a planet is 1/e as bright, as a share of its radius
+NO_END = 1e30  # distance of the last tiles where they reach the horizon
 
 
 @dataclass(frozen=True)
@@ -34,12 +39,14 @@ class Backdrop:
         return FADE * self.end
 
     @staticmethod
-    def for_eye(
-        terrain: EndlessTerrain, eye: Float[Array, "3"], sky: Sky, ground_colour: Sequence[float] | Array
-    ) -> "Backdrop":
+    def for_eye(terrain: EndlessTerrain, eye: Vector, sky: Sky, ground_colour: Sequence[float] | Array) -> "Backdrop":
+        """The backdrop that an eye sees behind a terrain."""
+        colours = [np.asarray(c, np.float32) for c in (sky.zenith, sky.horizon, ground_colour)]
+        if isinstance(sphere := terrain.heights, Sphere):
+            end, low, dip = find_end(sphere.radius, float(np.linalg.norm(eye)), find_reach(terrain, sphere, eye))
+            return SphereBackdrop(*colours, end, low, eye, dip, sphere.radius)
         end = terrain.reach * terrain.side
-        zenith, horizon, ground = (np.asarray(c, np.float32) for c in (sky.zenith, sky.horizon, ground_colour))
-        return Backdrop(zenith, horizon, ground, end, (eye[2] - terrain.heights.low) / end)
+        return Backdrop(*colours, end, (eye[2] - terrain.heights.low) / end)
 
     def colours_along(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
         """Colours in directions of any length."""
@@ -61,3 +68,54 @@ class Backdrop:
         sh = field.sh.copy()
         sh[:, 0] += share[:, None].astype(np.float32) * (rgb_to_sh(self.colours_along(to))[:, 0] - sh[:, 0])
         return replace(field, sh=sh)
+
+
+@dataclass(frozen=True)
+class SphereBackdrop(Backdrop):
+    """Sky that thins out with height, and the horizon of a planet.
+
+    eye: from the planet's middle. dip: sine of the angle of the horizon below the level. radius: of the ground.
+    """
+
+    eye: Vector
+    dip: float
+    radius: float
+
+    @property
+    def begin(self) -> float:
+        """Half-way from the ground below to the last tiles."""
+        return 0.5 * (max(float(np.linalg.norm(self.eye)) - self.radius, 0.0) + self.end)
+
+    def colours_along(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
+        way = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+        far = np.linalg.norm(self.eye)
+        rise = (way @ (self.eye / far))[..., None]
+        above = rise + self.dip
+        # closest to the ground a ray comes: at the eye if it goes up
+        passing = np.where(rise > 0, far, far * np.sqrt(np.maximum(1 - rise * rise, 0))) - self.radius
+        air, here = (np.exp(-((np.maximum(h, 0) / (AIR * self.radius)) ** 2)) for h in (passing, far - self.radius))
+        share = np.clip(above / (1 + self.dip), 0, 1) ** 0.5
+        sky = air * (self.horizon + (self.zenith - self.horizon) * share)
+        haze = here * np.exp(np.minimum(above, 0) / (0.3 * self.low))
+        below = self.ground + (self.horizon - self.ground) * haze
+        return np.where(above > 0, sky, below).astype(np.float32)
+
+
+def find_reach(terrain: EndlessTerrain, sphere: Sphere, eye: Vector) -> float:
+    """Distance to the last tiles of a planet: longer from above, where more of the ground is in view."""
+    reach = terrain.reach * terrain.side
+    return reach + min(max(float(np.linalg.norm(eye)) - sphere.radius, 0.0), CLIMB * reach)
+
+
+def find_end(radius: float, far: float, reach: float) -> tuple[float, float, float]:
+    """Distance at which the last tiles are blended into the backdrop, sine of the angle there below the horizon (at
+    least 1e-4), and that of the horizon below the level.
+
+    Args:   far: distance of the eye from the planet's middle.
+    """
+    height = max(far - radius, 0.0)
+    square = height * (2 * radius + height)  # of the distance to the horizon
+    dip = float(np.sqrt(square)) / far
+    if reach * reach >= square:
+        return NO_END, 1e-4, dip
+    return reach, max((square + reach * reach) / (2 * far * reach) - dip, 1e-4), dip

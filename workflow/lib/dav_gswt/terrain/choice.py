@@ -4,8 +4,10 @@ The viewer's `terrain/choice.js` computes the same integers; tests/golden/tile_c
 """
 
 import numpy as np
-from jaxtyping import Int64
+from jaxtyping import Float, Int64
 from numpy import ndarray as Array
+
+Ints, Floats, Vector = Int64[Array, "n"], Float[Array, "n"], Float[Array, "3"]
 
 WEST, SOUTH, CENTRE = 0, 1, 2  # axis of a hash: colour of the west edge, of the south edge, centre variant
 
@@ -36,23 +38,8 @@ def _low_word(h):
 
 
 def tile_at(i: int, j: int, salt: int, variants: int) -> int:
-    """Number of the tile in cell (i, j): T = 16 c + 8 W + 4 N + 2 E + S.
-
-    A cell's east edge is its neighbour's west edge, its north edge the south edge of the cell above, so each edge has
-    one colour. `variants` is C >= 1, the number of centres; T is in [0, 16 C).
-
-    Equal neighbours are the most visible repetition. With two centres or more, a cell with odd i + j therefore takes
-    the next centre that differs from its four neighbours; these are even and take the centre of the hash, so no choice
-    depends on another. Where the neighbours use every centre, the centre of the hash is kept.
-    """
-    return int(_choose_tile(int(i), int(j), salt, variants))
-
-
-def tiles_at(
-    i: Int64[Array, "*cells"], j: Int64[Array, "*cells"], salt: int, variants: int, period: int = 0
-) -> Int64[Array, "*cells"]:
-    """`tile_at` of many cells. period: (i + period, j + period) is the same cell as (i, j); 0: none."""
-    return _choose_tile(i, j, salt, variants, period)
+    """Number of the tile in one cell; see `tiles_at`."""
+    return int(tiles_at(np.array([i]), np.array([j]), salt, variants)[0])
 
 
 def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants: int) -> Int64[Array, "h w"]:
@@ -62,7 +49,20 @@ def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants:
     return tiles_at(i, j, salt, variants)
 
 
-def _choose_tile(i, j, salt: int, variants: int, period: int = 0):
+def tiles_at(
+    i: Int64[Array, "*cells"], j: Int64[Array, "*cells"], salt: int, variants: int, period: int = 0
+) -> Int64[Array, "*cells"]:
+    """Numbers of the tiles in cells: T = 16 c + 8 W + 4 N + 2 E + S.
+
+    A cell's east edge is its neighbour's west edge, its north edge the south edge of the cell above, so each edge has
+    one colour. `variants` is C >= 1, the number of centres; T is in [0, 16 C).
+
+    Equal neighbours are the most visible repetition. With two centres or more, a cell with odd i + j therefore takes
+    the next centre that differs from its four neighbours; these are even and take the centre of the hash, so no choice
+    depends on another. Where the neighbours use every centre, the centre of the hash is kept.
+
+    Args:   period: (i + period, j + period) is the same cell as (i, j); 0: none.
+    """
     edges, centre = _hash_edges(i, j, salt, period), _hash_centre(i, j, salt, variants, period)
     taken = 0  # a bit for each centre that a neighbour with the same edges has
     for east, north in ((1, 0), (-1, 0), (0, 1), (0, -1)):

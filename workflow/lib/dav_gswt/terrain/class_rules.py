@@ -3,30 +3,52 @@
 import hashlib
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any, TypeVar
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, TypeVar
 
 import numpy as np
-from jaxtyping import UInt8
-from numpy import ndarray as Array
+from scipy.spatial import cKDTree
 
-from dav_gswt.bundle.land_cover import ImageTerm, NoiseTerm, RangeTerm
+from dav_gswt.bundle.land_cover import ImageTerm, NoiseTerm, ObjectOrders, RangeTerm, find_run_fault
 from dav_gswt.bundle.manifest import TileSetInfo
 from dav_gswt.errors import InputError
-from dav_gswt.files import locate_path
+from dav_gswt.files import locate_path, read_record
 from dav_gswt.images import image_files
-from dav_gswt.terrain.classes import LATTICE, Classes
-from dav_gswt.terrain.paint_file import PaintFile, read_paint, scale_objects
+from dav_gswt.terrain.classes import LATTICE, Classes, Picture
 
 _log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=TileSetInfo)
-Picture = UInt8[Array, "rows columns"]
 NOISE = ({"kind": "noise", "weight": 1.0},)  # the config's default: the noise of the bundle alone
 WINDOW, SAMPLES = 64, 20_000  # tiles from the origin, and places there, in which a material is looked for
 MAX_SIDE = 4096  # pixels along a side of a picture of materials
 NEAR = 60.0  # of 255: largest distance of a pixel's colour from that of its material
 UNKNOWN = 255  # a pixel of no material
+MAX_BYTES = 2**24  # of a painted file
+MAX_DENSITY, MAX_OFFSET = 3.0, 8.0
+MAX_CANDIDATES = 512  # objects on a tile that the page draws
+REMEDY = "save it on the page again"
+
+
+@dataclass(frozen=True)
+class PaintFile:
+    """What a person painted and set.
+
+    Attributes:
+        format, version: of the file.
+        materials: names, by the numbers of the runs.
+        runs: [I, J, length, material] of painted points of the lattice of scores, from (I, J) to the east.
+        densities: by name of an object, how many times as densely it stands; 1 where it is not named.
+        offsets: by name of a material, what is added to the biases of the rule's noise; 0 where it is not named.
+    """
+
+    format: Literal["davgswt-paint"]
+    version: Literal[1]
+    materials: list[str]
+    runs: list[list[int]]
+    densities: dict[str, float] = field(default_factory=dict)
+    offsets: dict[str, float] = field(default_factory=dict)
 
 
 def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, dict[str, Picture]]:
@@ -35,7 +57,7 @@ def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, dict[str
     A bundle of one material has no classes: the rule changes nothing, which a warning says; densities of objects that
     were set on the page count nevertheless.
     Raises: InputError: a material that is not there, a picture that cannot be read, is too large or shows none of the
-        materials; two painted files, or nothing but one; see also `paint_file.read_paint`.
+        materials; two painted files, or nothing but one; see also `read_paint`.
     """
     names = {material.name: number for number, material in enumerate(manifest.materials)}
     manifest, paint = _read_painted(manifest, rule)
@@ -113,30 +135,56 @@ def _read_picture(entry: dict[str, Any], names: Mapping[str, int], file: str) ->
     columns, rows = image_files.read_size(path)
     if max(rows, columns) > MAX_SIDE:
         raise InputError(f"{path}: {columns} x {rows} pixels; at most {MAX_SIDE} a side: shrink the picture")
-    image = image_files.read_photo(path)
-    rows, columns = image.shape[:2]  # upright
     numbers = [_find_material(name, names) for name in entry["colours"]]
     colours = np.array([[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in entry["colours"].values()], float)
-    pixels = np.full((rows, columns), UNKNOWN, np.uint8)
-    for row in range(rows):  # row by row, so that distances to all colours take little memory
-        away = np.linalg.norm(255.0 * image[row, :, None, :3] - colours, axis=-1)
-        known = away.min(1) <= NEAR
-        pixels[row, known] = np.array(numbers, np.uint8)[away.argmin(1)[known]]
+    image = 255.0 * image_files.read_photo(path)[..., :3]
+    _, nearest = cKDTree(colours).query(image, distance_upper_bound=np.nextafter(NEAR, 256))
+    pixels = np.array([*numbers, UNKNOWN], np.uint8)[nearest]  # the last where no colour is near
+    rows, columns = pixels.shape  # upright
     unknown = float((pixels == UNKNOWN).mean())
     if unknown == 1:
         raise InputError(f"{path}: no pixel has the colour of a material ({', '.join(entry['colours'].values())})")
     if unknown:
         _log.warning("%s: %.1f %% of the pixels have the colour of no material", path, 100 * unknown)
-    data = pixels.tobytes()
-    term = ImageTerm(
-        "image",
-        float(entry.get("weight", 1.0)),
-        file,
-        len(data),
-        hashlib.sha256(data).hexdigest(),
-        rows,
-        columns,
-        float(entry["width"]),
-        entry.get("beyond", "mirror"),
-    )
-    return term, pixels
+    weight, width = float(entry.get("weight", 1.0)), float(entry["width"])
+    digest, beyond = hashlib.sha256(pixels).hexdigest(), entry.get("beyond", "mirror")
+    return ImageTerm("image", weight, file, pixels.size, digest, rows, columns, width, beyond), pixels
+
+
+def read_paint(path: Path | str, names: Sequence[str]) -> PaintFile:
+    """A file of painted materials, with the numbers and names of a terrain's materials.
+
+    Raises: InputError: missing, malformed or too large, out of bounds, or painted with materials that are not there.
+    """
+    if Path(path).is_file() and Path(path).stat().st_size > MAX_BYTES:
+        raise InputError(f"{path}: more than {MAX_BYTES} bytes; {REMEDY}")
+    paint = read_record(path, PaintFile, REMEDY)
+    if fault := find_run_fault(paint.runs, len(paint.materials)):
+        raise InputError(f"{path}: runs: {fault}; {REMEDY}")
+    if not all(0 <= v <= MAX_DENSITY for v in paint.densities.values()):
+        raise InputError(f"{path}: densities: beyond 0 to {MAX_DENSITY:g}; {REMEDY}")
+    if not all(abs(v) <= MAX_OFFSET for v in paint.offsets.values()):
+        raise InputError(f"{path}: offsets: beyond {MAX_OFFSET:g} either way; {REMEDY}")
+    numbers = [names.index(name) if name in names else -1 for name in paint.materials]
+    for material in sorted({run[3] for run in paint.runs}):
+        if numbers[material] < 0:
+            raise InputError(
+                f"{path}: there is no material {paint.materials[material]!r}; the terrain has {', '.join(names)}"
+            )
+    runs = [[i, j, length, numbers[material]] for i, j, length, material in paint.runs]
+    return replace(paint, materials=list(names), runs=runs)
+
+
+def scale_objects(objects: Sequence[ObjectOrders], cells: int, paint: PaintFile) -> list[ObjectOrders]:
+    """Objects with the probabilities of a paint's densities: those of one material sum to 1 at most, and no more stand
+    on a tile than the page draws. A density of an object that is not there is told in a warning.
+
+    Args:   cells: of the scatter along a tile's side.
+    """
+    if strange := sorted(set(paint.densities) - {each.name for each in objects}):
+        _log.warning("classes: the painted file has densities of objects that are not there: %s", ", ".join(strange))
+    scaled = np.array([each.probability * paint.densities.get(each.name, 1.0) for each in objects])
+    material = np.array([each.material for each in objects])
+    scaled = scaled / np.maximum(np.bincount(material, scaled)[material], 1)
+    scaled = scaled / max(1.0, cells**2 * float(scaled.sum()) / MAX_CANDIDATES)
+    return [replace(each, probability=float(p)) for each, p in zip(objects, scaled, strict=True)]

@@ -1,9 +1,13 @@
 """Classes of the terrain: which material lies at a place, and which Gaussians stay where materials meet.
 
 Every material has a score; the highest one lies there. Scores are sums of terms (noise, ranges of height and slope, a
-picture) at the points of a lattice, LATTICE of them along a tile's side, or what is painted there (`painted`), and
-bilinear in between. So a cell is decided
+picture) at the points of a lattice, LATTICE of them along a tile's side, and bilinear in between. So a cell is decided
 by its own lattice points, and most cells hold one material.
+
+A person may paint points of the lattice. A painted point counts for the points up to two steps around it with the
+binomial weights SPREAD, so what is painted has a smooth border that crosses the lattice at about the steepness of a
+rule's, and the same jitter frays it. At a point whose surroundings are painted with a weight, the rule keeps the rest;
+there its scores are taken from the highest and cut, since a rule may have any lead.
 
 Where materials meet, their tiles are placed together and each Gaussian is kept or dropped on its own. A Gaussian of
 material m stays where
@@ -27,10 +31,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int64, UInt8
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.land_cover import ClassesEntry, ImageTerm, NoiseTerm, RangeTerm
-from dav_gswt.terrain.choice import hash_cell
-from dav_gswt.terrain.heights import FlatSurface, HeightField, smoothstep, wrap_index
-from dav_gswt.terrain.painted import Painted, apply_paint, paint_lead
+from dav_gswt.bundle.land_cover import MAX_COORDINATE, ClassesEntry, ImageTerm, NoiseTerm, RangeTerm
+from dav_gswt.terrain.choice import Floats, Ints, hash_cell
+from dav_gswt.terrain.heights import FlatSurface, HeightField, gradient_noise, smoothstep, wrap_index
+
+Picture = UInt8[Array, "rows columns"]
 
 LATTICE = 8  # points of the lattice of scores along a tile's side
 MAX_OCTAVES = 8
@@ -43,6 +48,52 @@ CONTRAST = 3.0  # the jitter is its noise times this, cut at -1 and 1
 FARTHEST = 4.0  # weights by which a score falls at most outside of a range
 SLICE = 4096  # cells that are looked at at once
 CACHED = 32768  # cells whose materials, and where there are several also scores, are kept
+WIDE = 4 * MAX_COORDINATE  # painted point (i, j) has the key i WIDE + j
+SPREAD = (1, 4, 6, 4, 1)  # weights along an axis, by which a painted point counts for those around it
+WHOLE = 256  # sum of the products of two weights
+REACH = 2  # steps of the lattice to the farthest of them
+LEAD = 1.25  # of what is painted over all others, as a multiple of what border effects can change
+
+
+def paint_lead(entry: ClassesEntry) -> float:
+    """By how much the score of what is painted exceeds the others: just enough that nothing of them is left."""
+    return LEAD * (2 * entry.jitter.amplitude + entry.rise.most) or 1.0
+
+
+class Painted:
+    """A sparse set of painted points.
+
+    Args:   runs: [I, J, length, material], from (I, J) to the east; of two runs over a point the later one counts.
+    """
+
+    def __init__(self, runs: Sequence[Sequence[int]]):
+        points = {(x, j): material for i, j, length, material in runs for x in range(i, i + length)}
+        keys = np.array([x * WIDE + j for x, j in points], np.int64)
+        order = np.argsort(keys)
+        self._keys, self._materials = keys[order], np.array(list(points.values()), np.int64)[order]
+
+    def weights_at(self, i: Ints, j: Ints, materials: int) -> Int64[Array, "n m"]:
+        """Weights of the materials painted at and around points, in units of 1 / WHOLE."""
+        weights = np.zeros((len(i), materials), np.int64)
+        rows = np.flatnonzero(np.maximum(np.abs(i), np.abs(j)) < 2 * MAX_COORDINATE)  # nothing is painted beyond
+        for x, y in np.ndindex(len(SPREAD), len(SPREAD)):
+            keys = (i[rows] + x - REACH) * WIDE + j[rows] + y - REACH
+            at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+            hit = self._keys[at] == keys
+            weights[rows[hit], self._materials[at[hit]]] += SPREAD[x] * SPREAD[y]
+        return weights
+
+
+def apply_paint(scores: Float[Array, "n m"], weights: Int64[Array, "n m"], lead: float) -> Float[Array, "n m"]:
+    """Scores at points with paint at or around some of them: what is painted has 0 and all others -lead with its
+    weight, and the rule's scores, less the highest and cut at -lead, have the rest.
+
+    All materials of a point may be lifted by the same amount without effect, so points without paint keep the rule's.
+    """
+    total = weights.sum(1, keepdims=True)
+    rest = np.maximum(scores - scores.max(1, keepdims=True), -lead)
+    mixed = ((WHOLE - total) * rest - lead * (total - weights)) / WHOLE
+    return np.where(total > 0, mixed, scores)
 
 
 @dataclass(frozen=True)
@@ -61,11 +112,11 @@ class Classes:
     materials: int
     side: float
     heights: HeightField = FlatSurface()
-    pictures: Mapping[str, UInt8[Array, "rows columns"]] = field(default_factory=dict)
+    pictures: Mapping[str, Picture] = field(default_factory=dict)
     _known: dict[tuple[int, int], int] = field(default_factory=dict, init=False, repr=False)
     _lattices: dict[tuple[int, int], Float[Array, "y x m"]] = field(default_factory=dict, init=False, repr=False)
 
-    def lattice_scores(self, i: Int64[Array, "n"], j: Int64[Array, "n"]) -> Float[Array, "n m"]:
+    def lattice_scores(self, i: Ints, j: Ints) -> Float[Array, "n m"]:
         """Scores of all materials at lattice points; point (i, j) lies at (i, j) side / LATTICE."""
         scores = np.zeros((len(i), self.materials))
         for term in self.entry.rule:
@@ -78,23 +129,21 @@ class Classes:
     def _painted(self) -> Painted:
         return Painted(self.entry.painted)
 
-    def cell_lattices(self, i: Int64[Array, "n"], j: Int64[Array, "n"]) -> Float[Array, "n y x m"]:
+    def cell_lattices(self, i: Ints, j: Ints) -> Float[Array, "n y x m"]:
         """Scores at the LATTICE + 1 points along each side of cells."""
         steps = np.arange(LATTICE + 1, dtype=np.int64)
         x = np.broadcast_to((i * LATTICE)[:, None, None] + steps, (len(i), LATTICE + 1, LATTICE + 1))
         y = np.broadcast_to((j * LATTICE)[:, None, None] + steps[:, None], x.shape)
         return self.lattice_scores(x.ravel(), y.ravel()).reshape(*x.shape, self.materials)
 
-    def scores_at(
-        self, i: Int64[Array, "n"], j: Int64[Array, "n"], u: Float[Array, "n"], v: Float[Array, "n"]
-    ) -> Float[Array, "n m"]:
+    def scores_at(self, i: Ints, j: Ints, u: Floats, v: Floats) -> Float[Array, "n m"]:
         """Scores at places u, v in [0, 1] of cells, in tile sides from their south-western corners; without jitter."""
         a, b, s, t = _find_square(u, v)
         x, y = i * LATTICE + a, j * LATTICE + b
         corners = [self.lattice_scores(x + k % 2, y + k // 2) for k in range(4)]
         return _interpolate(corners, s[:, None], t[:, None])
 
-    def jitter_at(self, i: int, j: int, u: Float[Array, "n"], v: Float[Array, "n"]) -> Float[Array, "n m"]:
+    def jitter_at(self, i: int, j: int, u: Floats, v: Floats) -> Float[Array, "n m"]:
         """Jitter of all materials at places of one cell, at most the amplitude either way."""
         jitter, total = self.entry.jitter, sum(GAIN**k for k in range(self.entry.jitter.octaves))
         noise = np.zeros((len(u), self.materials))
@@ -104,7 +153,7 @@ class Classes:
             noise += GAIN**octave * _noise_of_table(self._jitter_gradients(i * cells, j * cells, octave), x, y)
         return jitter.amplitude * np.clip(CONTRAST * noise / total, -1, 1)
 
-    def materials_in(self, i: Int64[Array, "n"], j: Int64[Array, "n"]) -> Int64[Array, "n"]:
+    def materials_in(self, i: Ints, j: Ints) -> Ints:
         """Which materials may have a Gaussian in cells: bit m for material m.
 
         A difference of scores is bilinear in each square of the lattice, so it is largest at a corner of it; jitter
@@ -127,7 +176,7 @@ class Classes:
                     self._lattices[cell] = lattice.copy()
         return np.array([self._known[cell] for cell in cells], np.int64)
 
-    def keep(self, i: int, j: int, means: Float32[Array, "n 3"], material: Int64[Array, "n"]) -> Bool[Array, "n"]:
+    def keep(self, i: int, j: int, means: Float32[Array, "n 3"], material: Ints) -> Bool[Array, "n"]:
         """Which Gaussians of tiles in cell (i, j) stay.
 
         Args:   means: from the cell's corner. material: of each Gaussian's tile.
@@ -151,12 +200,12 @@ class Classes:
             self._lattices[i, j] = self.cell_lattices(np.array([i]), np.array([j]))[0]
         return self._lattices[i, j]
 
-    def _rise_bonus(self, z: Float[Array, "n"], material: Int64[Array, "n"]) -> Float[Array, "n"]:
+    def _rise_bonus(self, z: Floats, material: Ints) -> Floats:
         rise = self.entry.rise
         away = np.abs(z - np.array(rise.ground)[material]) - np.array(rise.clearance)[material]
         return np.minimum(rise.slope * np.maximum(away, 0), rise.most)
 
-    def _find_materials(self, lattices: Float[Array, "n y x m"]) -> Int64[Array, "n"]:
+    def _find_materials(self, lattices: Float[Array, "n y x m"]) -> Ints:
         slack, masks = 2 * self.entry.jitter.amplitude + self.entry.rise.most, np.zeros(len(lattices), np.int64)
         for material in range(self.materials):
             most = _over_corners(np.maximum, lattices[..., material, None] - lattices)
@@ -175,9 +224,7 @@ class Classes:
             undecided[..., material] = ~stays[..., material] & ~goes
         return stays, undecided
 
-    def _evaluate_term(
-        self, term: NoiseTerm | RangeTerm | ImageTerm, i: Int64[Array, "n"], j: Int64[Array, "n"]
-    ) -> Float[Array, "n m"]:
+    def _evaluate_term(self, term: NoiseTerm | RangeTerm | ImageTerm, i: Ints, j: Ints) -> Float[Array, "n m"]:
         if isinstance(term, NoiseTerm):
             return np.stack([self._class_noise(term, m, i, j) for m in range(self.materials)], 1)
         x, y = i * (self.side / LATTICE), j * (self.side / LATTICE)
@@ -187,7 +234,7 @@ class Classes:
         scores[:, term.material] = -self._outside_of_range(term, x, y)
         return scores
 
-    def _class_noise(self, term: NoiseTerm, material: int, i: Int64[Array, "n"], j: Int64[Array, "n"]) -> Array:
+    def _class_noise(self, term: NoiseTerm, material: int, i: Ints, j: Ints) -> Array:
         """Gradient noise of a material at lattice points, in [-1, 1], and its bias."""
         octaves, noise = term.octaves[material], np.zeros(len(i))
         step = 1 / (term.wavelengths[material] * LATTICE)
@@ -195,11 +242,11 @@ class Classes:
         for octave in range(octaves):
             x, y = TURN[0] * x - TURN[1] * y, TURN[1] * x + TURN[0] * y
             axis, place = NOISE + MAX_OCTAVES * material + octave, (x + octave * SHIFT[0], y + octave * SHIFT[1])
-            noise += GAIN**octave * gradient_noise(*place, axis, self.entry.salt)
+            noise += GAIN**octave * gradient_noise(*place, axis, self.entry.salt)[0]
             x, y = 2 * x, 2 * y
         return noise / sum(GAIN**k for k in range(octaves)) + term.biases[material]
 
-    def _outside_of_range(self, term: RangeTerm, x: Float[Array, "n"], y: Float[Array, "n"]) -> Float[Array, "n"]:
+    def _outside_of_range(self, term: RangeTerm, x: Floats, y: Floats) -> Floats:
         """How far height or slope lie outside of a range, in units of its softness."""
         height, slope = self.heights.at(x, y)
         value = height if term.kind == "height" else np.sqrt(slope[:, 0] * slope[:, 0] + slope[:, 1] * slope[:, 1])
@@ -208,7 +255,7 @@ class Classes:
         outside = np.maximum(np.maximum(low - value, value - high), 0)
         return np.minimum(outside / term.soft, FARTHEST)
 
-    def _picture_shares(self, term: ImageTerm, x: Float[Array, "n"], y: Float[Array, "n"]) -> Float[Array, "n m"]:
+    def _picture_shares(self, term: ImageTerm, x: Floats, y: Floats) -> Float[Array, "n m"]:
         """Share of each material among the four pixels around places, by the distances to their centres."""
         pixels, per_unit = self.pictures[term.file], term.columns / term.width
         p, q = x * per_unit + 0.5 * term.columns - 0.5, 0.5 * term.rows - y * per_unit - 0.5
@@ -238,9 +285,7 @@ class Classes:
         return np.stack([bits & 15, bits >> 4 & 15], -1) / 7.5 - 1
 
 
-def _noise_of_table(
-    gradients: Float[Array, "y x m 2"], x: Float[Array, "n"], y: Float[Array, "n"]
-) -> Float[Array, "n m"]:
+def _noise_of_table(gradients: Float[Array, "y x m 2"], x: Floats, y: Floats) -> Float[Array, "n m"]:
     """Gradient noise at places of a table of gradients; beyond it the last square goes on."""
     rows, columns, materials, _ = gradients.shape
     flat = np.moveaxis(gradients, -1, 0).reshape(2, rows * columns, materials)
@@ -256,7 +301,7 @@ def _noise_of_table(
     return noise
 
 
-def _find_square(u: Float[Array, "n"], v: Float[Array, "n"]):
+def _find_square(u: Floats, v: Floats):
     """The square of a cell's lattice under places, and the place in it; beyond the cell the nearest square goes on."""
     x, y = u * LATTICE, v * LATTICE
     a, b = (np.clip(np.floor(p), 0, LATTICE - 1).astype(np.int64) for p in (x, y))
@@ -273,17 +318,3 @@ def _over_corners(best, values: Float[Array, "n y x m"]) -> Float[Array, "n b a 
     """Minimum or maximum over the four corners of every square."""
     rows = best(values[:, 1:], values[:, :-1])
     return best(rows[:, :, 1:], rows[:, :, :-1])
-
-
-def gradient_noise(x: Float[Array, "n"], y: Float[Array, "n"], axis: int, salt: int) -> Float[Array, "n"]:
-    """The noise of `heights.Hills`, without its slope; x and y in cells."""
-    i, j = np.floor(x), np.floor(y)
-    u, v = x - i, y - j
-    i, j, across, along = i.astype(np.int64), j.astype(np.int64), smoothstep(u), smoothstep(v)
-    noise = np.zeros(len(x))
-    for k in range(4):
-        a, b = k % 2, k // 2
-        bits = hash_cell(i + a, j + b, axis, salt)
-        plane = ((bits & 0xFFFF) / 32767.5 - 1) * (u - a) + ((bits >> 16) / 32767.5 - 1) * (v - b)
-        noise += (across if a else 1 - across) * (along if b else 1 - along) * plane
-    return noise

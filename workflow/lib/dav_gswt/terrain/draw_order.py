@@ -1,27 +1,29 @@
-"""Draw order of cells and tiles: back to front, with little or no sorting.
+"""Draw order of cells and tiles, back to front with little or no sorting, and the weights of levels of detail.
 
-The viewer's `terrain/draw_order.js` computes the same order; tests/golden/draw_order.json holds both to it.
+The viewer's `terrain/draw_order.js` computes the same order, and its shader (draw/shaders.js) the same weights;
+tests/golden/draw_order.json and weights.json hold both to them.
 """
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Int64
+from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
+from dav_gswt.terrain.choice import Floats, Ints, Vector
 
-def sort_cells(
-    i: Int64[Array, "n"], j: Int64[Array, "n"], eye: tuple[int, int]
-) -> tuple[Int[Array, "n"], Int64[Array, "n"]]:
-    """Indices of cells from back to front, and each cell's steps |i - i0| + |j - j0| from the eye's cell (i0, j0).
+MAX_OPACITY = 1 - 1e-6  # an opaque Gaussian of weight 0 would otherwise be 0 * -infinity
+
+
+def sort_cells(i: Ints, j: Ints, eye: tuple[int, int]) -> Ints:
+    """Indices of cells from back to front, by their steps |i - i0| + |j - j0| from the eye's cell (i0, j0).
 
     A ray from the eye crosses cell edges only away from it, in i and in j, so each crossed edge adds a step: a cell
     with more steps never hides one with fewer, and cells of equal steps never hide each other. Exact for everything
     that stays in the column of its cell, whatever its height. Equal steps are ordered by j, then by i.
     """
-    steps = np.abs(i - eye[0]) + np.abs(j - eye[1])
-    return np.lexsort((i, j, -steps)), steps
+    return np.lexsort((i, j, -np.abs(i - eye[0]) - np.abs(j - eye[1])))
 
 
-def in_near_block(i: Int64[Array, "n"], j: Int64[Array, "n"], eye: tuple[int, int]) -> Bool[Array, "n"]:
+def in_near_block(i: Ints, j: Ints, eye: tuple[int, int]) -> Bool[Array, "n"]:
     """Whether cells belong to the 3 x 3 block about the eye's cell, where no direction serves a whole tile.
 
     The block is convex and holds the eye, so nothing outside hides anything inside: it is drawn last.
@@ -29,9 +31,7 @@ def in_near_block(i: Int64[Array, "n"], j: Int64[Array, "n"], eye: tuple[int, in
     return np.maximum(np.abs(i - eye[0]), np.abs(j - eye[1])) <= 1
 
 
-def nearest_order(
-    directions: Float[Array, "d 3"], orders: list[int], to: Float[Array, "3"], slope: Float[Array, "2"]
-) -> int:
+def nearest_order(directions: Float[Array, "d 3"], orders: list[int], to: Vector, slope: Float[Array, "2"]) -> int:
     """Position in `orders` of the pre-sorted order whose direction is nearest to the viewing direction.
 
     Orders were sorted on level ground. On a surface with slopes s the depth along a direction d is
@@ -42,3 +42,44 @@ def nearest_order(
     """
     x, y, z = directions[orders].T
     return int(np.argmax(x * (to[0] + slope[0] * to[2]) + y * (to[1] + slope[1] * to[2]) + z * to[2]))
+
+
+def finer_share(distance: Floats, switch: float, band: float, smooth: bool = False) -> Floats:
+    """Share of the finer of two levels at a distance d from the eye: clip(1/2 - (d - switch) / (2 band), 0, 1).
+
+    1 nearer than switch - band, 0 beyond switch + band; band = 0 is a step with 1/2 at the switch; an infinite switch
+    is never reached. smooth: s^2 (3 - 2 s) of it, which has a continuous slope.
+    Source: DAV-GSWT, Eq. (lod_blend); see docs/research/deviations.md on its "0 otherwise".
+    """
+    if switch == np.inf:
+        return np.ones_like(distance)
+    if band > 0:
+        with np.errstate(over="ignore"):
+            share = np.clip(0.5 - (distance - switch) / (2 * band), 0.0, 1.0)
+    else:
+        share = np.where(distance < switch, 1.0, np.where(distance > switch, 0.0, 0.5))
+    return share * share * (3 - 2 * share) if smooth else share
+
+
+def level_weights(distance: Floats, switches: list[float], bands: list[float]) -> Float[Array, "levels n"]:
+    """Weight of each level at a distance: the first takes its share, each next one its share of the rest.
+
+    The last level takes the whole rest, so weights are never negative and sum to 1, also where bands overlap.
+    switches, bands: of each level against the next, the last (infinite) included.
+    """
+    rest, weights = np.ones_like(distance), []
+    for switch, band in zip(switches[:-1], bands[:-1], strict=True):
+        share = finer_share(distance, switch, band)
+        weights.append(rest * share)
+        rest = rest * (1 - share)
+    return np.stack([*weights, rest])
+
+
+def crossfade_opacity(opacity: Floats, weight: Floats) -> Floats:
+    """Opacity of a Gaussian drawn with a weight w: 1 - (1 - opacity)^w, exactly the opacity at 1 and 0 at 0.
+
+    Transmittances multiply, so two equal Gaussians of weights w and 1 - w hide as much as one; a linear fade of 0.9
+    would dip to 0.7 half-way. Computed as -expm1(w log1p(-opacity)), with opacity at most MAX_OPACITY for 0 < w < 1.
+    """
+    partial = -np.expm1(weight * np.log1p(-np.minimum(opacity, MAX_OPACITY)))
+    return np.where(weight == 1, opacity, np.where(weight == 0, 0.0, partial))

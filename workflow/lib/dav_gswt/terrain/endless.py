@@ -8,16 +8,23 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.land_cover import ObjectOrders
+from dav_gswt.bundle.land_cover import ImageTerm, ObjectOrders
 from dav_gswt.bundle.manifest import TileSetInfo
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField
 from dav_gswt.raster.interface import RIM
-from dav_gswt.terrain.class_rules import NOISE, Picture, apply_rule, warn_of_missing
-from dav_gswt.terrain.classes import Classes
-from dav_gswt.terrain.heights import FlatSurface, HeightField, surface_from_config
+from dav_gswt.terrain.choice import Floats
+from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_missing
+from dav_gswt.terrain.classes import Classes, Picture
+from dav_gswt.terrain.heights import (
+    FlatSurface,
+    HeightField,
+    read_exactly,
+    read_surface,
+    require_plain_cover,
+    surface_from_config,
+)
 from dav_gswt.terrain.scatter import Scatter
-from dav_gswt.terrain.sphere import Sphere, require_plain_cover
 from dav_gswt.tiles.layout import EDGES
 
 NEAR = 0.1  # near plane, as a share of the eye floor
@@ -28,15 +35,16 @@ class EndlessTerrain:
     """Tiles, level distances and the surface that they cover.
 
     tiles: by (level, tile number), positions in [0, side], in no order. switches, bands: distance at which a level
-    gives way to the next, and half the width of that (see `weights.level_weights`); the last switch is infinite.
+    gives way to the next, and half the width of that (see `draw_order.level_weights`); the last switch is infinite.
     directions: of the pre-sorted orders; tile_orders: indices of the directions that each tile keeps. z: range of
     heights of all Gaussians. overhang: largest extent of a Gaussian beyond the edge of its tile. variants: centres of a
-    material's tiles. near: distance of the near plane. smooth: smoothstep fades. reach: distance to the last tiles, in
-    tile sides; beyond it the ground has the terrain's mean colour. classes: which material lies where; None with one.
-    kept: by cell, level and material, which Gaussians stay in a cell of several materials, as far as they are known.
-    objects: objects[number][level], about the foot. extents: of each object, the largest distance of a Gaussian's rim
-    from the foot. scatter: where they stand; None without objects. ordered: by object, order and levels, the Gaussians
-    in that order and the level of each, as far as they are known.
+    material's tiles. near: distance of the near plane. reach: distance to the last tiles, in tile sides; beyond it the
+    ground has the terrain's mean colour. classes: which material lies where; None with one. objects:
+    objects[number][level], about the foot. extents: of each object, the largest distance of a Gaussian's rim from the
+    foot. scatter: where they stand; None without objects.
+
+    Two caches: kept, by cell, level and material, which Gaussians stay in a cell of several materials; ordered, by
+    object, order and levels, the Gaussians in that order and the level of each.
     """
 
     tiles: dict[tuple[int, int], GaussianField]
@@ -51,7 +59,6 @@ class EndlessTerrain:
     salt: int
     near: float
     heights: HeightField = FlatSurface()
-    smooth: bool = False
     reach: int = 48
     classes: Classes | None = None
     objects: list[list[GaussianField]] = field(default_factory=list)
@@ -71,7 +78,7 @@ class EndlessTerrain:
         """Number of tiles of a material."""
         return EDGES * self.variants
 
-    def height_range(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n"]]:
+    def height_range(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Lower and upper bound of the heights of all Gaussians in cells with these centres, the surface included."""
         half = (0.5 * self.side + self.overhang) * 2**0.5
         middle, _ = self.heights.at(x, y)
@@ -89,14 +96,29 @@ def terrain_from_bundle(
     Raises: InputError: see `bundle.chunks.read_chunk`, `heights.surface_from_config`, `class_rules.apply_rule`.
     """
     manifest, pictures = apply_rule(bundle.manifest, rule)
-    objects = [
-        [bundle.object_chunk(number, level)[0] for level in range(len(manifest.levels))]
-        for number in range(len(manifest.objects or []))
-    ]
-    terrain = terrain_from_fields(bundle.fields(), manifest, surface, objects, pictures)
+    terrain = terrain_from_fields(bundle.fields(), manifest, surface, _read_objects(bundle), pictures)
     if terrain.classes is not None:
         warn_of_missing(terrain.classes, [material.name for material in manifest.materials])
     return terrain
+
+
+def terrain_from_page(bundle: Bundle) -> EndlessTerrain:
+    """The terrain of a page folder; of a bundle: on level ground, with the classes of its own noise.
+
+    Raises: InputError: see `bundle.chunks.read_chunk`; a height map or a picture that is missing or damaged.
+    """
+    manifest, pictures = bundle.manifest, {}
+    for term in manifest.classes.rule if manifest.classes else []:
+        if isinstance(term, ImageTerm):
+            data = read_exactly(bundle.folder, term.file, term.rows * term.columns, term.sha256)
+            pictures[term.file] = np.frombuffer(data, np.uint8).reshape(term.rows, term.columns)
+    surface = read_surface(bundle.folder, manifest.heights or {"kind": "flat"}, manifest.tile_side)
+    return terrain_from_fields(bundle.fields(), manifest, surface, _read_objects(bundle), pictures)
+
+
+def _read_objects(bundle: Bundle) -> list[list[GaussianField]]:
+    levels, objects = range(len(bundle.manifest.levels)), range(len(bundle.manifest.objects or []))
+    return [[bundle.object_chunk(number, level)[0] for level in levels] for number in objects]
 
 
 def terrain_from_fields(
@@ -110,13 +132,12 @@ def terrain_from_fields(
 
     Args:   surface: or the config's `heights` that describes it. objects: objects[number][level], about their feet.
             pictures: of the terms of classes, by file.
-    Raises: InputError: as `heights.surface_from_config`, `sphere.require_plain_cover`.
+    Raises: InputError: as `heights.surface_from_config`, `heights.require_plain_cover`.
     """
     levels, entries, side = manifest.levels, manifest.tiles, manifest.tile_side
     largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles for f in row)
     heights = surface_from_config(surface, side) if isinstance(surface, dict) else surface
-    if isinstance(heights, Sphere):
-        require_plain_cover("sphere", manifest.classes, manifest.objects)
+    require_plain_cover(heights, manifest.classes, manifest.objects)
     classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, heights, pictures or {})
     beyond = (RIM - 3) * largest  # the manifest's heights reach three deviations beyond the centres
     extents, things = [measure_extent(fields) for fields in objects], manifest.objects or []
@@ -149,7 +170,6 @@ def terrain_from_fields(
 
 def measure_extent(levels: list[GaussianField]) -> float:
     """Largest distance of the rim of an object's Gaussians from its foot, over all levels."""
-    away = [
-        np.linalg.norm(f.means.astype(float), axis=1) + RIM * np.exp(f.log_scales.astype(float)).max(1) for f in levels
-    ]
+    deviations = [np.exp(f.log_scales.astype(float)).max(1) for f in levels]
+    away = [np.linalg.norm(f.means.astype(float), axis=1) + RIM * d for f, d in zip(levels, deviations, strict=True)]
     return float(np.concatenate(away).max(initial=0.0))

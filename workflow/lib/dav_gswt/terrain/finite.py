@@ -4,31 +4,22 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Int64
+from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.materials.placing import turn_and_scale, turn_rows
-from dav_gswt.terrain import weights
-from dav_gswt.terrain.displacement import displace_field
+from dav_gswt.terrain.choice import Ints, Vector
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.placement import collect_tiles, fade_opacity
+from dav_gswt.terrain.heights import Sphere, displace_field
+from dav_gswt.terrain.placement import Part, active_objects, collect_tiles, concatenate_parts, fade_levels
 from dav_gswt.terrain.scatter import Instances
-from dav_gswt.terrain.sphere import Sphere
-from dav_gswt.terrain.visibility import (
-    GridCells,
-    active_levels,
-    active_range,
-    choose_tiles,
-    count_gaussians,
-    measure_distances,
-)
+from dav_gswt.terrain.visibility import GridCells, active_levels, choose_tiles, count_gaussians, measure_distances
 
 BLOCK = 65_536  # Gaussians that are placed at once, about
 SLICE = 4096  # cells that are counted at once
 
-Part = tuple[GaussianField, Int[Array, "n"]]  # Gaussians, and the level of each
 Placer = Callable[[], GaussianField]
 
 
@@ -40,7 +31,7 @@ class Disc:
     y: float
     radius: float
 
-    def touches(self, i: Int64[Array, "n"], j: Int64[Array, "n"]) -> Bool[Array, "n"]:
+    def touches(self, i: Ints, j: Ints) -> Bool[Array, "n"]:
         """Which cells lie nearer to the point than the radius, with any part of them."""
         east, north = (np.maximum(np.maximum(cell - at, at - cell - 1), 0) for cell, at in ((i, self.x), (j, self.y)))
         return np.hypot(east, north) < self.radius
@@ -66,7 +57,7 @@ class Area:
 
 def list_cells(
     terrain: EndlessTerrain, west: int, south: int, columns: int, rows: int
-) -> tuple[Int64[Array, "n"], Int64[Array, "n"], Int64[Array, "n"], Int64[Array, "n"]]:
+) -> tuple[Ints, Ints, Ints, Ints]:
     """Column, row, tile number and materials (bit m for material m) of cells, row by row from the south-western one.
 
     Raises: InputError: the terrain is a sphere.
@@ -88,7 +79,7 @@ def keep_level(terrain: EndlessTerrain, level: int) -> EndlessTerrain:
     return replace(terrain, switches=[-np.inf] * level + [np.inf] * (count - level), bands=[0.0] * count)
 
 
-def list_grid(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> GridCells:
+def list_grid(terrain: EndlessTerrain, area: Area, eye: Vector) -> GridCells:
     """The cells of an area, row by row, with their distances from an eye."""
     i, j, tile, materials = list_cells(terrain, area.west, area.south, area.columns, area.rows)
     if area.disc is not None:
@@ -97,12 +88,12 @@ def list_grid(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> Gr
     return GridCells(i, j, tile, materials, np.zeros(len(i), bool), *measure_distances(terrain, i, j, eye))
 
 
-def count_cells(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> Int64[Array, "n"]:
+def count_cells(terrain: EndlessTerrain, area: Area, eye: Vector) -> Ints:
     """Most Gaussians of each cell of an area, objects included. Where materials meet or levels fade there are fewer."""
     return count_in_slices(terrain, list_grid(terrain, area, eye))
 
 
-def count_in_slices(terrain: EndlessTerrain, cells: GridCells) -> Int64[Array, "n"]:
+def count_in_slices(terrain: EndlessTerrain, cells: GridCells) -> Ints:
     """`count_gaussians` of many cells, SLICE at a time: so memory does not grow with what is known of each of them."""
     slices = [cells[first : first + SLICE] for first in range(0, len(cells), SLICE)]
     return np.concatenate([np.zeros(0, np.int64), *(count_gaussians(terrain, some) for some in slices)])
@@ -118,7 +109,7 @@ def collect_cells(terrain: EndlessTerrain, west: int, south: int, columns: int, 
     return place_block(kept, list_grid(kept, area, corner), corner, corner)()
 
 
-def list_blocks(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> list[GridCells]:
+def list_blocks(terrain: EndlessTerrain, area: Area, eye: Vector) -> list[GridCells]:
     """The cells of an area in blocks of about BLOCK Gaussians, row by row. eye: see `place_block`."""
     cells = list_grid(terrain, area, eye)
     if not len(cells):
@@ -127,7 +118,7 @@ def list_blocks(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> 
     return [cells[rows] for rows in np.split(np.arange(len(cells)), np.flatnonzero(np.diff(block)) + 1)]
 
 
-def place_block(terrain: EndlessTerrain, cells: GridCells, eye: Float[Array, "3"], origin: Float[Array, "3"]) -> Placer:
+def place_block(terrain: EndlessTerrain, cells: GridCells, eye: Vector, origin: Vector) -> Placer:
     """A function that puts the Gaussians of some cells on the surface. It may run in any thread; this one may not.
 
     The Gaussians are found now, and what was remembered of these cells is given up: memory does not grow with an area.
@@ -136,31 +127,17 @@ def place_block(terrain: EndlessTerrain, cells: GridCells, eye: Float[Array, "3"
     """
     corner = np.array([cells.i[0] * terrain.side, cells.j[0] * terrain.side, 0.0])
     parts = [*_place_tiles(terrain, cells, corner), *_place_objects(terrain, cells, corner, eye)]
-    field = concatenate_fields([field for field, _ in parts])
-    level = np.concatenate([level for _, level in parts])
+    field, level = concatenate_parts(parts)
     terrain.kept.clear()
 
     def place() -> GaussianField:
         raised = displace_field(field, terrain.heights, corner, origin)
-        return _fade(terrain, raised, level, np.linalg.norm(raised.means + (origin - eye), axis=1))
+        return fade_levels(terrain, raised, level, np.linalg.norm(raised.means + (origin - eye), axis=1))[0]
 
     return place
 
 
-def _fade(
-    terrain: EndlessTerrain, field: GaussianField, level: Int[Array, "n"], distance: Float[Array, "n"]
-) -> GaussianField:
-    """Gaussians with the opacities of their levels' weights, without those of weight 0."""
-    weight = weights.level_weights(distance, terrain.switches, terrain.bands, terrain.smooth)[
-        level, np.arange(len(level))
-    ]
-    if (weight == 1).all():
-        return field
-    active = weight > 0
-    return fade_opacity(field[active], weight[active])
-
-
-def _place_tiles(terrain: EndlessTerrain, cells: GridCells, corner: Float[Array, "3"]) -> Iterator[Part]:
+def _place_tiles(terrain: EndlessTerrain, cells: GridCells, corner: Vector) -> Iterator[Part]:
     """Each cell's Gaussians at its active levels, from a corner of the grid."""
     active = active_levels(terrain, cells)
     for k in range(len(cells)):
@@ -170,18 +147,14 @@ def _place_tiles(terrain: EndlessTerrain, cells: GridCells, corner: Float[Array,
             yield replace(field, means=(field.means + by).astype(np.float32)), np.full(len(field), level)
 
 
-def _place_objects(
-    terrain: EndlessTerrain, cells: GridCells, corner: Float[Array, "3"], eye: Float[Array, "3"]
-) -> Iterator[Part]:
+def _place_objects(terrain: EndlessTerrain, cells: GridCells, corner: Vector, eye: Vector) -> Iterator[Part]:
     """The Gaussians of all objects whose feet lie in cells, at their active levels."""
     if terrain.scatter is None or not len(found := terrain.scatter.instances_in(cells.i, cells.j)):
         return
     feet = place_feet(terrain, found)
     away = feet - eye
     away[:, 2] += terrain.heights.at(feet[:, 0], feet[:, 1])[0]
-    distance = np.linalg.norm(away, axis=1)
-    reach = np.array(terrain.extents)[found.number] * found.size * (1 + terrain.heights.steepest)
-    active = active_range(terrain, distance - reach, distance + reach)
+    active = active_objects(terrain, found, np.linalg.norm(away, axis=1))
     way = turn_rows(np.radians(found.turn))
     for level in np.flatnonzero(active.any(1)).tolist():
         shown = np.flatnonzero(active[level])

@@ -9,7 +9,7 @@ from pathlib import Path
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, read_json
 from dav_gswt.templates import render_template
-from dav_gswt.terrain.page_front import FRONT, STILL
+from dav_gswt.terrain.page import FRONT, STILL
 
 TEMPLATE, STYLE = "index.html", "gallery.css"
 BY_SYSTEMS = ".DS_Store", "Thumbs.db"  # that file browsers leave

@@ -1,22 +1,27 @@
-"""Height fields: height and slope of the terrain's surface at any point.
+"""Surfaces of the terrain: height and slope at any point, and Gaussians moved onto them.
 
-The viewer's `terrain/heights.js` computes the same numbers; tests/golden/heights.json holds both to them. Only
-sums, products, quotients and floor of float64 are used, in the order written here.
+Each surface is one class that registers itself by its `kind`, the key of the config's `heights` and of the `heights`
+entry in the manifest of a page. The viewer's `terrain/heights.js` computes the same numbers; tests/golden/heights.json
+holds both to them. Only sums, products, quotients and floor of float64 are used, in the order written here.
 """
 
-from dataclasses import dataclass
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int64
 from numpy import ndarray as Array
+from scipy.spatial.transform import Rotation
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import locate_path
+from dav_gswt.bundle.manifest import NAME
+from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.field import GaussianField
+from dav_gswt.files import locate_path, parse_record
 from dav_gswt.images import image_files
-from dav_gswt.terrain.choice import hash_cell
-from dav_gswt.terrain.sphere import make_sphere
+from dav_gswt.terrain.choice import Floats, Vector, hash_cell
 
 HILLS = 3  # axis of the hash of octave 0, after west, south and centre; octave k uses HILLS + k
 GAIN = 0.4  # height of an octave over that of the one twice as wide
@@ -25,43 +30,86 @@ STEEPEST = 2.75  # upper bound of the slope of the noise, per cell, over all gra
 FARTHEST = 1e9  # units from 0 to a height: more is refused by the page too
 BLOCK = 4096  # points whose noise is computed at once: their intermediate values stay in the cache
 MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in use takes textures of this size
+PIXELS = "heights.bin"  # the pixels of a height map in a page: float32, little-endian, rows from the north
+QUARTER = 0.5 * np.pi
+THINNEST = 1e-30  # lower bound of an axis that a slope flattens to zero
+
+SURFACES: dict[str, type["HeightField"]] = {}
 
 
-@runtime_checkable
-class HeightField(Protocol):
-    """A surface z = h(x, y), once differentiable, over the whole plane.
+class HeightField:
+    """A surface z = h(x, y), once differentiable, over the whole plane; this base class is level ground.
 
-    low, high: bounds of h. steepest: upper bound of the length of h's gradient.
+    A subclass needs the keyword `kind`, and may override everything below.
     """
 
-    @property
-    def low(self) -> float: ...
+    kind: ClassVar[str]
+
+    def __init_subclass__(cls, kind: str) -> None:
+        cls.kind = kind
+        SURFACES[kind] = cls
 
     @property
-    def high(self) -> float: ...
+    def low(self) -> float:
+        """Lower bound of h."""
+        return 0.0
 
     @property
-    def steepest(self) -> float: ...
+    def high(self) -> float:
+        """Upper bound of h."""
+        return 0.0
 
-    def at(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n 2"]]:
+    @property
+    def steepest(self) -> float:
+        """Upper bound of the length of h's gradient."""
+        return 0.0
+
+    def at(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
         """h and its derivatives by x and y at points of the world."""
-        ...
-
-
-@dataclass(frozen=True)
-class FlatSurface:
-    """h = 0."""
-
-    low: float = 0.0
-    high: float = 0.0
-    steepest: float = 0.0
-
-    def at(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n 2"]]:
         return np.zeros(len(x)), np.zeros((len(x), 2))
 
+    @classmethod
+    def from_config(cls, entry: Mapping[str, Any], side: float) -> "HeightField":
+        """The surface of the config's `heights`. side: of a tile. Raises: InputError: it cannot be made."""
+        return cls()
+
+    def describe(self) -> tuple[dict[str, Any], bytes]:
+        """The `heights` entry of a page's manifest, and the content of PIXELS (empty: no file)."""
+        return {"kind": self.kind} | vars(self), b""
+
+    @classmethod
+    def from_page(cls, folder: Path, entry: Mapping[str, Any], side: float) -> "HeightField":
+        """The surface that `describe` described. Raises: InputError, KeyError, TypeError, ValueError: it is damaged."""
+        return parse_record(dict(entry), cls)
+
+
+def surface_from_config(entry: Mapping[str, Any], side: float) -> HeightField:
+    """The surface that the config's `heights` describes; side: of a tile, the unit of hills and of the sphere.
+
+    Raises: InputError: the image cannot be read (`read_height_map`), or its heights are beyond all bounds.
+    """
+    return SURFACES[entry["kind"]].from_config(entry, side)
+
+
+def read_surface(folder: Path, entry: Mapping[str, Any], side: float) -> HeightField:
+    """The surface of a page folder, from the `heights` entry of its manifest. side: of a tile.
+
+    Raises: InputError: a height map is missing or damaged, or the entry is unknown or makes no sense.
+    """
+    try:
+        return SURFACES[entry["kind"]].from_page(folder, entry, side)
+    except (KeyError, TypeError, ValueError) as error:
+        why = summarize_error(error)
+        raise InputError(f"{folder / NAME}: heights make no sense ({why}); make the page again") from error
+
 
 @dataclass(frozen=True)
-class Hills:
+class FlatSurface(HeightField, kind="flat"):
+    """h = 0."""
+
+
+@dataclass(frozen=True)
+class Hills(HeightField, kind="hills"):
     """Gradient noise: h = sum over octaves k of a_k n(2^k x / wavelength + k SHIFT), a_k ~ GAIN^k, sum a_k = height.
 
     n is 0 at the corners of unit cells and has a hash_cell gradient g in [-1, 1]^2 there; in between the four corners'
@@ -87,14 +135,14 @@ class Hills:
         rise = sum(a * 2.0**k for k, a in enumerate(self._amplitudes()))
         return STEEPEST * rise / self.wavelength
 
-    def at(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n 2"]]:
+    def at(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
         height, slope = np.empty(len(x)), np.empty((len(x), 2))
         for first in range(0, len(x), BLOCK):
             block = slice(first, first + BLOCK)
             height[block], slope[block] = self._sum_octaves(x[block], y[block])
         return height, slope
 
-    def _sum_octaves(self, x: Float[Array, "n"], y: Float[Array, "n"]):
+    def _sum_octaves(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
         octaves = np.arange(self.octaves)[:, None]
         cells = 2.0**octaves / self.wavelength
         noise, gradient = gradient_noise(
@@ -112,9 +160,13 @@ class Hills:
             shares.append(shares[-1] * GAIN)
         return [self.height * share / sum(shares) for share in shares]
 
+    @classmethod
+    def from_config(cls, entry: Mapping[str, Any], side: float) -> "Hills":
+        return cls(entry["height"] * side, entry["wavelength"] * side, entry.get("octaves", 4), entry.get("seed", 0))
+
 
 @dataclass(frozen=True)
-class HeightMap:
+class HeightMap(HeightField, kind="image"):
     """A height map, `width` world units wide, centred on the world's origin, its first row the northern one.
 
     h is the quadratic B-spline of the pixels: once differentiable, within the range of the pixels around. Beyond the
@@ -139,7 +191,7 @@ class HeightMap:
         most = [np.abs(np.diff(self.pixels, axis=axis)).max(initial=0) for axis in (0, 1)]
         return float(np.hypot(*most)) * self.pixels.shape[1] / self.width
 
-    def at(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n 2"]]:
+    def at(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
         rows, columns = self.pixels.shape
         per_unit = columns / self.width
         i, across, turn_x = _spline_weights(x * per_unit + 0.5 * columns)
@@ -154,6 +206,83 @@ class HeightMap:
                 slope[:, 1] -= value * across[a] * turn_y[b]  # rows go south
         return height, slope * per_unit
 
+    @classmethod
+    def from_config(cls, entry: Mapping[str, Any], side: float) -> "HeightMap":
+        with np.errstate(over="ignore"):  # what becomes infinite is refused
+            pixels = read_height_map(path := locate_path(entry["file"])) * np.float32(entry["height"])
+        fault, bad = f"times heights.height is beyond {FARTHEST:g} units", ~(np.abs(pixels) <= FARTHEST)
+        _refuse_pixels(path, bad, fault, "lower heights.height, or fill it")
+        return cls(pixels, float(entry["width"]), entry.get("beyond", "mirror"))
+
+    def describe(self) -> tuple[dict[str, Any], bytes]:
+        rows, columns = self.pixels.shape
+        data = self.pixels.astype("<f4").tobytes()
+        entry = {"kind": self.kind, "file": PIXELS, "rows": rows, "columns": columns, "width": self.width}
+        entry |= {"beyond": self.beyond, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+        return entry, data
+
+    @classmethod
+    def from_page(cls, folder: Path, entry: Mapping[str, Any], side: float) -> "HeightMap":
+        rows, columns, width = int(entry["rows"]), int(entry["columns"]), float(entry["width"])
+        if not (0 < rows <= MAX_SIDE and 0 < columns <= MAX_SIDE and 0 < width < np.inf):
+            raise ValueError("a size is out of range")
+        data = read_exactly(folder, entry["file"], 4 * rows * columns, entry.get("sha256"))
+        pixels = np.frombuffer(data, "<f4").reshape(rows, columns).astype(np.float32)
+        if not np.isfinite(pixels).all():
+            raise InputError(f"{folder / entry['file']}: a height is not finite; make the page again")
+        return cls(pixels, width, entry.get("beyond", "mirror"))
+
+
+@dataclass(frozen=True)
+class Sphere(HeightField, kind="sphere"):
+    """A sphere about the world's origin: a height field that is 0 above it. Its faces are those of `sphere`.
+
+    radius: of the ground, in world units. side: of a tile. cells: along the side of a face.
+    """
+
+    radius: float
+    side: float
+    cells: int
+
+    @property
+    def rate(self) -> float:
+        """Angle of a world unit on a tile."""
+        return QUARTER / (self.cells * self.side)
+
+    def column(self, face: Int64[Array, "*n"], i: Int64[Array, "*n"]) -> Int64[Array, "*n"]:
+        """The columns of all faces beside each other, each with one more beyond its western and its eastern edge."""
+        return face * (self.cells + 2) + i + 1
+
+    def tangents(self, a: Float[Array, "*n"], b: Float[Array, "*n"]) -> Float[Array, "*n 2"]:
+        """Tangents of the two angles of points of a face, in cells from its south-western corner."""
+        return np.tan((np.stack([a, b], -1) / self.cells - 0.5) * QUARTER)
+
+    @classmethod
+    def from_config(cls, entry: Mapping[str, Any], side: float) -> "Sphere":
+        return make_sphere(entry["radius"], side)
+
+    def describe(self) -> tuple[dict[str, Any], bytes]:
+        return {"kind": self.kind, "radius": self.radius, "cells": self.cells}, b""
+
+    @classmethod
+    def from_page(cls, folder: Path, entry: Mapping[str, Any], side: float) -> "Sphere":
+        return parse_record(dict(entry) | {"side": side}, cls)
+
+
+def make_sphere(radius: float, side: float) -> Sphere:
+    """A sphere with as many cells as make their mean area that of a tile. radius: in tile sides."""
+    return Sphere(radius * side, side, max(1, round(radius * np.sqrt(2 * np.pi / 3))))
+
+
+def require_plain_cover(surface: HeightField, classes: object, objects: object) -> None:
+    """Refuse several materials, and objects, on a sphere. Raises: InputError."""
+    if isinstance(surface, Sphere) and (classes or objects):
+        what = "several materials" if classes else "objects"
+        raise InputError(
+            f"heights: a sphere is covered with one material and no objects, and this scene has {what}: "
+            "give the scene `materials: one`, or choose another surface"
+        )
+
 
 def wrap_index(index: Int64[Array, "*n"], n: int, beyond: str) -> Int64[Array, "*n"]:
     """Indices of a picture's n pixels for any index: mirrored, or the border's (beyond = "clamp")."""
@@ -161,24 +290,6 @@ def wrap_index(index: Int64[Array, "*n"], n: int, beyond: str) -> Int64[Array, "
         return np.clip(index, 0, n - 1)
     index = index % (2 * n)
     return np.where(index < n, index, 2 * n - 1 - index)
-
-
-def surface_from_config(entry: dict, side: float) -> HeightField:
-    """The surface that the config's `heights` describes; side: of a tile, the unit of hills and of the sphere.
-
-    Raises: InputError: the image cannot be read (`read_height_map`), or its heights are beyond all bounds.
-    """
-    if entry["kind"] == "flat":
-        return FlatSurface()
-    if entry["kind"] == "sphere":
-        return make_sphere(entry["radius"], side)
-    if entry["kind"] == "hills":
-        return Hills(entry["height"] * side, entry["wavelength"] * side, entry.get("octaves", 4), entry.get("seed", 0))
-    with np.errstate(over="ignore"):  # what becomes infinite is refused
-        pixels = read_height_map(path := locate_path(entry["file"])) * np.float32(entry["height"])
-    bad = ~(np.abs(pixels) <= FARTHEST)
-    _refuse_pixels(path, bad, f"times heights.height is beyond {FARTHEST:g} units", "lower heights.height, or fill it")
-    return HeightMap(pixels, float(entry["width"]), entry.get("beyond", "mirror"))
 
 
 def read_height_map(path: Path | str) -> Float32[Array, "rows columns"]:
@@ -209,7 +320,22 @@ def check_height_map(path: Path | str) -> None:
         raise InputError(f"{path}: {width} x {height} pixels; at most {MAX_SIDE} a side are read: shrink the image")
 
 
-def _spline_weights(u: Float[Array, "n"]):
+def read_exactly(folder: Path, name: str, size: int, digest: str | None) -> bytes:
+    """The bytes of a page's file of this size. Raises: InputError: it is missing, of another size or damaged."""
+    path = folder / name
+    if Path(name).name != name:
+        raise InputError(f"{folder / NAME}: {name!r} does not lie beside it; make the page again")
+    if not path.is_file():
+        raise InputError(f"{path}: missing; make the page again")
+    if path.stat().st_size != size:
+        raise InputError(f"{path}: {path.stat().st_size} bytes instead of {size}; make the page again")
+    data = path.read_bytes()
+    if digest is not None and hashlib.sha256(data).hexdigest() != digest:
+        raise InputError(f"{path}: damaged (its SHA-256 is not the manifest's); make the page again")
+    return data
+
+
+def _spline_weights(u: Floats):
     """The pixel under each point, the weights of it and its two neighbours, and their derivatives."""
     pixel = np.floor(u)
     t = u - pixel - 0.5
@@ -250,3 +376,55 @@ def smoothstep(t):
 
 def _smoothstep_slope(t):
     return 30 * t * t * (t * (t - 2) + 1)
+
+
+Slope = Float[Array, "n 2"] | Float[Array, "n 3 3"]  # of a height field; on a sphere J itself
+
+
+def displace_means(
+    field: GaussianField, heights: HeightField, corner: Vector, origin: Vector
+) -> tuple[GaussianField, Float[Array, "n 2"]]:
+    """Move centres from (x, y, z) to (x, y, z + h(x, y)); also returns the surface's slope at each.
+
+    Heights above the surface stay along z, so upright objects stay upright, no Gaussian leaves the column of its tile
+    and neighbouring tiles still meet. Shapes are unchanged; see `displaced_axes`.
+
+    Args:   corner: world position of the origin of the field's means. origin: world position of the origin of the
+            returned means.
+    """
+    means = field.means.astype(float)
+    height, slope = heights.at(means[:, 0] + corner[0], means[:, 1] + corner[1])
+    means += corner - origin
+    means[:, 2] += height
+    return replace(field, means=means.astype(np.float32)), slope
+
+
+def displaced_axes(field: GaussianField, slope: Slope) -> Float[Array, "n 3 3"]:
+    """A = J R S of every Gaussian on a surface of these slopes; its covariance is A A^T = J Sigma J^T.
+
+    J = [[1, 0, 0], [0, 1, 0], [h_x, h_y, 1]] is the derivative of `displace_means`; its determinant is 1. The columns
+    of R S are the Gaussian's axes, scaled by their standard deviations. Discs on a slope are stretched along it, so
+    they stay as dense as on level ground. On a sphere J is given (see `sphere.bend`).
+    """
+    rotation = Rotation.from_quat(field.quats.astype(float), scalar_first=True).as_matrix()
+    axes = rotation * np.exp(field.log_scales.astype(float))[:, None]
+    if slope.ndim == 3:
+        return slope @ axes
+    axes[:, 2] += slope[:, 0, None] * axes[:, 0] + slope[:, 1, None] * axes[:, 1]
+    return axes
+
+
+def displace_field(field: GaussianField, heights: HeightField, corner: Vector, origin: Vector) -> GaussianField:
+    """The field on the surface, as Gaussians that any rasterizer draws: `displace_means`, shapes by `displaced_axes`.
+
+    A is factored as R' S' V^T; its singular values are the new scales, so needles keep their digits. Where the surface
+    is level a Gaussian keeps its bits.
+    """
+    raised, slope = displace_means(field, heights, corner, origin)
+    steep = np.flatnonzero((slope != 0).any(1))
+    rotation, scales, _ = np.linalg.svd(displaced_axes(field[steep], slope[steep]))
+    rotation[:, :, 2] *= np.sign(np.linalg.det(rotation))[:, None]
+    quats, log_scales = field.quats.copy(), field.log_scales.copy()
+    quats[steep] = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
+    log_scales[steep] = np.log(np.maximum(scales, THINNEST))
+    return replace(raised, quats=quats, log_scales=log_scales)

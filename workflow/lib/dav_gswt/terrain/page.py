@@ -1,9 +1,14 @@
-"""Page folders: viewer, manifest and chunks together, ready for any web server."""
+"""Page folders, ready for any web server: viewer, manifest, surface and chunks, and the front of the scene.
 
-import hashlib
-import os
+The front is the scene's name, a line about it and a still. They are written into the HTML, so that they show before any
+script runs, and in what other pages say of a link.
+"""
+
+import html
+import re
 import shutil
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -11,15 +16,71 @@ from dav_gswt.bundle.manifest import FORMAT, READABLE, VERSION, Manifest
 from dav_gswt.bundle.manifest import NAME as MANIFEST
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, read_json, write_json
-from dav_gswt.terrain.class_rules import NOISE, Picture, apply_rule, warn_of_rule
-from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
-from dav_gswt.terrain.page_front import FRONT, STILL, Front, fill_front
-from dav_gswt.terrain.page_story import SHEET, STORY
-from dav_gswt.terrain.sphere import Sphere, require_plain_cover
+from dav_gswt.images.image_files import read_photo, shrink_image
+from dav_gswt.images.jpeg import encode_jpeg
+from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_rule
+from dav_gswt.terrain.classes import Picture
+from dav_gswt.terrain.heights import PIXELS, FlatSurface, HeightField, require_plain_cover
+from dav_gswt.terrain.page_story import SHEET, STORY, Story
 
-SURFACE = "heights.bin"
-INDEX = "index.html"
+INDEX, STILL, FRONT = "index.html", "first.jpg", "front.json"
 OWN_SCRIPTS = ("early.js", "worker/", "api/", "terrain_api.js")  # that are no modules of the page itself
+STILL_WIDTH = 1280  # pixels, at most
+STILL_BYTES = 90_000  # at most: it is there within a second at 1 Mbit/s
+QUALITIES = (80, 70, 60, 50, 40, 30)  # the best that fits is taken; the last one anyhow
+STORY_BUTTON = '<button id="storyButton" type="button" aria-controls="story" aria-expanded="false"'
+DEFAULT_NAME, DEFAULT_LINE = "Endless terrain", "An endless terrain made from a few photos"
+VERDICTS = {"good": "The photos fit together well.", "doubtful": "It is doubtful that the photos fit together."}
+
+
+@dataclass(frozen=True)
+class Front:
+    """What a page says of its scene.
+
+    still: a JPEG of what the page shows first, see `encode_still`. verdict: what tests said of the photos and of the
+    field. story: how it was made, where that is known.
+    """
+
+    name: str
+    line: str
+    still: bytes
+    verdict: str = ""
+    story: Story | None = None
+
+
+def front_of_scene(scene: str, story: Story | None, still: Path | str) -> Front:
+    """The front of a scene's page. still: of the place where everybody begins. Raises: as `encode_still`."""
+    line, verdict = "An endless terrain made from a Gaussian field", ""
+    if story:
+        count = len(story.value["photos"])
+        line = f"An endless terrain made from {count} photo{'s' * (count > 1)}"
+        tested = [one["psnr"] for one in story.value["rounds"] if one["psnr"] is not None]
+        psnr = f"Photos that were not used are predicted to {tested[-1]:.1f} dB." if tested else ""
+        verdict = " ".join(filter(None, (VERDICTS.get(story.value["grade"] or ""), psnr)))
+    return Front(name_of_scene(scene), line, encode_still(still), verdict, story)
+
+
+def name_of_scene(scene: str) -> str:
+    """A scene's key as a title: my_meadow becomes My meadow."""
+    words = re.sub(r"[_-]+", " ", scene).strip()
+    return words[:1].upper() + words[1:]
+
+
+def encode_still(path: Path | str) -> bytes:
+    """A still as a JPEG of at most STILL_WIDTH pixels across and, where quality allows, STILL_BYTES.
+
+    Raises: InputError: the file is no readable image.
+    """
+    image = read_photo(path)
+    height, width = image.shape[:2]
+    if width > STILL_WIDTH:
+        image = shrink_image(image, STILL_WIDTH, max(1, round(height * STILL_WIDTH / width)))
+    made = b""
+    for quality in QUALITIES:
+        made = encode_jpeg(image, quality)
+        if len(made) <= STILL_BYTES:
+            break
+    return made
 
 
 def write_page(
@@ -34,43 +95,41 @@ def write_page(
 
     All files under `viewer_dir` are copied, and the chunks that the manifest names.
 
-    Args:   surface: height field of the terrain (default: level ground), stored in the page's manifest as `heights`;
-            the pixels of a height map are heights.bin, float32, little-endian, rows from the north. rule: the config's
-            `classes`, stored as those of the page's manifest, its pictures beside it. front: name of the scene, line
-            about it, first still and story (default: the viewer's own texts, no still, no story).
-    Raises: InputError: the manifest is missing or of another version, a chunk is missing, has another size than the
-            manifest says, or lies outside of the bundle; the viewer is incomplete; see also `describe_surface`,
-            `class_rules.apply_rule`, `sphere.require_plain_cover`.
+    Args:   surface: of the terrain (default: level ground), stored in the page's manifest as `heights`. rule: the
+            config's `classes`, stored as those of the page's manifest, its pictures beside it. front: name of the
+            scene, line about it, first still and story (default: the viewer's own texts, no still, no story).
+    Raises: InputError: the manifest is missing or of another version, a chunk is missing or lies outside of the bundle;
+            the viewer is incomplete; see also `class_rules.apply_rule`, `heights.require_plain_cover`.
     """
     bundle, viewer, out = Path(bundle_dir), Path(viewer_dir), Path(out_dir)
     if not (viewer / INDEX).is_file():
         raise InputError(f"{viewer}: no viewer here (index.html is missing)")
+    value = read_json(bundle / MANIFEST)
+    if not isinstance(value, dict) or value.get("format") != FORMAT or value.get("version") not in READABLE:
+        raise InputError(f"{bundle / MANIFEST}: not a bundle of format {FORMAT!r}, version {VERSION}; make it again")
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
-    copies += [(bundle / name, name) for name in list_chunks(bundle)]
-    heights, pixels = describe_surface(surface or FlatSurface())
-    value, pictures = replace_classes(read_json(bundle / MANIFEST), rule)
-    require_plain_cover(heights["kind"], value.get("classes"), value.get("objects"))
+    copies += [(bundle / name, name) for name in _list_chunks(bundle, value)]
+    heights, pixels = (surface or FlatSurface()).describe()
+    value, pictures = _replace_classes(value, rule)
+    require_plain_cover(surface or FlatSurface(), value.get("classes"), value.get("objects"))
     with atomic_folder(out) as part:
         for source, name in copies:
-            _copy_file(source, part / name)
+            (part / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, part / name)
         modules = [name for _, name in copies if name.endswith(".js") and not name.startswith(OWN_SCRIPTS)]
-        _write_index(part / INDEX, front, modules)
+        index = (part / INDEX).read_text(encoding="utf-8")
+        (part / INDEX).write_text(fill_front(index, front, modules), encoding="utf-8")
         if pixels:
-            (part / SURFACE).write_bytes(pixels)
-        for name, pixels in pictures.items():
-            (part / name).write_bytes(pixels.tobytes())
+            (part / PIXELS).write_bytes(pixels)
+        for name, picture in pictures.items():
+            (part / name).write_bytes(picture.tobytes())
+        if front:
+            (part / STILL).write_bytes(front.still)
+            write_json(part / FRONT, {"name": front.name, "line": front.line, "verdict": front.verdict})
+        if front and front.story:
+            write_json(part / STORY, front.story.value)
+            (part / SHEET).write_bytes(front.story.sheet)
         write_json(part / MANIFEST, value | {"heights": heights})
-
-
-def _write_index(path: Path, front: Front | None, modules: list[str]) -> None:
-    """Fill the copied index.html, and write the first still and the story beside it."""
-    path.write_text(fill_front(path.read_text(encoding="utf-8"), front, modules), encoding="utf-8")
-    if front:
-        (path.parent / STILL).write_bytes(front.still)
-        write_json(path.parent / FRONT, front.to_dict())
-    if front and front.story:
-        write_json(path.parent / STORY, front.story.value)
-        (path.parent / SHEET).write_bytes(front.story.sheet)
 
 
 def find_viewer(paths: Iterable[Path | str]) -> Path:
@@ -81,26 +140,11 @@ def find_viewer(paths: Iterable[Path | str]) -> Path:
     raise InputError("the viewer's files hold no index.html")
 
 
-def describe_surface(surface: HeightField) -> tuple[dict, bytes]:
-    """The `heights` entry of the page's manifest, and the bytes of the height map's pixels (empty without one)."""
-    if isinstance(surface, Hills):
-        names = ("height", "wavelength", "octaves", "salt")
-        return {"kind": "hills"} | {name: getattr(surface, name) for name in names}, b""
-    if isinstance(surface, Sphere):
-        return {"kind": "sphere", "radius": surface.radius, "cells": surface.cells}, b""
-    if not isinstance(surface, HeightMap):
-        return {"kind": "flat"}, b""
-    rows, columns = surface.pixels.shape
-    data = surface.pixels.astype("<f4").tobytes()
-    entry = {"kind": "image", "file": SURFACE, "rows": rows, "columns": columns}
-    entry |= {"width": surface.width, "beyond": surface.beyond, "bytes": len(data)}
-    return entry | {"sha256": hashlib.sha256(data).hexdigest()}, data
-
-
-def replace_classes(value: dict[str, Any], rule: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, Picture]]:
+def _replace_classes(
+    value: dict[str, Any], rule: Sequence[dict[str, Any]]
+) -> tuple[dict[str, Any], dict[str, Picture]]:
     """A manifest with the classes of the config's rule, and the pixels of its pictures. Raises: as `apply_rule`."""
-    painted = any(entry["kind"] == "painted" for entry in rule)
-    if "classes" not in value and not painted:
+    if "classes" not in value and not any(entry["kind"] == "painted" for entry in rule):
         warn_of_rule(rule)
         return value, {}
     made, pictures = apply_rule(Manifest.from_dict(value), rule)
@@ -108,34 +152,39 @@ def replace_classes(value: dict[str, Any], rule: Sequence[dict[str, Any]]) -> tu
     return value | {key: changed[key] for key in ("classes", "objects") if key in changed}, pictures
 
 
-def list_chunks(bundle: Path) -> list[str]:
-    """The chunk files that a bundle's manifest names, checked against the folder. Raises: InputError, as write_page."""
-    manifest = read_json(bundle / MANIFEST)
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT or manifest.get("version") not in READABLE:
-        raise InputError(f"{bundle / MANIFEST}: not a bundle of format {FORMAT!r}, version {VERSION}; make it again")
-    try:
-        holders = [*manifest["tiles"], *manifest.get("objects", [])]
-        chunks = [(chunk["file"], chunk["bytes"]) for holder in holders for chunk in holder["chunks"]]
-    except (KeyError, TypeError) as error:
-        raise InputError(f"{bundle / MANIFEST}: incomplete tile table ({error}); make the bundle again") from error
-    for name, size in chunks:
-        if not _is_inside(name):
+def _list_chunks(bundle: Path, manifest: dict[str, Any]) -> list[str]:
+    """The chunk files that a bundle's manifest names. Raises: InputError, as write_page."""
+    holders = [*manifest["tiles"], *manifest.get("objects", [])]
+    names = list(dict.fromkeys(chunk["file"] for holder in holders for chunk in holder["chunks"]))
+    for name in names:
+        if "\\" in name or {"..", "/", ""} & set(PurePosixPath(name).parts or ("",)):
             raise InputError(f"{bundle / MANIFEST}: chunk {name!r} lies outside of the bundle")
-        path = bundle / name
-        if not path.is_file():
-            raise InputError(f"{path}: this chunk is missing; make the bundle again")
-        if path.stat().st_size != size:
-            raise InputError(f"{path}: {path.stat().st_size} bytes instead of {size}; make the bundle again")
-    return list(dict.fromkeys(name for name, _ in chunks))
+        if not (bundle / name).is_file():
+            raise InputError(f"{bundle / name}: this chunk is missing; make the bundle again")
+    return names
 
 
-def _is_inside(name) -> bool:
-    """A plain relative path that cannot leave the folder it starts from."""
-    return isinstance(name, str) and "\\" not in name and not {"..", "/", ""} & set(PurePosixPath(name).parts or ("",))
+def fill_front(source: str, front: Front | None, modules: Iterable[str]) -> str:
+    """The page's HTML with the front and its script's modules, which browsers then ask for all at once.
 
-
-def _copy_file(source: Path, target: Path) -> None:
-    target.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(source, target)
-    with target.open("rb") as file:
-        os.fsync(file.fileno())
+    source: index.html of the viewer; where front is None, its own texts stay. modules: paths from the page.
+    Raises: InputError: index.html lacks the place of something.
+    """
+    links = "\n  ".join(f'<link rel="modulepreload" href="{html.escape(name)}">' for name in modules)
+    filled = {"<!-- modules -->": links, "<!-- first -->": ""}
+    if front:
+        name, line = html.escape(front.name), html.escape(front.line)
+        filled |= {
+            "<!-- first -->": f'<img id="first" src="{STILL}" alt="">',
+            f"<title>{DEFAULT_NAME}</title>": f"<title>{name} · {line}</title>",
+            f'content="{DEFAULT_LINE}"': f'content="{name}: {line}"',
+            f'<h1 id="name">{DEFAULT_NAME}</h1>': f'<h1 id="name">{name}</h1>',
+            f'<p id="line">{DEFAULT_LINE}</p>': f'<p id="line">{line}</p>',
+        }
+    if front and front.story:
+        filled |= {f"{STORY_BUTTON} hidden>": f"{STORY_BUTTON}>"}
+    for mark, by in filled.items():
+        if source.count(mark) != 1:
+            raise InputError(f"the viewer's index.html must hold {mark!r} once")
+        source = source.replace(mark, by)
+    return source

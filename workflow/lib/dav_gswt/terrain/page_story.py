@@ -60,7 +60,8 @@ def tell_story(given: Mapping[str, Any]) -> Story | None:
         "unit": frame.unit, "half": half, "photos": photos, "rounds": rounds, "thumb": THUMB, "columns": COLUMNS,
         "pictures": len(shown), "grade": frame.verdict.grade if frame.verdict else None,
     }  # fmt: skip
-    return Story(value, encode_jpeg(draw_sheet([make_small(read_photo(taken[k].source)) for k in shown]), QUALITY))
+    smalls = [shrink_to(read_photo(taken[k].source), THUMB) for k in shown]
+    return Story(value, encode_jpeg(draw_sheet(smalls), QUALITY))
 
 
 def list_photos(given: Mapping[str, Any]) -> list[TakenPhoto]:
@@ -76,11 +77,6 @@ def list_photos(given: Mapping[str, Any]) -> list[TakenPhoto]:
 def spread(count: int, most: int) -> list[int]:
     """At most `most` of the numbers below `count`, evenly."""
     return sorted({int(k) for k in np.linspace(0, count - 1, min(count, most)).round()}) if count else []
-
-
-def make_small(photo: Float32[Array, "h w 3"]) -> Float32[Array, "height width 3"]:
-    """A photo at most THUMB pixels wide or high."""
-    return shrink_to(photo, THUMB)
 
 
 def draw_sheet(smalls: Sequence[Float32[Array, "_ _ 3"]]) -> Float32[Array, "height width 3"]:

@@ -1,41 +1,49 @@
-"""Placement of a cell's Gaussians: relative to the eye, on the surface, back to front, faded between levels."""
+"""Placement of a cell's Gaussians, and of the objects on it: relative to the eye, on the surface, back to front, faded
+between levels.
+"""
 
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.orders import sort_back_to_front
 from dav_gswt.field import GaussianField, concatenate_fields
-from dav_gswt.terrain import draw_order, weights
-from dav_gswt.terrain.displacement import displace_means
+from dav_gswt.materials.placing import turn_and_scale, turn_rows
+from dav_gswt.terrain.choice import Floats, Vector
+from dav_gswt.terrain.draw_order import crossfade_opacity, level_weights, nearest_order
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.object_placement import place_objects
+from dav_gswt.terrain.heights import displace_means
 from dav_gswt.terrain.scatter import Instances
-from dav_gswt.terrain.visibility import GridCells, active_levels
+from dav_gswt.terrain.visibility import GridCells, active_levels, active_range
 
 KEPT = 4096  # cells, levels and materials whose kept Gaussians are remembered
 
+Part = tuple[GaussianField, Int[Array, "n"]]  # Gaussians, and the level of each
+
 
 def place_cell(
-    terrain: EndlessTerrain, cell: GridCells, eye: Float[Array, "3"], things: Instances | None = None
+    terrain: EndlessTerrain, cell: GridCells, eye: Vector, things: Instances | None = None
 ) -> tuple[GaussianField, Float[Array, "n 2"]]:
     """The Gaussians of one cell relative to the eye, and the surface's slope at each (see `displaced_axes`).
 
-    After those of the tiles come those of things, the objects that are drawn with the cell. Positions count from the
-    eye, so float32 resolves a disc kilometres away. Opacities are cross-faded between levels by each Gaussian's own
-    distance. Where two levels are active their pre-sorted orders are merged, so neither level covers the other.
+    Objects (`things`) that are drawn with the cell come after its tiles. Positions count from the eye, so float32
+    resolves a disc kilometres away. Opacities are cross-faded between levels by each Gaussian's own distance. Where two
+    levels are active their pre-sorted orders are merged, so neither level covers the other.
     """
     (i,), (j,), (tile,) = cell.i.tolist(), cell.j.tolist(), cell.tile.tolist()
     levels = np.flatnonzero(active_levels(terrain, cell)[:, 0]).tolist()
-    parts = collect_tiles(terrain, cell, levels)
-    corner = np.array([i * terrain.side, j * terrain.side, 0.0])
-    field, level = order_gaussians(parts, cell_direction(terrain, i, j, tile, eye))
+    parts = [order_gaussians(collect_tiles(terrain, cell, levels), cell_direction(terrain, i, j, tile, eye))]
     if things is not None:
-        placed = place_objects(terrain, things, (i, j), eye)
-        field, level = concatenate_fields([field, placed.field]), np.concatenate([level, placed.level])
-    return displace_and_fade(terrain, field, level, corner, eye)
+        parts.append(place_objects(terrain, things, (i, j), eye))
+    corner = np.array([i * terrain.side, j * terrain.side, 0.0])
+    return displace_and_fade(terrain, *concatenate_parts(parts), corner, eye)
+
+
+def concatenate_parts(parts: list[Part]) -> Part:
+    """The Gaussians of all parts, in their order, and the level of each."""
+    return concatenate_fields([field for field, _ in parts]), np.concatenate([level for _, level in parts])
 
 
 def collect_tiles(terrain: EndlessTerrain, cell: GridCells, levels: list[int]) -> dict[int, GaussianField]:
@@ -72,23 +80,7 @@ def _find_kept(
     return found
 
 
-def place_gaussians(
-    terrain: EndlessTerrain,
-    parts: dict[int, GaussianField],
-    corner: Float[Array, "3"],
-    direction: Float[Array, "3"],
-    eye: Float[Array, "3"],
-) -> tuple[GaussianField, Float[Array, "n 2"]]:
-    """`place_cell` of any Gaussians.
-
-    Args:   parts: Gaussians by level. corner: world position of their origin. direction: of the pre-sorted order.
-    """
-    return displace_and_fade(terrain, *order_gaussians(parts, direction), corner, eye)
-
-
-def order_gaussians(
-    parts: dict[int, GaussianField], direction: Float[Array, "3"]
-) -> tuple[GaussianField, Int[Array, "n"]]:
+def order_gaussians(parts: dict[int, GaussianField], direction: Vector) -> Part:
     """Gaussians of several levels from back to front along a direction, and the level of each."""
     level = np.repeat(list(parts), [len(part) for part in parts.values()])
     flat = concatenate_fields(list(parts.values()))
@@ -97,37 +89,113 @@ def order_gaussians(
 
 
 def displace_and_fade(
-    terrain: EndlessTerrain,
-    field: GaussianField,
-    level: Int[Array, "n"],
-    corner: Float[Array, "3"],
-    eye: Float[Array, "3"],
+    terrain: EndlessTerrain, field: GaussianField, level: Int[Array, "n"], corner: Vector, eye: Vector
 ) -> tuple[GaussianField, Float[Array, "k 2"]]:
     """Gaussians on the surface relative to the eye, in their order, faded by the weights of their levels."""
     field, slope = displace_means(field, terrain.heights, corner, eye)
-    distance = np.linalg.norm(field.means.astype(float), axis=1)
-    shares = weights.level_weights(distance, terrain.switches, terrain.bands, terrain.smooth)
-    weight = shares[level, np.arange(len(level))]
+    faded, active = fade_levels(terrain, field, level, np.linalg.norm(field.means.astype(float), axis=1))
+    return faded, slope[active]
+
+
+def fade_levels(
+    terrain: EndlessTerrain, field: GaussianField, level: Int[Array, "n"], distance: Floats
+) -> tuple[GaussianField, Bool[Array, "n"]]:
+    """Gaussians with the opacities of their levels' weights at their distances, without Gaussians of weight 0; and
+    which are left. A Gaussian of weight 1 keeps its bits.
+    """
+    weight = level_weights(distance, terrain.switches, terrain.bands)[level, np.arange(len(level))]
     active = weight > 0
-    return fade_opacity(field[active], weight[active]), slope[active]
+    field, weight = field[active], weight[active]
+    partial = weight < 1
+    if not partial.any():
+        return field, active
+    opacity = 1 / (1 + np.exp(-field.opacity_logits[partial].astype(float)))
+    left = np.maximum(crossfade_opacity(opacity, weight[partial]), 1e-30)
+    logits = field.opacity_logits.copy()
+    logits[partial] = np.log(left) - np.log1p(-left)
+    return replace(field, opacity_logits=logits), active
 
 
-def cell_direction(terrain: EndlessTerrain, i: int, j: int, tile: int, eye: Float[Array, "3"]) -> Float[Array, "3"]:
+def cell_direction(terrain: EndlessTerrain, i: int, j: int, tile: int, eye: Vector) -> Vector:
     """Direction of the pre-sorted order that is used for the tile in cell (i, j)."""
     x, y = (i + 0.5) * terrain.side, (j + 0.5) * terrain.side
     height, slope = terrain.heights.at(np.array([x]), np.array([y]))
     to = np.array([x, y, height[0] + 0.5 * sum(terrain.z)]) - eye
     orders = terrain.tile_orders[tile]
-    return terrain.directions[orders[draw_order.nearest_order(terrain.directions, orders, to, slope[0])]]
+    return terrain.directions[orders[nearest_order(terrain.directions, orders, to, slope[0])]]
 
 
-def fade_opacity(field: GaussianField, weight: Float[Array, "n"]) -> GaussianField:
-    """Opacities under these weights; a Gaussian of weight 1 keeps its bits."""
-    partial = weight < 1
-    if not partial.any():
-        return field
-    opacity = 1 / (1 + np.exp(-field.opacity_logits[partial].astype(float)))
-    left = np.maximum(weights.crossfade_opacity(opacity, weight[partial]), 1e-30)
-    logits = field.opacity_logits.copy()
-    logits[partial] = np.log(left) - np.log1p(-left)
-    return replace(field, opacity_logits=logits)
+def group_by_cell(terrain: EndlessTerrain, cells: GridCells, eye: Vector) -> dict[int, Instances]:
+    """The objects that stand in cells, by the index of the cell that each is drawn with.
+
+    An object reaches over the edges of its own cell. Of the cells that its footprint touches, the one nearest to the
+    eye is drawn last, and the object right after it: else the ground of a nearer cell would cover what hangs over it.
+    Where that cell is not visible, the object is drawn with its own.
+    """
+    if terrain.scatter is None:
+        return {}
+    found, side = terrain.scatter.instances_in(cells.i, cells.j), terrain.side
+    if not len(found):
+        return {}
+    radius = np.array([each.radius for each in terrain.scatter.objects])[found.number] * found.size / side
+    owner = []
+    for cell, place, at in ((found.i, found.u, eye[0]), (found.j, found.v, eye[1])):
+        low, high = (cell + np.floor(place + step * radius).astype(np.int64) for step in (-1, 1))
+        owner.append(np.clip(int(np.floor(at / side)), low, high))
+    index = {cell: k for k, cell in enumerate(zip(cells.i.tolist(), cells.j.tolist(), strict=True))}
+    own = zip(found.i.tolist(), found.j.tolist(), strict=True)
+    drawn = zip(*(each.tolist() for each in owner), strict=True)
+    with_cell = np.array([index.get(near, index[foot]) for near, foot in zip(drawn, own, strict=True)])
+    order = np.argsort(with_cell, kind="stable")
+    numbers, starts = np.unique(with_cell[order], return_index=True)
+    return dict(zip(numbers.tolist(), map(found.__getitem__, np.split(order, starts[1:])), strict=True))
+
+
+def place_objects(terrain: EndlessTerrain, found: Instances, cell: tuple[int, int], eye: Vector) -> Part:
+    """The Gaussians of objects, turned, scaled and moved to their feet, at every level that has a weight.
+
+    Positions count from the cell. Objects are sorted by falling distance from the eye to their feet, the Gaussians of
+    an object are in the pre-sorted order.
+    """
+    side = terrain.side
+    x, y = (found.i - cell[0] + found.u) * side, (found.j - cell[1] + found.v) * side
+    height, slope = terrain.heights.at(x + cell[0] * side, y + cell[1] * side)
+    ground = np.array([each.ground for each in terrain.object_entries])[found.number]
+    feet = np.stack([x, y, ground], 1)
+    to = feet + [cell[0] * side, cell[1] * side, 0.0] - eye
+    to[:, 2] += height
+    distance = np.linalg.norm(to, axis=1)
+    active = active_objects(terrain, found, distance)
+    angle = np.radians(found.turn)
+    cos, sin = np.cos(angle), np.sin(angle)
+    back = np.stack([cos * to[:, 0] + sin * to[:, 1], cos * to[:, 1] - sin * to[:, 0], to[:, 2]], 1)
+    tilt = np.stack([cos * slope[:, 0] + sin * slope[:, 1], cos * slope[:, 1] - sin * slope[:, 0]], 1)
+    sequence = np.argsort(-distance, kind="stable").tolist()
+    parts = [_order_levels(terrain, int(found.number[k]), active[:, k], back[k], tilt[k]) for k in sequence]
+    field, level = concatenate_parts(parts)
+    row = np.repeat(sequence, [len(levels) for _, levels in parts])
+    return turn_and_scale(field, turn_rows(angle)[row], found.size[row], feet[row]), level
+
+
+def active_objects(terrain: EndlessTerrain, found: Instances, distance: Floats) -> Bool[Array, "levels n"]:
+    """Which levels have a weight somewhere on objects whose feet are at distances from the eye."""
+    extent = np.array(terrain.extents)[found.number] * found.size
+    reach = extent * (1 + terrain.heights.steepest)
+    return active_range(terrain, distance - reach, distance + reach)
+
+
+def _order_levels(
+    terrain: EndlessTerrain, number: int, active: Bool[Array, "levels"], to: Vector, slope: Float[Array, "2"]
+) -> Part:
+    """An object's Gaussians of the active levels in the order nearest to the viewing direction, and their levels.
+
+    Args:   to, slope: from the eye to the foot, and of the surface there, turned back with the object.
+    """
+    kept = terrain.object_entries[number].chunks[0].orders
+    order = kept[nearest_order(terrain.directions, kept, to, slope)]
+    place = (number, order, *np.flatnonzero(active).tolist())
+    if place not in terrain.ordered:
+        parts = {level: terrain.objects[number][level] for level in place[2:]}
+        parts = parts or {len(terrain.switches) - 1: terrain.objects[number][-1][:0]}
+        terrain.ordered[place] = order_gaussians(parts, terrain.directions[order])
+    return terrain.ordered[place]

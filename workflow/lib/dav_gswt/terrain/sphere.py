@@ -1,4 +1,4 @@
-"""The sphere: a planet of tiles, six faces of n x n cells each, and how the plane of a tile bends onto it.
+"""The sphere: a planet of tiles, six faces of n x n cells each, how a tile bends onto it, and where its faces meet.
 
 A face is a square of angles: the point (a, b) of a face, in cells from its south-western corner, lies in the direction
 tan(alpha) east + tan(beta) north + out with alpha = (a / n - 1/2) 90 degrees, and beta likewise. Cells along a face's
@@ -12,17 +12,21 @@ the next but one, turned by 90 degrees: fewer than six turned edges are impossib
 three right angles meet, a quarter turn short of the plane's four, and a connected set of edges can only make up for a
 whole number of turns.
 
-The viewer's `terrain/sphere.js` computes the same numbers; tests/golden/sphere.json holds both to them.
+Across a turned edge the strips of tiles cannot match. There the tilings of both faces reach over the edge, and a noise
+that both share decides to which face a place belongs: the edge frays as the border of two materials does.
+
+The viewer's `terrain/sphere.js` and `terrain/sphere_edges.js` compute the same numbers; tests/golden/sphere.json holds
+both to them.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int64
+from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError
+from dav_gswt.terrain.choice import Floats, Ints, tiles_at
+from dav_gswt.terrain.heights import QUARTER, Sphere, gradient_noise
 
 FACES = np.array(  # east, north and out of each face
     [
@@ -34,103 +38,41 @@ FACES = np.array(  # east, north and out of each face
         [[0, 1, 0], [1, 0, 0], [0, 0, -1]],
     ]
 )
-QUARTER = 0.5 * np.pi
-WEST, NORTH, EAST, SOUTH = range(4)
+FRAY = 120  # axis of the hash of edge 0; edge k, that of the face it leads out of, uses FRAY + 2 k and the next
+FINE = (3.0, 9.0)  # cells of the two octaves of the noise, on a tile's side
+SHIFT = (0.37, 0.71)  # of the second octave
+WIDTH, CONTRAST = 0.3, 2.5  # tile sides: most that an edge is moved; the noise is this many times as strong, and cut
+TAPER = 0.5  # of the distance from a corner, in tile sides: there three faces meet, and edges are not moved
+LEVEL, LIFT, HIGHEST = 0.03, 2.0, 0.2  # what is higher than LEVEL reaches over by LIFT times that, HIGHEST at most
 
 
 @dataclass(frozen=True)
-class Sphere:
-    """A sphere as the surface of a terrain, about the world's origin: a height field that is 0 above it.
+class FaceCells:
+    """Cells of faces, or squares of cells of one size by their south-western cells."""
 
-    radius: of the ground, in world units. side: of a tile. cells: along the side of a face.
-    """
+    face: Ints
+    i: Ints
+    j: Ints
 
-    radius: float
-    side: float
-    cells: int
-    low: float = 0.0
-    high: float = 0.0
-    steepest: float = 0.0
+    def __len__(self) -> int:
+        return len(self.face)
 
-    @property
-    def rate(self) -> float:
-        """Angle of a world unit on a tile."""
-        return QUARTER / (self.cells * self.side)
-
-    def at(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n 2"]]:
-        return np.zeros(len(x)), np.zeros((len(x), 2))
-
-    def column(self, face: Int64[Array, "*n"], i: Int64[Array, "*n"]) -> Int64[Array, "*n"]:
-        """The columns of all faces beside each other, each with one more beyond its western and its eastern edge."""
-        return face * (self.cells + 2) + i + 1
-
-    def split_column(self, column: Int64[Array, "n"]) -> tuple[Int64[Array, "n"], Int64[Array, "n"]]:
-        """Face and column in it; see `column`."""
-        face, rest = np.divmod(column, self.cells + 2)
-        return face, rest - 1
-
-    def tangents(self, a: Float[Array, "*n"], b: Float[Array, "*n"]) -> Float[Array, "*n 2"]:
-        """Tangents of the two angles of points of a face, in cells from its south-western corner."""
-        return np.tan((np.stack([a, b], -1) / self.cells - 0.5) * QUARTER)
+    def __getitem__(self, index) -> "FaceCells":
+        return FaceCells(self.face[index], self.i[index], self.j[index])
 
 
-def make_sphere(radius: float, side: float) -> Sphere:
-    """A sphere with as many cells as make their mean area that of a tile. radius: in tile sides."""
-    return Sphere(radius * side, side, max(1, round(radius * np.sqrt(2 * np.pi / 3))))
-
-
-def require_plain_cover(kind: str, classes: object, objects: Sequence[object] | None) -> None:
-    """Refuse several materials, and objects, on a surface of the kind `sphere`. Raises: InputError."""
-    if kind == "sphere" and (classes or objects):
-        what = "several materials" if classes else "objects"
-        raise InputError(
-            f"heights: a sphere is covered with one material and no objects, and this scene has {what}: "
-            "give the scene `materials: one`, or choose another surface"
-        )
-
-
-def directions(face: Int64[Array, "n"], tangents: Float[Array, "n 2"]) -> Float[Array, "n 3"]:
+def directions(face: Ints, tangents: Float[Array, "n 2"]) -> Float[Array, "n 3"]:
     """Unit vectors to points of faces, from the planet's middle."""
     ray = np.concatenate([tangents, np.ones_like(tangents[:, :1])], 1)
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
     return np.einsum("nk,nkc->nc", ray, FACES[face].astype(ray.dtype))
 
 
-def locate(sphere: Sphere, points: Float[Array, "n 3"]) -> tuple[Int64[Array, "n"], Float[Array, "n 2"]]:
+def locate(sphere: Sphere, points: Float[Array, "n 3"]) -> tuple[Ints, Float[Array, "n 2"]]:
     """The face under points, and the places on it in cells from its south-western corner."""
     face = np.argmax(points @ FACES[:, 2].T, axis=1).astype(np.int64)
     along = np.einsum("nc,nkc->nk", points, FACES[face])
     return face, (np.arctan2(along[:, :2], along[:, 2:]) / QUARTER + 0.5) * sphere.cells
-
-
-def cross_edge(face: int, side: int) -> tuple[int, int, int]:
-    """What lies beyond an edge of a face: the face, its side there, and the quarter turns to the left from the one
-    face's east to the other's (0: tiles go on).
-    """
-    odd = face % 2
-    if side == (NORTH if odd else EAST):
-        return (face + 1) % 6, SOUTH if odd else WEST, 0
-    if side == (WEST if odd else SOUTH):
-        return (face + 5) % 6, EAST if odd else NORTH, 0
-    if side == (EAST if odd else NORTH):
-        return (face + 2) % 6, SOUTH if odd else WEST, 3 if odd else 1
-    return (face + 4) % 6, EAST if odd else NORTH, 1 if odd else 3
-
-
-def step_cell(sphere: Sphere, face: int, i: int, j: int, side: int) -> tuple[int, int, int, int]:
-    """The cell beyond a side of a cell: face, column, row, and the quarter turns as of `cross_edge`."""
-    n = sphere.cells
-    i, j = i + (side == EAST) - (side == WEST), j + (side == NORTH) - (side == SOUTH)
-    if 0 <= i < n and 0 <= j < n:
-        return face, i, j, 0
-    there, entered, turns = cross_edge(face, side)
-    along = j if side in (WEST, EAST) else i
-    along = n - 1 - along if turns else along
-    return there, *_edge_cell(entered, along, n), turns
-
-
-def _edge_cell(side: int, along: int, n: int) -> tuple[int, int]:
-    return {WEST: (0, along), EAST: (n - 1, along), SOUTH: (along, 0), NORTH: (along, n - 1)}[side]
 
 
 def bend(
@@ -174,3 +116,58 @@ def walk_from(frame: Float[Array, "3 3"], way: Float[Array, "2"], radius: float)
     left = east * frame[1] - north * frame[0]
     ahead, up = np.cos(angle) * ahead - np.sin(angle) * up, np.cos(angle) * up + np.sin(angle) * ahead
     return np.stack([east * ahead - north * left, north * ahead + east * left, up])
+
+
+def tiles_on(sphere: Sphere, cells: FaceCells, salt: int, variants: int) -> Ints:
+    """Tile numbers of cells of faces: `choice.tiles_at` on the unfolded cube, which repeats after three faces' sides.
+
+    Cells beyond an edge of a face belong to its tiling too.
+    """
+    n, face = sphere.cells, cells.face
+    return tiles_at((face + 1) // 2 * n + cells.i, face // 2 * n + cells.j, salt, variants, 3 * n)
+
+
+def is_covered(sphere: Sphere, cells: FaceCells) -> Bool[Array, "n"]:
+    """Whether cells are of a face, or beyond one of its turned edges by one and not at a corner."""
+    n, odd, i, j = sphere.cells, cells.face % 2 == 1, cells.i, cells.j
+    inside_i, inside_j = (i >= 0) & (i < n), (j >= 0) & (j < n)
+    return (inside_i & (inside_j | (j == np.where(odd, -1, n)))) | (inside_j & (i == np.where(odd, n, -1)))
+
+
+def is_frayed(sphere: Sphere, cells: FaceCells) -> Bool[Array, "n"]:
+    """Whether cells lie at a turned edge of their face, or beyond it."""
+    n, odd, i, j = sphere.cells, cells.face % 2 == 1, cells.i, cells.j
+    return np.where(odd, (i >= n - 1) | (j <= 0), (i <= 0) | (j >= n - 1))
+
+
+def find_kept(sphere: Sphere, face: int, places: Float[Array, "n 3"], salt: int) -> Bool[Array, "n"]:
+    """Which Gaussians of a face's tiling stay. places: in cells from the face's south-western corner; z in tile sides.
+
+    With J the movement of an edge, Gaussians of the face that it leads out of stay up to J beyond it, and Gaussians of
+    the other face where these do not. What rises above the ground reaches over, so things are not cut through.
+    """
+    half = 0.5 * sphere.cells
+    u, v = places[:, 0] - half, places[:, 1] - half
+    over = np.minimum(LIFT * np.maximum(np.abs(places[:, 2]) - LEVEL, 0), HIGHEST)
+    across, along = (u, v) if face % 2 else (v, u)
+    out = across - half <= _move_edge(sphere, face, along, across, salt) + over
+    across, along = (-v, u) if face % 2 else (-u, v)
+    moved = _move_edge(sphere, (face + 4) % 6, -along, across, salt, -1)
+    return out & (across - half < over - moved)
+
+
+def _move_edge(sphere: Sphere, edge: int, along: Floats, across: Floats, salt: int, sign: int = 1) -> Floats:
+    """How far an edge is moved at places of a face, to be added to it on the side that the edge leads out of.
+
+    along, across: cells from the face's middle, along the edge as it runs on that side. sign: -1 on the other side.
+    """
+    per_cell, half = QUARTER / sphere.cells, 0.5 * sphere.cells
+    tangent = np.tan(across * per_cell)
+    middle = np.arctan(np.tan(along * per_cell) * np.sqrt(2 / (1 + tangent * tangent))) / per_cell
+    beyond = sign * (across - half)
+    first, second = (
+        gradient_noise(middle * fine + k * SHIFT[0], beyond * fine + k * SHIFT[1], FRAY + 2 * edge + k, salt)[0]
+        for k, fine in enumerate(FINE)
+    )
+    most = np.clip(TAPER * (half - np.abs(middle)), 0, WIDTH)
+    return most * np.clip(CONTRAST * (first + 0.5 * second), -1, 1)

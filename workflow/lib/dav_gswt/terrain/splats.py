@@ -13,7 +13,7 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rasterizer, Rendering, harmonics
-from dav_gswt.terrain.displacement import Slope, displaced_axes
+from dav_gswt.terrain.heights import Slope, displaced_axes
 
 DILATION = 0.3  # square pixels, added to variances by the rasterizer
 MARGIN = 0.15  # of the picture's side: beyond it the projection is linearised at this margin

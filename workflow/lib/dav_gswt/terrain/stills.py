@@ -1,11 +1,13 @@
 """Stills of the endless terrain: rendered tile by tile as the viewer does, over a sky and a far ground."""
 
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.manifest import Manifest, Sky
@@ -13,21 +15,25 @@ from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import splats
-from dav_gswt.terrain.displacement import Slope
+from dav_gswt.terrain.backdrop import Backdrop
+from dav_gswt.terrain.choice import Vector
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.ground_mapping import camera_on, mapping_of
-from dav_gswt.terrain.object_placement import group_by_cell
-from dav_gswt.terrain.sphere import Sphere
-from dav_gswt.terrain.timing import FrameTiming
+from dav_gswt.terrain.heights import Slope, Sphere
+from dav_gswt.terrain.placement import group_by_cell, place_cell
+from dav_gswt.terrain.planet import place_on_sphere, visible_on_sphere
+from dav_gswt.terrain.sphere import frame_at, walk_from
 from dav_gswt.terrain.visibility import (
     MAX_GAUSSIANS,
     coarsen_to_budget,
     count_gaussians,
     drop_far_cells,
+    visible_cells,
 )
 from dav_gswt.threads import default_threads
 
 TOGETHER = 64  # cells that are placed, then projected: what lies between the two is held
+ORBIT = 2.5  # height of `above` over a planet, in its radii: all of it is in view
+START = (20.0, 30.0)  # longitude and latitude that places on a sphere count from, in degrees
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,19 @@ SHOTS = (
 )
 
 
-ORBIT = 2.5  # height of `above` over a planet, in its radii: all of it is in view
+@dataclass
+class FrameTiming:
+    """Accumulates while a picture is rendered. milliseconds: by stage; gaussians: placed for the picture."""
+
+    milliseconds: dict[str, float] = field(default_factory=dict)
+    gaussians: int = 0
+
+    @contextmanager
+    def measure(self, stage: str) -> Iterator[None]:
+        """Add the time of this block to a stage."""
+        start = time.perf_counter()
+        yield
+        self.milliseconds[stage] = self.milliseconds.get(stage, 0.0) + 1e3 * (time.perf_counter() - start)
 
 
 def list_shots(terrain: EndlessTerrain, floor: float) -> list[Shot]:
@@ -69,8 +87,9 @@ def walk_shots(frames: int, length: float, height: float) -> list[Shot]:
 
 def shot_camera(shot: Shot, terrain: EndlessTerrain, floor: float, width: int, height: int) -> Camera:
     """The camera of a shot, with a horizontal field of view of 60 degrees. floor: lowest height of the eye."""
-    if isinstance(terrain.heights, Sphere):
-        eye, axes = mapping_of(terrain).stand(np.array(shot.at) * terrain.side, shot.height * floor)
+    if isinstance(sphere := terrain.heights, Sphere):
+        axes = walk_from(frame_at(*START), np.array(shot.at) * terrain.side, sphere.radius)
+        eye = (sphere.radius + shot.height * floor) * axes[2]
         return camera_on(eye, axes, shot.yaw, -min(shot.pitch, 89.99), width, height)
     x, y = (v * terrain.side for v in shot.at)
     ground, _ = terrain.heights.at(np.array([x]), np.array([y]))
@@ -78,6 +97,18 @@ def shot_camera(shot: Shot, terrain: EndlessTerrain, floor: float, width: int, h
     down, yaw = np.radians(min(shot.pitch, 89.99)), np.radians(shot.yaw)
     ahead = np.array([np.cos(down) * np.cos(yaw), np.cos(down) * np.sin(yaw), -np.sin(down)])
     return cameras.pinhole(eye, eye + ahead, width, height, 60.0)
+
+
+def camera_on(eye: Vector, axes: Float[Array, "3 3"], yaw: float, pitch: float, width: int, height: int) -> Camera:
+    """The camera of an eye with a horizontal field of view of 60 degrees.
+
+    Args:   axes: east, north and up. yaw: degrees from east to the left. pitch: degrees above the level, over -90.
+    """
+    up, turn = np.radians(pitch), np.radians(yaw)
+    ahead = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+    here = cameras.pinhole(np.zeros(3), ahead, width, height, 60.0)
+    rotation = here.rotation @ axes
+    return replace(here, rotation=rotation, translation=-rotation @ eye)
 
 
 def render_shot(
@@ -108,19 +139,21 @@ def render_view(
     if camera.orthographic:
         raise ValueError("the terrain is drawn for a pinhole camera")
     timing = timing or FrameTiming()
-    eye, here = camera.centre, replace(camera, translation=np.zeros(3))
+    eye, here, surface = camera.centre, replace(camera, translation=np.zeros(3)), terrain.heights
+    sphere = surface if isinstance(surface, Sphere) else None
     with timing.measure("update"):
-        ground = mapping_of(terrain)
-        cells = ground.find_cells(camera)
+        cells = visible_on_sphere(terrain, sphere, camera) if sphere else visible_cells(terrain, camera)
         if count_gaussians(terrain, cells).sum() > MAX_GAUSSIANS:  # coarser levels first, then fewer cells
             terrain = coarsen_to_budget(terrain, camera, MAX_GAUSSIANS, cells)
             cells = drop_far_cells(terrain, cells)
         things = group_by_cell(terrain, cells, eye)
-    backdrop = ground.make_backdrop(eye, sky, ground_colour)
+    backdrop = Backdrop.for_eye(terrain, eye, sky, ground_colour)
     far, close = [splats.EMPTY], [splats.EMPTY]
 
     def place(k: int) -> tuple[GaussianField, Slope]:
-        return ground.place_cell(terrain, cells[k : k + 1], eye, things.get(k))
+        if sphere:
+            return place_on_sphere(terrain, sphere, cells[k : k + 1], eye)
+        return place_cell(terrain, cells[k : k + 1], eye, things.get(k))
 
     def project(placed: tuple[GaussianField, Slope]) -> splats.Splats:
         return splats.project(backdrop.blend_far(placed[0]), placed[1], here, terrain.near)

@@ -8,7 +8,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import draw_order
-from dav_gswt.terrain.choice import tiles_at
+from dav_gswt.terrain.choice import Floats, Ints, Vector, tiles_at
 from dav_gswt.terrain.endless import EndlessTerrain
 
 MAX_GAUSSIANS = 10_000_000  # in one picture
@@ -23,13 +23,13 @@ class GridCells:
     distances from the eye to the centres of a cell's Gaussians.
     """
 
-    i: Int64[Array, "n"]
-    j: Int64[Array, "n"]
-    tile: Int64[Array, "n"]
-    materials: Int64[Array, "n"]
+    i: Ints
+    j: Ints
+    tile: Ints
+    materials: Ints
     close: Bool[Array, "n"]
-    nearest: Float[Array, "n"]
-    farthest: Float[Array, "n"]
+    nearest: Floats
+    farthest: Floats
 
     def __len__(self) -> int:
         return len(self.i)
@@ -52,7 +52,7 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     nearest, farthest = _bound_distances(middle, half)
     wider = np.array([terrain.overhang, terrain.overhang, 0])
     seen = (nearest < terrain.reach * side) & ~_outside_frustum(camera, terrain.near, middle, half + wider)
-    sequence, _ = draw_order.sort_cells(i, j, at)
+    sequence = draw_order.sort_cells(i, j, at)
     sequence = sequence[seen[sequence]]
     i, j = i[sequence], j[sequence]
     tile, materials = choose_tiles(terrain, i, j)
@@ -60,15 +60,13 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     return GridCells(i, j, tile, materials, close, nearest[sequence], farthest[sequence])
 
 
-def measure_distances(
-    terrain: EndlessTerrain, i: Int64[Array, "n"], j: Int64[Array, "n"], eye: Float[Array, "3"]
-) -> tuple[Float[Array, "n"], Float[Array, "n"]]:
+def measure_distances(terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector) -> tuple[Floats, Floats]:
     """Bounds of the distances from an eye to the centres of cells' Gaussians."""
     return _bound_distances(*_bound_cells(terrain, i, j, eye))
 
 
 def _bound_cells(
-    terrain: EndlessTerrain, i: Int64[Array, "n"], j: Int64[Array, "n"], eye: Float[Array, "3"]
+    terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector
 ) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
     """Boxes of the centres of cells' Gaussians: their middles from an eye, and their half extents."""
     side = terrain.side
@@ -78,27 +76,19 @@ def _bound_cells(
     return middle, np.stack([np.full(len(x), 0.5 * side), np.full(len(x), 0.5 * side), 0.5 * (high - low)], 1)
 
 
-def _bound_distances(
-    middle: Float[Array, "n 3"], half: Float[Array, "n 3"]
-) -> tuple[Float[Array, "n"], Float[Array, "n"]]:
+def _bound_distances(middle: Float[Array, "n 3"], half: Float[Array, "n 3"]) -> tuple[Floats, Floats]:
     nearest = np.linalg.norm(np.maximum(np.abs(middle) - half, 0), axis=1)
     return nearest, np.linalg.norm(np.abs(middle) + half, axis=1)
 
 
-def choose_tiles(
-    terrain: EndlessTerrain, i: Int64[Array, "n"], j: Int64[Array, "n"]
-) -> tuple[Int64[Array, "n"], Int64[Array, "n"]]:
+def choose_tiles(terrain: EndlessTerrain, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     """Tile of the first material in each cell, and which materials it may show, bit m for material m."""
     tile = tiles_at(i, j, terrain.salt, terrain.variants)
     if terrain.classes is None:
         return tile, np.ones(len(i), np.int64)
     materials = terrain.classes.materials_in(i, j)
-    return tile + terrain.tiles_each * _first_bit(materials), materials
-
-
-def _first_bit(bits: Int64[Array, "n"]) -> Int64[Array, "n"]:
-    """Number of the lowest bit that is set, of at most eight."""
-    return np.argmax(bits[:, None] >> np.arange(8) & 1, axis=1)
+    first = np.argmax(materials[:, None] >> np.arange(8) & 1, axis=1)  # the lowest bit that is set
+    return tile + terrain.tiles_each * first, materials
 
 
 def _outside_frustum(
@@ -110,9 +100,7 @@ def _outside_frustum(
     return np.any(most < 0, axis=1)
 
 
-def outside_by_ball(
-    camera: Camera, near: float, middle: Float[Array, "n 3"], radius: Float[Array, "n"]
-) -> Bool[Array, "n"]:
+def outside_by_ball(camera: Camera, near: float, middle: Float[Array, "n 3"], radius: Floats) -> Bool[Array, "n"]:
     """Which balls (centre from the eye) lie wholly outside one plane of the frustum."""
     planes = _frustum_planes(camera, near)
     reach = radius[:, None] * np.linalg.norm(planes[:, :3], axis=1)
@@ -138,16 +126,14 @@ def active_levels(terrain: EndlessTerrain, cells: GridCells) -> Bool[Array, "lev
     return active_range(terrain, cells.nearest, cells.farthest)
 
 
-def active_range(
-    terrain: EndlessTerrain, nearest: Float[Array, "n"], farthest: Float[Array, "n"]
-) -> Bool[Array, "levels n"]:
+def active_range(terrain: EndlessTerrain, nearest: Floats, farthest: Floats) -> Bool[Array, "levels n"]:
     """Which levels have a weight somewhere between two distances from the eye."""
     switch, band = np.array(terrain.switches)[:, None], np.array(terrain.bands)[:, None]
     begin = np.concatenate([[[-np.inf]], (switch - band)[:-1]])
     return (nearest <= switch + band) & (farthest >= begin)
 
 
-def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Int64[Array, "n"]:
+def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Ints:
     """Number of Gaussians in each cell, over its active levels."""
     levels, each = range(len(terrain.switches)), terrain.tiles_each
     kinds = 1 if terrain.classes is None else terrain.classes.materials

@@ -97,7 +97,8 @@ def render_pieces(
     behind = Backdrop.for_eye(terrain, eye, SKY, ground)
     parts = []  # of each piece: its splats, their colours by every recolouring, whether it is close
     for piece in pieces:
-        field, slope = placement.place_gaussians(terrain, piece.parts, piece.corner, piece.direction, eye)
+        ordered = placement.order_gaussians(piece.parts, piece.direction)
+        field, slope = placement.displace_and_fade(terrain, *ordered, piece.corner, eye)
         part, indices = splats.project_indexed(behind.blend_far(field), slope, here, terrain.near)
         parts.append((part, [recolour(field, eye)[indices] for recolour in recolourings], piece.close))
     parts.sort(key=lambda each: each[2])  # close pieces come last

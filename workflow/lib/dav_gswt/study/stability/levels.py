@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt.bundle import level_distances
 from dav_gswt.field import GaussianField
 from dav_gswt.study.stability.formula import FLOAT32, FLOAT32_EPS, Case, Check
-from dav_gswt.terrain import displacement, weights
+from dav_gswt.terrain import draw_order, heights
 from dav_gswt.terrain.choice import hash_cell
 from dav_gswt.terrain.heights import GAIN, HILLS, SHIFT, Hills
 
@@ -103,7 +103,7 @@ def _drape(quats: Array, scales: tuple, slope: Array) -> Array:
     field = GaussianField(
         np.zeros((n, 3), np.float32), logs, quats, zero, np.zeros((n, 1, 3), np.float32), zero, zero > 0
     )
-    return displacement.displaced_axes(field, slope) / np.exp(logs.astype(np.float64))[:, None]
+    return heights.displaced_axes(field, slope) / np.exp(logs.astype(np.float64))[:, None]
 
 
 def _drape_reference(quats: Array, scales: tuple, slope: Array) -> Array:
@@ -201,7 +201,7 @@ CHECKS = [
     Check(
         "LOD alpha: clip(1/2 - (d - D) / (2 Delta), 0, 1)",
         _distance_cases,
-        weights.finer_share,
+        draw_order.finer_share,
         _alpha_reference,
         relative=FLOAT32,
         absolute=1e-6,
@@ -210,7 +210,7 @@ CHECKS = [
     Check(
         "LOD alpha, smooth",
         _distance_cases,
-        lambda d, switch, band: weights.finer_share(d, switch, band, True),
+        lambda d, switch, band: draw_order.finer_share(d, switch, band, True),
         lambda d, switch, band: _alpha_reference(d, switch, band, True),
         relative=FLOAT32,
         absolute=1e-6,
@@ -218,7 +218,7 @@ CHECKS = [
     Check(
         "LOD: weights of all levels sum to 1",
         _level_cases,
-        lambda d, s, b: weights.level_weights(d, s, b).astype(np.float64).sum(0),
+        lambda d, s, b: draw_order.level_weights(d, s, b).astype(np.float64).sum(0),
         lambda d, s, b: np.ones(len(d)),
         absolute=5 * FLOAT32_EPS,
     ),
@@ -232,7 +232,7 @@ CHECKS = [
     Check(
         "cross-fade: -expm1(w log1p(-alpha))",
         _crossfade_cases,
-        weights.crossfade_opacity,
+        draw_order.crossfade_opacity,
         _crossfade_reference,
         relative=FLOAT32,
         absolute=1e-12,
@@ -240,7 +240,7 @@ CHECKS = [
     Check(
         "two equal splats, drawn with w and 1 - w",
         _equal_splat_cases,
-        lambda a, w: _composite_twice(weights.crossfade_opacity, a, w),
+        lambda a, w: _composite_twice(draw_order.crossfade_opacity, a, w),
         lambda a, w: a.astype(np.float64),
         relative=FLOAT32,
         absolute=1e-6,

@@ -11,7 +11,7 @@ from dav_gswt.field import GaussianField
 from dav_gswt.materials.segmentation import WEIGHTS, compare_classes
 from dav_gswt.study.stability.formula import FLOAT32_EPS, Case, Check
 from dav_gswt.study.stability.levels import hash_exactly
-from dav_gswt.terrain import classes, displacement, scatter, sphere
+from dav_gswt.terrain import classes, heights, scatter, sphere
 from dav_gswt.terrain.heights import FlatSurface
 
 SOFT = (1e-12, 1e-3, 1.0, 1e6)  # softness of a range of heights
@@ -22,12 +22,8 @@ SIDE = 0.7  # of a tile whose positions are exported, in units
 
 
 @dataclass(frozen=True)
-class Ramp:
+class Ramp(heights.HeightField, kind="ramp"):
     """A surface as high as its place lies east: lattice point i of a tile 8 units wide is i high."""
-
-    low: float = -np.inf
-    high: float = np.inf
-    steepest: float = 1.0
 
     def at(self, x: Array, y: Array) -> tuple[Array, Array]:
         return x, np.stack([np.ones_like(x), np.zeros_like(x)], 1)
@@ -117,7 +113,7 @@ def _sphere_cases() -> list[Case]:
     rim = np.array([[x, y, 0] for x in (-0.5, 0, 0.5) for y in (-0.5, 0, 0.5)])
     local = np.concatenate([rim, rng.uniform(-0.5, 0.5, (20, 3)) * [1, 1, 0.2]])
     for radius in RADII:
-        cells = sphere.make_sphere(radius, 1.0).cells
+        cells = heights.make_sphere(radius, 1.0).cells
         for i, j in ((0, 0), (cells // 2, 0), (cells // 2, cells // 2), (cells - 1, cells // 3)):
             cases.append(Case(f"radius {radius:g}, cell ({i}, {j})", (radius, i, j, local)))
     return cases
@@ -125,14 +121,14 @@ def _sphere_cases() -> list[Case]:
 
 def _bend(radius: float, i: int, j: int, local: Array) -> Array:
     """Points of a tile on a sphere, from the tile's middle, in float32."""
-    ball = sphere.make_sphere(radius, 1.0)
+    ball = heights.make_sphere(radius, 1.0)
     tangents = ball.tangents(np.array(i + 0.5), np.array(j + 0.5)).astype(np.float32)
     return sphere.bend(local.astype(np.float32), tangents, ball.radius, ball.rate)[0]
 
 
 def _place_exactly(radius: float, i: int, j: int, local: Array) -> Array:
     """The same points from the planet's middle, in 80 bits; the last one is the tile's middle."""
-    ball, real = sphere.make_sphere(radius, 1.0), np.longdouble
+    ball, real = heights.make_sphere(radius, 1.0), np.longdouble
     points = np.concatenate([local, np.zeros((1, 3))]).astype(real)
     angles = ((points[:, :2] + np.array([i, j], real) + real(0.5)) / ball.cells - real(0.5)) * 2 * np.arctan(real(1))
     ray = np.concatenate([np.tan(angles), np.ones_like(points[:, :1])], 1)
@@ -163,7 +159,7 @@ def _export(far: int, cells: int, local: Array) -> Array:
     """Positions of a tile in the last cell of an area, from its middle, in tile sides."""
     last, middle = far + cells - 1, far + cells / 2
     corner, origin = np.array([last, last, 0]) * SIDE, np.array([middle, middle, 0]) * SIDE
-    means = displacement.displace_means(_as_field(local), FlatSurface(), corner, origin)[0].means
+    means = heights.displace_means(_as_field(local), FlatSurface(), corner, origin)[0].means
     return means.astype(np.float64) / SIDE
 
 

@@ -20,8 +20,7 @@ from dav_gswt.study.tables import spread
 from dav_gswt.study.terrain import browser
 from dav_gswt.terrain import endless, heights, stills, visibility
 from dav_gswt.terrain.page import write_page
-from dav_gswt.terrain.stills import Shot
-from dav_gswt.terrain.timing import FrameTiming
+from dav_gswt.terrain.stills import FrameTiming, Shot
 
 PARTS = ("render", "sort", "update")
 LIBRARY, PAGE = "library", "page"
