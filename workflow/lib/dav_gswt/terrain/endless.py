@@ -41,10 +41,8 @@ class EndlessTerrain:
     material's tiles. near: distance of the near plane. reach: distance to the last tiles, in tile sides; beyond it the
     ground has the terrain's mean colour. classes: which material lies where; None with one. objects:
     objects[number][level], about the foot. extents: of each object, the largest distance of a Gaussian's rim from the
-    foot. scatter: where they stand; None without objects.
-
-    Two caches: kept, by cell, level and material, which Gaussians stay in a cell of several materials; ordered, by
-    object, order and levels, the Gaussians in that order and the level of each.
+    foot. scatter: where they stand; None without objects. ordered: by object, order and levels, the Gaussians in that
+    order and the level of each, as far as they are known.
     """
 
     tiles: dict[tuple[int, int], GaussianField]
@@ -64,7 +62,6 @@ class EndlessTerrain:
     objects: list[list[GaussianField]] = field(default_factory=list)
     extents: list[float] = field(default_factory=list)
     scatter: Scatter | None = None
-    kept: dict[tuple[int, int, int, int], Int[Array, "k"]] = field(default_factory=dict, init=False, repr=False)
     ordered: dict[tuple[int, ...], tuple[GaussianField, Int[Array, "k"]]] = field(
         default_factory=dict, init=False, repr=False
     )

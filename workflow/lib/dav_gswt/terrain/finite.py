@@ -121,14 +121,11 @@ def list_blocks(terrain: EndlessTerrain, area: Area, eye: Vector) -> list[GridCe
 def place_block(terrain: EndlessTerrain, cells: GridCells, eye: Vector, origin: Vector) -> Placer:
     """A function that puts the Gaussians of some cells on the surface. It may run in any thread; this one may not.
 
-    The Gaussians are found now, and what was remembered of these cells is given up: memory does not grow with an area.
-
     Args:   eye: levels are chosen and faded by the distance from it. origin: world position that positions count from.
     """
     corner = np.array([cells.i[0] * terrain.side, cells.j[0] * terrain.side, 0.0])
     parts = [*_place_tiles(terrain, cells, corner), *_place_objects(terrain, cells, corner, eye)]
     field, level = concatenate_parts(parts)
-    terrain.kept.clear()
 
     def place() -> GaussianField:
         raised = displace_field(field, terrain.heights, corner, origin)

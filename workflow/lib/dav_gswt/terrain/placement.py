@@ -18,8 +18,6 @@ from dav_gswt.terrain.heights import displace_means
 from dav_gswt.terrain.scatter import Instances
 from dav_gswt.terrain.visibility import GridCells, active_levels, active_range
 
-KEPT = 4096  # cells, levels and materials whose kept Gaussians are remembered
-
 Part = tuple[GaussianField, Int[Array, "n"]]  # Gaussians, and the level of each
 
 
@@ -51,32 +49,14 @@ def collect_tiles(terrain: EndlessTerrain, cell: GridCells, levels: list[int]) -
     (i,), (j,), (tile,), (bits,) = cell.i.tolist(), cell.j.tolist(), cell.tile.tolist(), cell.materials.tolist()
     if terrain.classes is None or bits & (bits - 1) == 0:
         return {level: terrain.tiles[level, tile] for level in levels}
-    materials = [m for m in range(terrain.classes.materials) if bits >> m & 1]
-    fields = {
-        (level, m): terrain.tiles[level, m * terrain.tiles_each + tile % terrain.tiles_each]
-        for level in levels
-        for m in materials
-    }
-    kept = _find_kept(terrain, (i, j), fields)
-    return {level: concatenate_fields([fields[level, m][kept[level, m]] for m in materials]) for level in levels}
-
-
-def _find_kept(
-    terrain: EndlessTerrain, cell: tuple[int, int], fields: dict[tuple[int, int], GaussianField]
-) -> dict[tuple[int, int], Int[Array, "k"]]:
-    """Indices of the Gaussians of each level and material that stay in a cell of several; they are remembered."""
-    known, classes = terrain.kept, terrain.classes
-    assert classes is not None
-    if len(known) > KEPT:
-        known.clear()  # other threads hold what they have found
-    found = {place: rows for place in fields if (rows := known.get((*cell, *place))) is not None}
-    missing = [place for place in fields if place not in found]
-    if missing:
-        sizes = [len(fields[place]) for place in missing]
-        means = np.concatenate([fields[place].means for place in missing])
-        stays = classes.keep(*cell, means, np.repeat([material for _, material in missing], sizes))
-        for place, part in zip(missing, np.split(stays, np.cumsum(sizes)[:-1]), strict=True):
-            found[place] = known[(*cell, *place)] = np.flatnonzero(part)
+    found, each = {}, terrain.tiles_each
+    for level in levels:
+        parts = {
+            m: terrain.tiles[level, m * each + tile % each] for m in range(terrain.classes.materials) if bits >> m & 1
+        }
+        field = concatenate_fields(list(parts.values()))
+        material = np.repeat(list(parts), [len(part) for part in parts.values()])
+        found[level] = field[terrain.classes.keep(i, j, field.means, material)]
     return found
 
 

@@ -16,7 +16,7 @@ from dav_gswt.terrain.backdrop import find_reach
 from dav_gswt.terrain.choice import Floats, Ints, Vector
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import QUARTER, Sphere
-from dav_gswt.terrain.placement import KEPT, fade_levels, order_gaussians
+from dav_gswt.terrain.placement import fade_levels, order_gaussians
 from dav_gswt.terrain.sphere import FACES, FaceCells, bend, directions, find_kept, is_covered, is_frayed, tiles_on
 from dav_gswt.terrain.visibility import GridCells, active_levels, outside_by_ball
 
@@ -109,7 +109,11 @@ def place_on_sphere(
     (column,), (j,), (tile,) = cell.i.tolist(), cell.j.tolist(), cell.tile.tolist()
     face, i = column // (sphere.cells + 2), column % (sphere.cells + 2) - 1
     levels = np.flatnonzero(active_levels(terrain, cell)[:, 0]).tolist()
-    parts = {level: _keep(terrain, sphere, (face, i, j), level, tile) for level in levels}
+    parts = {level: terrain.tiles[level, tile] for level in levels}
+    if is_frayed(sphere, FaceCells(*(np.array([v]) for v in (face, i, j))))[0]:
+        for level, field in parts.items():
+            places = field.means.astype(float) / terrain.side + [i, j, 0]
+            parts[level] = field[find_kept(sphere, face, places, terrain.salt)]
     tangents = sphere.tangents(np.array(i + 0.5), np.array(j + 0.5))
     axes, up = FACES[face].T.astype(float), np.array([*tangents, 1.0])
     up /= np.linalg.norm(up)
@@ -124,17 +128,3 @@ def place_on_sphere(
     means = centre + points @ axes.T
     placed, active = fade_levels(terrain, field, level, np.linalg.norm(means, axis=1))
     return replace(placed, means=means[active].astype(np.float32)), axes @ jacobians[active]
-
-
-def _keep(terrain: EndlessTerrain, sphere: Sphere, cell: tuple[int, int, int], level: int, tile: int) -> GaussianField:
-    """The Gaussians of a tile that stay in a cell; they are remembered where the face's edge frays."""
-    field, (face, i, j) = terrain.tiles[level, tile], cell
-    if not is_frayed(sphere, FaceCells(*(np.array([v]) for v in cell)))[0]:
-        return field
-    key = (face * (sphere.cells + 2) + i + 1, j, level, tile)
-    if len(terrain.kept) > KEPT:
-        terrain.kept.clear()
-    if key not in terrain.kept:
-        places = field.means.astype(float) / terrain.side + [i, j, 0]
-        terrain.kept[key] = np.flatnonzero(find_kept(sphere, face, places, terrain.salt))
-    return field[terrain.kept[key]]
