@@ -46,8 +46,8 @@ SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells
 TURN = (0.8, 0.6)  # cosine and sine by which each octave is turned against the last: gradient noise prefers its axes
 CONTRAST = 3.0  # the jitter is its noise times this, cut at -1 and 1
 FARTHEST = 4.0  # weights by which a score falls at most outside of a range
-SLICE = 4096  # cells that are looked at at once
-CACHED = 32768  # cells whose materials, and where there are several also scores, are kept
+SLICE = 256  # cells whose scores are computed at once
+CACHED = 32768  # cells whose materials are remembered
 WIDE = 4 * MAX_COORDINATE  # painted point (i, j) has the key i WIDE + j
 SPREAD = (1, 4, 6, 4, 1)  # weights along an axis, by which a painted point counts for those around it
 WHOLE = 256  # sum of the products of two weights
@@ -114,7 +114,6 @@ class Classes:
     heights: HeightField = FlatSurface()
     pictures: Mapping[str, Picture] = field(default_factory=dict)
     _known: dict[tuple[int, int], int] = field(default_factory=dict, init=False, repr=False)
-    _lattices: dict[tuple[int, int], Float[Array, "y x m"]] = field(default_factory=dict, init=False, repr=False)
 
     def lattice_scores(self, i: Ints, j: Ints) -> Float[Array, "n m"]:
         """Scores of all materials at lattice points; point (i, j) lies at (i, j) side / LATTICE."""
@@ -144,14 +143,29 @@ class Classes:
         return _interpolate(corners, s[:, None], t[:, None])
 
     def jitter_at(self, i: int, j: int, u: Floats, v: Floats) -> Float[Array, "n m"]:
-        """Jitter of all materials at places of one cell, at most the amplitude either way."""
-        jitter, total = self.entry.jitter, sum(GAIN**k for k in range(self.entry.jitter.octaves))
-        noise = np.zeros((len(u), self.materials))
+        """Jitter of all materials at places of one cell, at most the amplitude either way.
+
+        It is gradient noise. One hash serves four materials: a byte each, half of it for the gradient's way east and
+        half for the way north. Beyond the cell its last square goes on.
+        """
+        jitter, which = self.entry.jitter, np.arange(self.materials)
+        total = np.zeros((len(u), self.materials))
         for octave in range(jitter.octaves):
-            cells = jitter.cells * 2**octave
+            cells, noise = jitter.cells * 2**octave, np.zeros_like(total)
             x, y = cells * u + octave * SHIFT[0], cells * v + octave * SHIFT[1]
-            noise += GAIN**octave * _noise_of_table(self._jitter_gradients(i * cells, j * cells, octave), x, y)
-        return jitter.amplitude * np.clip(CONTRAST * noise / total, -1, 1)
+            column, row = (np.clip(np.floor(p), 0, cells).astype(np.int64) for p in (x, y))
+            s, t = (x - column)[:, None], (y - row)[:, None]
+            across, along = smoothstep(s), smoothstep(t)
+            for b, a in np.ndindex(2, 2):
+                corner = i * cells + column + a, j * cells + row + b
+                axes = [JITTER + MAX_OCTAVES * word + octave for word in range((self.materials + 3) // 4)]
+                words = np.stack([np.asarray(hash_cell(*corner, axis, self.entry.salt)) for axis in axes], -1)
+                bits = words[:, which // 4] >> (8 * (which % 4))
+                plane = ((bits & 15) / 7.5 - 1) * (s - a) + ((bits >> 4 & 15) / 7.5 - 1) * (t - b)
+                noise += (across if a else 1 - across) * (along if b else 1 - along) * plane
+            total += GAIN**octave * noise
+        total /= sum(GAIN**k for k in range(jitter.octaves))
+        return jitter.amplitude * np.clip(CONTRAST * total, -1, 1)
 
     def materials_in(self, i: Ints, j: Ints) -> Ints:
         """Which materials may have a Gaussian in cells: bit m for material m.
@@ -159,21 +173,18 @@ class Classes:
         A difference of scores is bilinear in each square of the lattice, so it is largest at a corner of it; jitter
         changes it by twice the amplitude at most, height by `most`.
         """
-        if len(i) > SLICE:  # what is known of cells takes 2 kB each: of a wide area it is kept for some at a time
-            parts = [self.materials_in(i[k : k + SLICE], j[k : k + SLICE]) for k in range(0, len(i), SLICE)]
-            return np.concatenate(parts)
         cells = list(zip(i.tolist(), j.tolist(), strict=True))
         if len(self._known) + len(cells) > CACHED:
             self._known.clear()
-            self._lattices.clear()
         new = [cell for cell in dict.fromkeys(cells) if cell not in self._known]
-        for first in range(0, len(new), 256):
-            some = new[first : first + 256]
-            lattices = self.cell_lattices(*np.array(some, np.int64).T)
-            for cell, bits, lattice in zip(some, self._find_materials(lattices).tolist(), lattices, strict=True):
-                self._known[cell] = bits
-                if bits & (bits - 1):
-                    self._lattices[cell] = lattice.copy()
+        slack = 2 * self.entry.jitter.amplitude + self.entry.rise.most
+        for first in range(0, len(new), SLICE):
+            some = new[first : first + SLICE]
+            lattices, masks = self.cell_lattices(*np.array(some, np.int64).T), np.zeros(len(some), np.int64)
+            for material in range(self.materials):
+                most = _over_corners(np.maximum, lattices[..., material, None] - lattices)
+                masks |= (most >= -slack).all(-1).any((1, 2)).astype(np.int64) << material
+            self._known.update(zip(some, masks.tolist(), strict=True))
         return np.array([self._known[cell] for cell in cells], np.int64)
 
     def keep(self, i: int, j: int, means: Float32[Array, "n 3"], material: Ints) -> Bool[Array, "n"]:
@@ -181,36 +192,21 @@ class Classes:
 
         Args:   means: from the cell's corner. material: of each Gaussian's tile.
         """
-        lattice = self._find_lattice(i, j)
+        lattice = self.cell_lattices(np.array([i]), np.array([j]))[0]
         u, v = means[:, 0].astype(float) / self.side, means[:, 1].astype(float) / self.side
         a, b, s, t = _find_square(u, v)
         stays, undecided = self._decide_squares(lattice)
         kept, test = stays[b, a, material], np.flatnonzero(undecided[b, a, material])
         if len(test):
-            a, b, s, t = a[test], b[test], s[test, None], t[test, None]
+            a, b, s, t, rise = a[test], b[test], s[test, None], t[test, None], self.entry.rise
             corners = [lattice[b + k // 2, a + k % 2] for k in range(4)]
             scores, own = _interpolate(corners, s, t) + self.jitter_at(i, j, u[test], v[test]), material[test]
-            mine = scores[np.arange(len(test)), own] + self._rise_bonus(means[test, 2].astype(float), own)
+            away = np.abs(means[test, 2].astype(float) - np.array(rise.ground)[own]) - np.array(rise.clearance)[own]
+            bonus = np.minimum(rise.slope * np.maximum(away, 0), rise.most)
+            mine = scores[np.arange(len(test)), own] + bonus
             scores[np.arange(len(test)), own] = -np.inf
             kept[test] = mine >= scores.max(1)
         return kept
-
-    def _find_lattice(self, i: int, j: int) -> Float[Array, "y x m"]:
-        if (i, j) not in self._lattices:
-            self._lattices[i, j] = self.cell_lattices(np.array([i]), np.array([j]))[0]
-        return self._lattices[i, j]
-
-    def _rise_bonus(self, z: Floats, material: Ints) -> Floats:
-        rise = self.entry.rise
-        away = np.abs(z - np.array(rise.ground)[material]) - np.array(rise.clearance)[material]
-        return np.minimum(rise.slope * np.maximum(away, 0), rise.most)
-
-    def _find_materials(self, lattices: Float[Array, "n y x m"]) -> Ints:
-        slack, masks = 2 * self.entry.jitter.amplitude + self.entry.rise.most, np.zeros(len(lattices), np.int64)
-        for material in range(self.materials):
-            most = _over_corners(np.maximum, lattices[..., material, None] - lattices)
-            masks |= (most >= -slack).all(-1).reshape(len(lattices), -1).any(1).astype(np.int64) << material
-        return masks
 
     def _decide_squares(self, lattice: Float[Array, "y x m"]) -> tuple[Bool[Array, "b a m"], Bool[Array, "b a m"]]:
         """Squares of a cell's lattice where all Gaussians of a material stay, and those where each has to be tested."""
@@ -230,11 +226,16 @@ class Classes:
         x, y = i * (self.side / LATTICE), j * (self.side / LATTICE)
         if isinstance(term, ImageTerm):
             return self._picture_shares(term, x, y)
+        height, slope = self.heights.at(x, y)
+        value = height if term.kind == "height" else np.sqrt(slope[:, 0] * slope[:, 0] + slope[:, 1] * slope[:, 1])
+        low = -np.inf if term.low is None else term.low
+        high = np.inf if term.high is None else term.high
+        outside = np.maximum(np.maximum(low - value, value - high), 0)
         scores = np.zeros((len(i), self.materials))
-        scores[:, term.material] = -self._outside_of_range(term, x, y)
+        scores[:, term.material] = -np.minimum(outside / term.soft, FARTHEST)
         return scores
 
-    def _class_noise(self, term: NoiseTerm, material: int, i: Ints, j: Ints) -> Array:
+    def _class_noise(self, term: NoiseTerm, material: int, i: Ints, j: Ints) -> Floats:
         """Gradient noise of a material at lattice points, in [-1, 1], and its bias."""
         octaves, noise = term.octaves[material], np.zeros(len(i))
         step = 1 / (term.wavelengths[material] * LATTICE)
@@ -246,59 +247,18 @@ class Classes:
             x, y = 2 * x, 2 * y
         return noise / sum(GAIN**k for k in range(octaves)) + term.biases[material]
 
-    def _outside_of_range(self, term: RangeTerm, x: Floats, y: Floats) -> Floats:
-        """How far height or slope lie outside of a range, in units of its softness."""
-        height, slope = self.heights.at(x, y)
-        value = height if term.kind == "height" else np.sqrt(slope[:, 0] * slope[:, 0] + slope[:, 1] * slope[:, 1])
-        low = -np.inf if term.low is None else term.low
-        high = np.inf if term.high is None else term.high
-        outside = np.maximum(np.maximum(low - value, value - high), 0)
-        return np.minimum(outside / term.soft, FARTHEST)
-
     def _picture_shares(self, term: ImageTerm, x: Floats, y: Floats) -> Float[Array, "n m"]:
         """Share of each material among the four pixels around places, by the distances to their centres."""
         pixels, per_unit = self.pictures[term.file], term.columns / term.width
         p, q = x * per_unit + 0.5 * term.columns - 0.5, 0.5 * term.rows - y * per_unit - 0.5
-        column, row = np.floor(p), np.floor(q)
-        s, t = p - column, q - row
-        column, row, shares = column.astype(np.int64), row.astype(np.int64), np.zeros((len(x), self.materials))
-        for k in range(4):
-            rows = wrap_index(row + k // 2, term.rows, term.beyond)
-            columns = wrap_index(column + k % 2, term.columns, term.beyond)
-            weight = (s if k % 2 else 1 - s) * (t if k // 2 else 1 - t)
+        column, row = np.floor(p).astype(np.int64), np.floor(q).astype(np.int64)
+        s, t, shares = p - column, q - row, np.zeros((len(x), self.materials))
+        for b, a in np.ndindex(2, 2):
+            rows = wrap_index(row + b, term.rows, term.beyond)
+            columns = wrap_index(column + a, term.columns, term.beyond)
+            weight = (s if a else 1 - s) * (t if b else 1 - t)
             shares += weight[:, None] * (pixels[rows, columns][:, None] == np.arange(self.materials))
         return shares
-
-    def _jitter_gradients(self, i: int, j: int, octave: int) -> Float[Array, "y x m 2"]:
-        """Gradients of the jitter at all integer points of one tile, for all materials; its first point is (i, j).
-
-        One hash serves four materials: a byte each, half of it for the way east and half for the way north.
-        """
-        steps = np.arange(self.entry.jitter.cells * 2**octave + 2, dtype=np.int64)  # one more for the shift
-        columns, rows = np.meshgrid(i + steps, j + steps)
-        which = np.arange(self.materials)
-        words = [
-            hash_cell(columns, rows, JITTER + MAX_OCTAVES * word + octave, self.entry.salt)
-            for word in range((self.materials + 3) // 4)
-        ]
-        bits = np.stack(words, -1)[..., which // 4] >> (8 * (which % 4))
-        return np.stack([bits & 15, bits >> 4 & 15], -1) / 7.5 - 1
-
-
-def _noise_of_table(gradients: Float[Array, "y x m 2"], x: Floats, y: Floats) -> Float[Array, "n m"]:
-    """Gradient noise at places of a table of gradients; beyond it the last square goes on."""
-    rows, columns, materials, _ = gradients.shape
-    flat = np.moveaxis(gradients, -1, 0).reshape(2, rows * columns, materials)
-    column, row = (np.clip(np.floor(p), 0, rows - 2).astype(np.int64) for p in (x, y))
-    u, v = (x - column)[:, None], (y - row)[:, None]
-    across, along, noise = smoothstep(u), smoothstep(v), np.zeros((len(x), materials))
-    for k in range(4):
-        a, b = k % 2, k // 2
-        corner = (row + b) * columns + column + a
-        east, north = (part.take(corner, axis=0) for part in flat)
-        weight = (across if a else 1 - across) * (along if b else 1 - along)
-        noise += weight * (east * (u - a) + north * (v - b))
-    return noise
 
 
 def _find_square(u: Floats, v: Floats):
