@@ -13,7 +13,6 @@ from dav_gswt.bundle.manifest import TileSetInfo
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField
 from dav_gswt.raster.interface import RIM
-from dav_gswt.terrain.choice import Floats
 from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_missing
 from dav_gswt.terrain.classes import Classes, Picture
 from dav_gswt.terrain.heights import (
@@ -74,14 +73,6 @@ class EndlessTerrain:
     def tiles_each(self) -> int:
         """Number of tiles of a material."""
         return EDGES * self.variants
-
-    def height_range(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """Lower and upper bound of the heights of all Gaussians in cells with these centres, the surface included."""
-        half = (0.5 * self.side + self.overhang) * 2**0.5
-        middle, _ = self.heights.at(x, y)
-        most = self.heights.steepest * half
-        low = np.maximum(middle - most, self.heights.low) + self.z[0]
-        return low, np.minimum(middle + most, self.heights.high) + self.z[1]
 
 
 def terrain_from_bundle(

@@ -76,22 +76,18 @@ def fit_cover(content: BundleContent, salt: int) -> BundleContent:
 def fit_classes(content: BundleContent, salt: int) -> ClassesEntry:
     """The rule that gives every material its share of the ground and, as far as possible, its patch scale.
 
-    Where borders were seen, the noise has so many octaves that its borders bend as those do.
+    Where borders were seen, the noise has as many octaves as make its borders bend most nearly as much.
     """
-    seen = [material.bend / content.side for material in content.materials if material.bend is not None]
-    bend = float(np.mean(seen)) if seen else None
-    entry, steepness = _fit_noise(content, salt, MAX_OCTAVES) if bend is None else _fit_bends(content, salt, bend)
-    return replace(entry, jitter=_fit_jitter(content, steepness), rise=_fit_rise(content, steepness / content.side))
-
-
-def _fit_bends(content: BundleContent, salt: int, bend: float) -> tuple[ClassesEntry, float]:
-    """As `_fit_noise`, with so many octaves that borders bend the most nearly by so many tile sides."""
-    choices = [_fit_noise(content, salt, 1)]
-    while len(choices) < MAX_OCTAVES and (more := _fit_noise(content, salt, len(choices) + 1)) != choices[-1]:
-        choices.append(more)  # as long as the lattice shows another octave
-    number = len(content.materials)
-    found = [measure_bends(Classes(entry, number, content.side), salt) for entry, _ in choices]
-    return choices[int(np.abs(np.array(found) - bend).argmin())]
+    side, seen = content.side, [each.bend for each in content.materials if each.bend is not None]
+    entry, steepness = _fit_noise(content, salt, 1 if seen else MAX_OCTAVES)
+    if seen:
+        choices = [(entry, steepness)]
+        while len(choices) < MAX_OCTAVES and (more := _fit_noise(content, salt, len(choices) + 1)) != choices[-1]:
+            choices.append(more)  # as long as the lattice shows another octave
+        bends = [measure_bends(Classes(each, len(content.materials), side), salt) for each, _ in choices]
+        wanted = float(np.mean([bend / side for bend in seen]))
+        entry, steepness = choices[int(np.abs(np.array(bends) - wanted).argmin())]
+    return replace(entry, jitter=_fit_jitter(content, steepness), rise=_fit_rise(content, steepness / side))
 
 
 def measure_bends(classes: Classes, salt: int) -> float:
@@ -210,39 +206,29 @@ def fit_scatter(content: BundleContent, classes: ClassesEntry | None, salt: int)
     Candidates are lost to others that overlap them and to borders of materials. They are counted in a window of the
     terrain, and the probabilities are corrected by what is missing. A density that does not fit is reported.
     """
-    densities = np.array([each.density for each in content.objects])
-    material = np.array([each.material for each in content.objects])
+    side, number = content.side, len(content.objects)
+    densities, material = (np.array([getattr(each, k) for each in content.objects]) for k in ("density", "material"))
+    shares = np.array([content.materials[m].share for m in material])
     fullest = max(densities[material == m].sum() for m in range(len(content.materials)))
-    cells = int(np.clip(np.ceil(content.side * np.sqrt(CANDIDATES * fullest)), 1, MAX_CELLS))
-    entry = ScatterEntry(cells, TURN, SIZE, salt)
-    cover = classes and Classes(classes, len(content.materials), content.side)
-    probabilities = _cap(densities * (content.side / cells) ** 2, material)
-    reached = densities
+    cells = int(np.clip(np.ceil(side * np.sqrt(CANDIDATES * fullest)), 1, MAX_CELLS))
+    rarest = float((densities * shares)[densities > 0].min(initial=np.inf)) * side**2
+    window = int(np.clip(np.ceil(np.sqrt(WANTED / rarest)), 8, MAX_WINDOW))
+    i, j = (v.ravel() for v in np.mgrid[:window, :window].astype(np.int64) - window // 2)
+    entry, cover = ScatterEntry(cells, TURN, SIZE, salt), classes and Classes(classes, len(content.materials), side)
+    probabilities, reached = _cap(densities * (side / cells) ** 2, material), densities
     for _ in range(SCATTER_PASSES):
         objects = [
             ObjectOrders(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, float(p), [])
             for each, p in zip(content.objects, probabilities, strict=True)
         ]
-        scatter = Scatter(entry, objects, content.side, cover)
-        reached = measure_densities(scatter, content)
+        found = Scatter(entry, objects, side, cover).instances_in(i, j)
+        reached = np.bincount(found.number, minlength=number) / (window**2 * side**2 * shares)
         probabilities = _cap(probabilities * np.clip(densities / np.maximum(reached, 1e-300), 0.5, 2), material)
     for each, density in zip(content.objects, reached.tolist(), strict=True):
         if density < SHORTFALL * each.density:
             said = "objects: %s stands %.3g times per unit of area where %.3g were found; there is no room for more"
             _log.warning(said, each.name, density, each.density)
     return entry, probabilities.tolist()
-
-
-def measure_densities(scatter: Scatter, content: BundleContent) -> Float[Array, "objects"]:
-    """Number of each object per unit of area of its material, in a window about the origin."""
-    shares = np.array([content.materials[each.material].share for each in content.objects])
-    densities = np.array([each.density for each in content.objects])
-    rarest = float((densities * shares)[densities > 0].min(initial=np.inf)) * content.side**2
-    window = int(np.clip(np.ceil(np.sqrt(WANTED / rarest)), 8, MAX_WINDOW))
-    i, j = (v.ravel() for v in np.mgrid[:window, :window].astype(np.int64) - window // 2)
-    found = scatter.instances_in(i, j)
-    counts = np.bincount(found.number, minlength=len(content.objects))
-    return counts / (window**2 * content.side**2 * shares)
 
 
 def _cap(probabilities: Float[Array, "objects"], material: Array) -> Float[Array, "objects"]:

@@ -18,7 +18,7 @@ from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import QUARTER, Sphere
 from dav_gswt.terrain.placement import fade_levels, order_gaussians
 from dav_gswt.terrain.sphere import FACES, FaceCells, bend, directions, find_kept, is_covered, is_frayed, tiles_on
-from dav_gswt.terrain.visibility import GridCells, active_levels, outside_by_ball
+from dav_gswt.terrain.visibility import GridCells, active_levels, frustum_planes
 
 
 def visible_on_sphere(terrain: EndlessTerrain, sphere: Sphere, camera: Camera) -> GridCells:
@@ -75,7 +75,10 @@ def _find_seen(
     dip, rise = (np.arccos(np.clip((radius + low) / top, -1, 1)) for top in (far, radius + high))
     apart = _angle(np.linalg.norm(middle - eye / far, axis=1)) - _angle(chord) - terrain.overhang / radius
     seen = (nearest < find_reach(terrain, sphere, eye)) & (apart <= dip + rise)
-    return seen & ~outside_by_ball(camera, terrain.near, away, ball + terrain.overhang), nearest, farthest
+    planes = frustum_planes(camera, terrain.near)
+    most = (ball + terrain.overhang)[:, None] * np.linalg.norm(planes[:, :3], axis=1)
+    seen &= (away @ planes[:, :3].T + most + planes[:, 3] >= 0).all(1)
+    return seen, nearest, farthest
 
 
 def _angle(chord: Floats) -> Floats:

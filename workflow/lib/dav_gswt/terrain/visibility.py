@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int64
+from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
@@ -14,6 +14,8 @@ from dav_gswt.terrain.endless import EndlessTerrain
 MAX_GAUSSIANS = 10_000_000  # in one picture
 PAD = 2.0  # pixels, rounded up, by which the rasterizer's dilation of splats reaches into the picture
 MIN_FACTOR, BISECTIONS = 1e-5, 16  # of the search for a factor on level distances
+
+Points = Float[Array, "n 3"]
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,12 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     at = (int(np.floor(eye[0] / side)), int(np.floor(eye[1] / side)))
     steps = np.arange(-terrain.reach, terrain.reach + 1, dtype=np.int64)
     i, j = (v.ravel() for v in np.meshgrid(at[0] + steps, at[1] + steps))
+    nearest, farthest = measure_distances(terrain, i, j, eye)
     middle, half = _bound_cells(terrain, i, j, eye)
-    nearest, farthest = _bound_distances(middle, half)
-    wider = np.array([terrain.overhang, terrain.overhang, 0])
-    seen = (nearest < terrain.reach * side) & ~_outside_frustum(camera, terrain.near, middle, half + wider)
+    planes = frustum_planes(camera, terrain.near)
+    half += np.array([terrain.overhang, terrain.overhang, 0])
+    most = middle @ planes[:, :3].T + half @ np.abs(planes[:, :3]).T + planes[:, 3]
+    seen = (nearest < terrain.reach * side) & (most >= 0).all(1)
     sequence = draw_order.sort_cells(i, j, at)
     sequence = sequence[seen[sequence]]
     i, j = i[sequence], j[sequence]
@@ -62,23 +66,21 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
 
 def measure_distances(terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector) -> tuple[Floats, Floats]:
     """Bounds of the distances from an eye to the centres of cells' Gaussians."""
-    return _bound_distances(*_bound_cells(terrain, i, j, eye))
-
-
-def _bound_cells(
-    terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector
-) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
-    """Boxes of the centres of cells' Gaussians: their middles from an eye, and their half extents."""
-    side = terrain.side
-    x, y = (i + 0.5) * side, (j + 0.5) * side
-    low, high = terrain.height_range(x, y)
-    middle = np.stack([x, y, 0.5 * (low + high)], 1) - eye
-    return middle, np.stack([np.full(len(x), 0.5 * side), np.full(len(x), 0.5 * side), 0.5 * (high - low)], 1)
-
-
-def _bound_distances(middle: Float[Array, "n 3"], half: Float[Array, "n 3"]) -> tuple[Floats, Floats]:
+    middle, half = _bound_cells(terrain, i, j, eye)
     nearest = np.linalg.norm(np.maximum(np.abs(middle) - half, 0), axis=1)
     return nearest, np.linalg.norm(np.abs(middle) + half, axis=1)
+
+
+def _bound_cells(terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector) -> tuple[Points, Points]:
+    """Boxes of the centres of cells' Gaussians: their middles from an eye, and their half extents."""
+    side, surface = terrain.side, terrain.heights
+    x, y = (i + 0.5) * side, (j + 0.5) * side
+    middle, _ = surface.at(x, y)
+    most = surface.steepest * (0.5 * side + terrain.overhang) * 2**0.5
+    low = np.maximum(middle - most, surface.low) + terrain.z[0]
+    high = np.minimum(middle + most, surface.high) + terrain.z[1]
+    half = np.full(len(x), 0.5 * side)
+    return np.stack([x, y, 0.5 * (low + high)], 1) - eye, np.stack([half, half, 0.5 * (high - low)], 1)
 
 
 def choose_tiles(terrain: EndlessTerrain, i: Ints, j: Ints) -> tuple[Ints, Ints]:
@@ -91,23 +93,7 @@ def choose_tiles(terrain: EndlessTerrain, i: Ints, j: Ints) -> tuple[Ints, Ints]
     return tile + terrain.tiles_each * first, materials
 
 
-def _outside_frustum(
-    camera: Camera, near: float, middle: Float[Array, "n 3"], half: Float[Array, "n 3"]
-) -> Bool[Array, "n"]:
-    """Which boxes (centre from the eye, half extents) lie wholly outside one plane of the frustum."""
-    planes = _frustum_planes(camera, near)
-    most = middle @ planes[:, :3].T + half @ np.abs(planes[:, :3]).T + planes[:, 3]
-    return np.any(most < 0, axis=1)
-
-
-def outside_by_ball(camera: Camera, near: float, middle: Float[Array, "n 3"], radius: Floats) -> Bool[Array, "n"]:
-    """Which balls (centre from the eye) lie wholly outside one plane of the frustum."""
-    planes = _frustum_planes(camera, near)
-    reach = radius[:, None] * np.linalg.norm(planes[:, :3], axis=1)
-    return np.any(middle @ planes[:, :3].T + reach + planes[:, 3] < 0, axis=1)
-
-
-def _frustum_planes(camera: Camera, near: float) -> Float[Array, "5 4"]:
+def frustum_planes(camera: Camera, near: float) -> Float[Array, "5 4"]:
     """Near, left, right, upper and lower plane: inward normal and distance."""
     right, down, ahead = camera.rotation
     return np.array(
@@ -134,24 +120,18 @@ def active_range(terrain: EndlessTerrain, nearest: Floats, farthest: Floats) -> 
 
 
 def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Ints:
-    """Number of Gaussians in each cell, over its active levels."""
+    """Number of Gaussians in each cell, and of the objects whose feet lie in it, over its active levels."""
     levels, each = range(len(terrain.switches)), terrain.tiles_each
     kinds = 1 if terrain.classes is None else terrain.classes.materials
     sizes = np.array([[len(terrain.tiles[level, t]) for t in range(kinds * each)] for level in levels], np.int64)
     counts = sum(sizes[:, m * each + cells.tile % each] * (cells.materials >> m & 1) for m in range(kinds))
     if terrain.scatter is not None:
-        counts = counts + _count_objects(terrain, cells)
+        found = terrain.scatter.instances_in(cells.i, cells.j)
+        index = {cell: k for k, cell in enumerate(zip(cells.i.tolist(), cells.j.tolist(), strict=True))}
+        owner = np.array([index[cell] for cell in zip(found.i.tolist(), found.j.tolist(), strict=True)], int)
+        sizes = np.array([[len(fields[level]) for fields in terrain.objects] for level in levels])
+        counts = counts + [np.bincount(owner, size[found.number], len(cells)).astype(np.int64) for size in sizes]
     return (counts * active_levels(terrain, cells)).sum(0)
-
-
-def _count_objects(terrain: EndlessTerrain, cells: GridCells) -> Int64[Array, "levels n"]:
-    """Number of Gaussians at each level of the objects whose feet lie in cells."""
-    assert terrain.scatter is not None
-    found = terrain.scatter.instances_in(cells.i, cells.j)
-    index = {cell: k for k, cell in enumerate(zip(cells.i.tolist(), cells.j.tolist(), strict=True))}
-    owner = np.array([index[cell] for cell in zip(found.i.tolist(), found.j.tolist(), strict=True)], int)
-    sizes = [[len(levels[level]) for levels in terrain.objects] for level in range(len(terrain.switches))]
-    return np.array([np.bincount(owner, np.array(size)[found.number], len(cells)) for size in sizes]).astype(np.int64)
 
 
 def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int = MAX_GAUSSIANS) -> GridCells:
