@@ -117,7 +117,7 @@ def group_by_cell(terrain: EndlessTerrain, cells: GridCells, eye: Vector) -> dic
     found, side = terrain.scatter.instances_in(cells.i, cells.j), terrain.side
     if not len(found):
         return {}
-    radius = np.array([each.radius for each in terrain.scatter.objects])[found.number] * found.size / side
+    radius = terrain.scatter.radii(found) / side
     owner = []
     for cell, place, at in ((found.i, found.u, eye[0]), (found.j, found.v, eye[1])):
         low, high = (cell + np.floor(place + step * radius).astype(np.int64) for step in (-1, 1))

@@ -19,7 +19,7 @@ from numpy import ndarray as Array
 from scipy.spatial import cKDTree
 
 from dav_gswt.bundle.land_cover import ObjectOrders, ScatterEntry
-from dav_gswt.terrain.choice import hash_cell
+from dav_gswt.terrain.choice import Floats, Ints, hash_cell
 from dav_gswt.terrain.classes import Classes
 
 PLACE, WHICH, PRIORITY, FORM = 96, 97, 98, 99  # axes of the hash
@@ -39,13 +39,13 @@ class Instances:
         size: factor.
     """
 
-    i: Int64[Array, "n"]
-    j: Int64[Array, "n"]
-    u: Float[Array, "n"]
-    v: Float[Array, "n"]
-    number: Int64[Array, "n"]
-    turn: Float[Array, "n"]
-    size: Float[Array, "n"]
+    i: Ints
+    j: Ints
+    u: Floats
+    v: Floats
+    number: Ints
+    turn: Floats
+    size: Floats
 
     def __len__(self) -> int:
         return len(self.i)
@@ -54,8 +54,7 @@ class Instances:
         return Instances(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
-_NONE = np.zeros(0, np.int64)
-EMPTY = Instances(_NONE, _NONE, np.zeros(0), np.zeros(0), _NONE, np.zeros(0), np.zeros(0))
+EMPTY = Instances(*(np.zeros(0, kind) for kind in (int, int, float, float, int, float, float)))
 
 
 def concatenate_instances(parts: Sequence[Instances]) -> Instances:
@@ -80,7 +79,7 @@ class Scatter:
     classes: Classes | None = None
     _known: dict[tuple[int, int], Instances] = field(default_factory=dict, init=False, repr=False)
 
-    def instances_in(self, i: Int64[Array, "n"], j: Int64[Array, "n"]) -> Instances:
+    def instances_in(self, i: Ints, j: Ints) -> Instances:
         """The objects whose feet lie in cells, cell by cell."""
         cells = list(zip(i.tolist(), j.tolist(), strict=True))
         if len(self._known) + len(cells) > CACHED:
@@ -97,72 +96,62 @@ class Scatter:
 
     def _find_instances(self, cells: Int64[Array, "n 2"]) -> Instances:
         """All instances in distinct cells, by candidates in them and in the cells around."""
-        n, widest = self.entry.cells, 2 * max(each.radius for each in self.objects) * (1 + self.entry.size)
-        ring = -(-int(np.ceil(widest * n / self.side)) // n)  # cells around whose candidates may overlap one inside
+        n, entry, widest = self.entry.cells, self.entry, 2 * max(each.radius for each in self.objects)
+        ring = -(-int(np.ceil(widest * (1 + entry.size) * n / self.side)) // n)  # farther candidates do not overlap
         around = np.stack(np.meshgrid(*2 * [np.arange(-ring, ring + 1)]), -1).reshape(-1, 2)
         wide = np.unique((cells[:, None] + around[None]).reshape(-1, 2), axis=0)
         squares = np.stack(np.meshgrid(np.arange(n), np.arange(n)), -1).reshape(-1, 2)
         a, b = (wide[:, None] * n + squares[None]).reshape(-1, 2).T
-        a, b, found = self._find_candidates(a, b)
-        stands = self._has_priority(a, b, found)
+        bounds = np.stack(  # upper ones of the hash, by material and object
+            [np.cumsum([each.probability * (each.material == m) for each in self.objects]) for m in self._materials]
+        )
+        chance = self._hash(a, b, WHICH) / 4294967296.0
+        some = chance < bounds.max()
+        a, b, chance = a[some], b[some], chance[some]
+        place, form = self._hash(a, b, PLACE), self._hash(a, b, FORM)
+        x, y = ((place & 0xFFFF) + 0.5) / 65536.0, ((place >> 16) + 0.5) / 65536.0
+        i, j = a // n, b // n
+        u, v = ((a - i * n) + x) / n, ((b - j * n) + y) / n
+        size = 1 + entry.size * ((form & 0xFFFF) / 32767.5 - 1)
+        turn = entry.turn * ((form >> 16) / 32767.5 - 1)
+        material = self._find_material(i, j, u, v)
+        below = chance[:, None] < bounds[material]
+        found, rows = Instances(i, j, u, v, below.argmax(1), turn, size), np.flatnonzero(below.any(1))
+        rows = rows[self._lies_inside(found[rows], material[rows])]
+        found = found[rows]
+        stands = self._has_priority(a[rows], b[rows], np.stack([x, y], 1)[rows], self.radii(found))
         wanted = set(map(tuple, cells.tolist()))
         inside = [cell in wanted for cell in zip(found.i.tolist(), found.j.tolist(), strict=True)]
         return found[stands & np.array(inside, bool)]
 
-    def _find_candidates(
-        self, a: Int64[Array, "n"], b: Int64[Array, "n"]
-    ) -> tuple[Int64[Array, "k"], Int64[Array, "k"], Instances]:
-        """Candidates of squares that are an object whose footprint lies inside its material, and their squares."""
-        entry = self.entry
-        chance = self._hash(a, b, WHICH) / 4294967296.0
-        some = chance < max(self._thresholds(m)[-1] for m in range(self._materials))
-        a, b, chance = a[some], b[some], chance[some]
-        place, form = self._hash(a, b, PLACE), self._hash(a, b, FORM)
-        i, j = a // entry.cells, b // entry.cells
-        u = ((a - i * entry.cells) + ((place & 0xFFFF) + 0.5) / 65536.0) / entry.cells
-        v = ((b - j * entry.cells) + ((place >> 16) + 0.5) / 65536.0) / entry.cells
-        size = 1 + entry.size * ((form & 0xFFFF) / 32767.5 - 1)
-        turn = entry.turn * ((form >> 16) / 32767.5 - 1)
-        material = self._find_material(i, j, u, v)
-        number = self._choose_object(material, chance)
-        found, rows = Instances(i, j, u, v, number, turn, size), np.flatnonzero(number >= 0)
-        rows = rows[self._lies_inside(found[rows], material[rows])]
-        return a[rows], b[rows], found[rows]
+    def radii(self, found: Instances) -> Floats:
+        """The radii of footprints."""
+        return np.array([each.radius for each in self.objects])[found.number] * found.size
 
-    def _hash(self, a: Int64[Array, "n"], b: Int64[Array, "n"], axis: int) -> Int64[Array, "n"]:
+    def _hash(self, a: Ints, b: Ints, axis: int) -> Ints:
         return np.asarray(hash_cell(a, b, axis, self.entry.salt))
 
     @property
-    def _materials(self) -> int:
-        return 1 if self.classes is None else self.classes.materials
+    def _materials(self) -> range:
+        return range(1 if self.classes is None else self.classes.materials)
 
-    def _thresholds(self, material: int) -> Float[Array, "k"]:
-        """Upper bounds of the hash, in [0, 1], by object; the bound of one of another material is that before it."""
-        return np.cumsum([each.probability * (each.material == material) for each in self.objects])
-
-    def _choose_object(self, material: Int64[Array, "n"], chance: Float[Array, "n"]) -> Int64[Array, "n"]:
-        """Number of the object that each candidate is; -1: none."""
-        bounds = np.stack([self._thresholds(m) for m in range(self._materials)])[material]
-        below = chance[:, None] < bounds
-        return np.where(below.any(1), below.argmax(1), -1)
-
-    def _find_material(self, i: Array, j: Array, u: Array, v: Array) -> Int64[Array, "n"]:
+    def _find_material(self, i: Ints, j: Ints, u: Floats, v: Floats) -> Ints:
         """The material with the highest score at places, of equals the first."""
         material = np.zeros(len(i), np.int64)
         if self.classes is not None:
             bits = self.classes.materials_in(i, j)
-            for m in range(self._materials):
+            for m in self._materials:
                 material[bits == 1 << m] = m
             mixed = np.flatnonzero(bits & (bits - 1))
             material[mixed] = self.classes.scores_at(i[mixed], j[mixed], u[mixed], v[mixed]).argmax(1)
         return material
 
-    def _lies_inside(self, found: Instances, material: Int64[Array, "n"]) -> Bool[Array, "n"]:
+    def _lies_inside(self, found: Instances, material: Ints) -> Bool[Array, "n"]:
         """Whether the score of the material exceeds the others by the jitter's amplitude in four places of the rim."""
         inside = np.ones(len(found), bool)
         if self.classes is None:
             return inside
-        radius = np.array([each.radius for each in self.objects])[found.number] * found.size / self.side
+        radius = self.radii(found) / self.side
         for east, north in RIM:
             x, y = found.u + east * radius, found.v + north * radius
             right, up = np.floor(x), np.floor(y)
@@ -174,24 +163,23 @@ class Scatter:
             inside[test] = own - scores.max(1) >= self.classes.entry.jitter.amplitude
         return inside
 
-    def _has_priority(self, a: Int64[Array, "n"], b: Int64[Array, "n"], found: Instances) -> Bool[Array, "n"]:
-        """Whether no candidate of a higher priority overlaps; of equal priorities the one farther east, then north."""
-        stands = np.ones(len(found), bool)
-        if len(found) < 2:
+    def _has_priority(self, a: Ints, b: Ints, place: Float[Array, "n 2"], radius: Floats) -> Bool[Array, "n"]:
+        """Whether no candidate of a higher priority overlaps; of equal priorities the one farther east, then north.
+
+        a, b: squares of the grid. place: in the square, in its sides.
+        """
+        stands = np.ones(len(a), bool)
+        if len(a) < 2:
             return stands
         square = self.side / self.entry.cells
-        radius = np.array([each.radius for each in self.objects])[found.number] * found.size
-        place = self._hash(a, b, PLACE)
-        x, y = ((place & 0xFFFF) + 0.5) / 65536.0, ((place >> 16) + 0.5) / 65536.0
-        rough = np.stack([(a - a[0]) + x, (b - b[0]) + y], 1) * square
+        rough = (np.stack([a - a[0], b - b[0]], 1) + place) * square
         first, second = cKDTree(rough).query_pairs(2.001 * radius.max(), output_type="ndarray").T
-        dx = ((a[first] - a[second]) + (x[first] - x[second])) * square
-        dy = ((b[first] - b[second]) + (y[first] - y[second])) * square
+        way = np.stack([a[first] - a[second], b[first] - b[second]], 1)
+        dx, dy = ((way + (place[first] - place[second])) * square).T
         reach = radius[first] + radius[second]
         overlap = dx * dx + dy * dy < reach * reach
         first, second = first[overlap], second[overlap]
-        priority = self._hash(a, b, PRIORITY)
-        keys = np.stack([priority, a, b], 1)
+        keys = np.stack([self._hash(a, b, PRIORITY), a, b], 1)
         difference = keys[first] - keys[second]
         leading = difference[np.arange(len(first)), (difference != 0).argmax(1)]
         stands[np.where(leading > 0, second, first)] = False
