@@ -13,16 +13,10 @@ from dav_gswt.bundle.manifest import TileSetInfo
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField
 from dav_gswt.raster.interface import RIM
+from dav_gswt.terrain import heights
 from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_missing
 from dav_gswt.terrain.classes import Classes, Picture
-from dav_gswt.terrain.heights import (
-    FlatSurface,
-    HeightField,
-    read_exactly,
-    read_surface,
-    require_plain_cover,
-    surface_from_config,
-)
+from dav_gswt.terrain.heights import FlatSurface, HeightField
 from dav_gswt.terrain.scatter import Scatter
 from dav_gswt.tiles.layout import EDGES
 
@@ -98,9 +92,9 @@ def terrain_from_page(bundle: Bundle) -> EndlessTerrain:
     manifest, pictures = bundle.manifest, {}
     for term in manifest.classes.rule if manifest.classes else []:
         if isinstance(term, ImageTerm):
-            data = read_exactly(bundle.folder, term.file, term.rows * term.columns, term.sha256)
+            data = heights.read_exactly(bundle.folder, term.file, term.rows * term.columns, term.sha256)
             pictures[term.file] = np.frombuffer(data, np.uint8).reshape(term.rows, term.columns)
-    surface = read_surface(bundle.folder, manifest.heights or {"kind": "flat"}, manifest.tile_side)
+    surface = heights.read_surface(bundle.folder, manifest.heights or {"kind": "flat"}, manifest.tile_side)
     return terrain_from_fields(bundle.fields(), manifest, surface, _read_objects(bundle), pictures)
 
 
@@ -124,9 +118,9 @@ def terrain_from_fields(
     """
     levels, entries, side = manifest.levels, manifest.tiles, manifest.tile_side
     largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles for f in row)
-    heights = surface_from_config(surface, side) if isinstance(surface, dict) else surface
-    require_plain_cover(heights, manifest.classes, manifest.objects)
-    classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, heights, pictures or {})
+    surface = heights.surface_from_config(surface, side) if isinstance(surface, dict) else surface
+    heights.require_plain_cover(surface, manifest.classes, manifest.objects)
+    classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, surface, pictures or {})
     beyond = (RIM - 3) * largest  # the manifest's heights reach three deviations beyond the centres
     extents, things = [measure_extent(fields) for fields in objects], manifest.objects or []
     z = [(entry.z[0] - beyond, entry.z[1] + beyond) for entry in entries]
@@ -148,7 +142,7 @@ def terrain_from_fields(
         variants=len(tiles[0]) // (16 * len(manifest.materials)),
         salt=manifest.salt,
         near=NEAR * manifest.eye_floor,
-        heights=heights,
+        heights=surface,
         classes=classes,
         objects=list(objects),
         extents=extents,

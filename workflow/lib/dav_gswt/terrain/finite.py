@@ -123,25 +123,20 @@ def place_block(terrain: EndlessTerrain, cells: GridCells, eye: Vector, origin: 
 
     Args:   eye: levels are chosen and faded by the distance from it. origin: world position that positions count from.
     """
-    corner = np.array([cells.i[0] * terrain.side, cells.j[0] * terrain.side, 0.0])
-    parts = [*_place_tiles(terrain, cells, corner), *_place_objects(terrain, cells, corner, eye)]
-    field, level = concatenate_parts(parts)
+    side, active, parts = terrain.side, active_levels(terrain, cells), []
+    corner = np.array([cells.i[0] * side, cells.j[0] * side, 0.0])
+    for k in range(len(cells)):
+        by = np.array([cells.i[k] * side, cells.j[k] * side, 0.0]) - corner
+        levels = np.flatnonzero(active[:, k]).tolist()
+        for level, field in collect_tiles(terrain, cells[k : k + 1], levels).items():
+            parts.append((replace(field, means=(field.means + by).astype(np.float32)), np.full(len(field), level)))
+    field, level = concatenate_parts([*parts, *_place_objects(terrain, cells, corner, eye)])
 
     def place() -> GaussianField:
         raised = displace_field(field, terrain.heights, corner, origin)
         return fade_levels(terrain, raised, level, np.linalg.norm(raised.means + (origin - eye), axis=1))[0]
 
     return place
-
-
-def _place_tiles(terrain: EndlessTerrain, cells: GridCells, corner: Vector) -> Iterator[Part]:
-    """Each cell's Gaussians at its active levels, from a corner of the grid."""
-    active = active_levels(terrain, cells)
-    for k in range(len(cells)):
-        by = np.array([cells.i[k] * terrain.side, cells.j[k] * terrain.side, 0.0]) - corner
-        levels = np.flatnonzero(active[:, k]).tolist()
-        for level, field in collect_tiles(terrain, cells[k : k + 1], levels).items():
-            yield replace(field, means=(field.means + by).astype(np.float32)), np.full(len(field), level)
 
 
 def _place_objects(terrain: EndlessTerrain, cells: GridCells, corner: Vector, eye: Vector) -> Iterator[Part]:

@@ -64,7 +64,9 @@ def list_entries(pages: Sequence[Path | str]) -> list[Entry]:
     for page in map(Path, pages):
         name, line, verdict = _read_front(page)
         size = sum(path.stat().st_size for path in page.rglob("*") if path.is_file())
-        folder = _free_name(re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "terrain", entries)
+        wanted, taken = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "terrain", {e.folder for e in entries}
+        names = [wanted, *(f"{wanted}-{number}" for number in range(2, len(taken) + 2))]
+        folder = next(each for each in names if each not in taken)
         entries.append(Entry(page, folder, name, line, verdict, f"{size / 1e6:.1f}"))
     return entries
 
@@ -77,9 +79,3 @@ def _read_front(page: Path) -> tuple[str, ...]:
     if not texts or not all(isinstance(text, str) and len(text) <= LONGEST for text in texts):
         raise InputError(f"{page / FRONT}: no name, line and verdict; make the page again")
     return tuple(str(text) for text in texts)
-
-
-def _free_name(wanted: str, entries: list[Entry]) -> str:
-    taken = {entry.folder for entry in entries}
-    names = [wanted, *(f"{wanted}-{number}" for number in range(2, len(taken) + 2))]
-    return next(name for name in names if name not in taken)

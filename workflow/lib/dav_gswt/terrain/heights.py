@@ -28,7 +28,6 @@ GAIN = 0.4  # height of an octave over that of the one twice as wide
 SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells; else all are 0 at the corners of the first
 STEEPEST = 2.75  # upper bound of the slope of the noise, per cell, over all gradients at the corners
 FARTHEST = 1e9  # units from 0 to a height: more is refused by the page too
-BLOCK = 4096  # points whose noise is computed at once: their intermediate values stay in the cache
 MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in use takes textures of this size
 PIXELS = "heights.bin"  # the pixels of a height map in a page: float32, little-endian, rows from the north
 QUARTER = 0.5 * np.pi
@@ -136,13 +135,6 @@ class Hills(HeightField, kind="hills"):
         return STEEPEST * rise / self.wavelength
 
     def at(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
-        height, slope = np.empty(len(x)), np.empty((len(x), 2))
-        for first in range(0, len(x), BLOCK):
-            block = slice(first, first + BLOCK)
-            height[block], slope[block] = self._sum_octaves(x[block], y[block])
-        return height, slope
-
-    def _sum_octaves(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
         octaves = np.arange(self.octaves)[:, None]
         cells = 2.0**octaves / self.wavelength
         noise, gradient = gradient_noise(
@@ -347,10 +339,7 @@ def _spline_weights(u: Floats):
 def gradient_noise(
     x: Float[Array, "*n"], y: Float[Array, "*n"], axis: int | Int64[Array, "#octaves 1"], salt: int
 ) -> tuple[Float[Array, "*n"], Float[Array, "*n 2"]]:
-    """Gradient noise and its gradient; x and y in cells, axis of their hash.
-
-    All corners are hashed at once: for few points the number of NumPy calls is what costs.
-    """
+    """Gradient noise and its gradient; x and y in cells, axis of their hash."""
     i, j = np.floor(x), np.floor(y)
     u, v = x - i, y - j
     step = np.arange(2).reshape(2, *[1] * x.ndim)

@@ -13,7 +13,7 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.files import read_json
-from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images.image_files import read_photo, shrink_to
 from dav_gswt.images.jpeg import encode_jpeg
 from dav_gswt.paths import decode_path
@@ -44,9 +44,12 @@ def tell_story(given: Mapping[str, Any]) -> Story | None:
     if not given.get("views"):
         return None
     taken = list_photos(given)
-    shown = spread(len(taken), MOST)
-    frame = read_scene_frame(given["frame"])
-    photos = [_place(photo, frame) for photo in taken]
+    shown = np.unique(np.linspace(0, len(taken) - 1, min(len(taken), MOST)).round().astype(int)).tolist()
+    frame, photos = read_scene_frame(given["frame"]), []
+    for photo in taken:  # where its camera is, seen from the exemplar's centre, and where it looks, on the ground
+        at = (photo.camera.centre - frame.exemplar.centre).tolist()
+        look = photo.camera.rotation[2, :2].tolist()
+        photos.append({"round": photo.round, "at": [round(v, 3) for v in at], "look": [round(v, 3) for v in look]})
     for number, k in enumerate(shown):
         photos[k]["picture"] = number
     presets = [decode_path(Path(path)).get("preset") for path in given["metrics"]]
@@ -74,11 +77,6 @@ def list_photos(given: Mapping[str, Any]) -> list[TakenPhoto]:
     return list_taken_photos(given["images"], read_colmap_model(given["model"]), start, given["captures"], rejected)
 
 
-def spread(count: int, most: int) -> list[int]:
-    """At most `most` of the numbers below `count`, evenly."""
-    return sorted({int(k) for k in np.linspace(0, count - 1, min(count, most)).round()}) if count else []
-
-
 def draw_sheet(smalls: Sequence[Float32[Array, "_ _ 3"]]) -> Float32[Array, "height width 3"]:
     """Small photos, each in the middle of a square of THUMB pixels, COLUMNS in a row."""
     rows = max(1, -(-len(smalls) // COLUMNS))
@@ -88,14 +86,6 @@ def draw_sheet(smalls: Sequence[Float32[Array, "_ _ 3"]]) -> Float32[Array, "hei
         top, left = k // COLUMNS * THUMB + (THUMB - height) // 2, k % COLUMNS * THUMB + (THUMB - width) // 2
         sheet[top : top + height, left : left + width] = small
     return sheet
-
-
-def _place(photo: TakenPhoto, frame: SceneFrame) -> dict[str, Any]:
-    """Where a camera is, seen from the exemplar's centre, and where it looks, on the ground."""
-    x, y, z = photo.camera.centre - frame.exemplar.centre
-    ahead = photo.camera.rotation[2]
-    at = [round(float(v), 3) for v in (x, y, z)]
-    return {"round": photo.round, "at": at, "look": [round(float(v), 3) for v in ahead[:2]]}
 
 
 def _psnr(path: Path | str, kind: str) -> float | None:

@@ -68,13 +68,6 @@ def directions(face: Ints, tangents: Float[Array, "n 2"]) -> Float[Array, "n 3"]
     return np.einsum("nk,nkc->nc", ray, FACES[face].astype(ray.dtype))
 
 
-def locate(sphere: Sphere, points: Float[Array, "n 3"]) -> tuple[Ints, Float[Array, "n 2"]]:
-    """The face under points, and the places on it in cells from its south-western corner."""
-    face = np.argmax(points @ FACES[:, 2].T, axis=1).astype(np.int64)
-    along = np.einsum("nc,nkc->nk", points, FACES[face])
-    return face, (np.arctan2(along[:, :2], along[:, 2:]) / QUARTER + 0.5) * sphere.cells
-
-
 def bend(
     local: Float[Array, "n 3"], tangents: Float[Array, "*n 2"], radius: float, rate: float
 ) -> tuple[Float[Array, "n 3"], Float[Array, "n 3 3"]]:

@@ -73,7 +73,8 @@ def project_indexed(field: GaussianField, slope: Slope, camera: Camera, near: fl
     q = np.ascontiguousarray((field.means.astype(float) @ camera.rotation.T + camera.translation).T)
     ahead = np.flatnonzero(q[2] > near)
     field, q = field[ahead], q[:, ahead]
-    axes = _turn_axes(camera.rotation, displaced_axes(field, slope[ahead]))
+    axes = np.ascontiguousarray(displaced_axes(field, slope[ahead]).transpose(1, 2, 0))  # NumPy is slow along axes of 3
+    axes = (camera.rotation @ axes.reshape(3, -1)).reshape(axes.shape)
     x, y = q[0] / q[2], q[1] / q[2]
     bound_x, bound_y = (
         np.clip(slope, -(c + MARGIN * size) / f, (size - c + MARGIN * size) / f)
@@ -81,28 +82,28 @@ def project_indexed(field: GaussianField, slope: Slope, camera: Camera, near: fl
     )
     across = (axes[0] - bound_x * axes[2]) * (camera.fx / q[2])
     along = (axes[1] - bound_y * axes[2]) * (camera.fy / q[2])
-    share = _fade_in(q[2] / np.maximum(np.sqrt(_dot(axes[2], axes[2])), 1e-300))
+    depth = q[2] / np.maximum(np.sqrt(_dot(axes[2], axes[2])), 1e-300)
+    share = np.clip((depth - FADE_IN[0]) / (FADE_IN[1] - FADE_IN[0]), 0, 1)
+    share = share * share * (3 - 2 * share)
     visible = share > 0
     centres = camera.fx * x + camera.cx, camera.fy * y + camera.cy
     for at, axis, size in zip(centres, (across, along), (camera.width, camera.height), strict=True):
         extent = np.sqrt(RIM2 * (_dot(axis, axis) + DILATION))
         visible &= (at + extent > 0) & (at - extent < size)
+    share, logits = share[visible], field.opacity_logits[visible]
+    opacity = share / (1 + np.exp(-logits.astype(float)))
+    with np.errstate(divide="ignore"):
+        faded = np.log(opacity) - np.log1p(-opacity)
     log_scales, angles = _ellipses(across[:, visible], along[:, visible])
     splats = Splats(
         np.stack([at[visible] for at in centres], 1).astype(np.float32),
         log_scales,
         angles,
-        _scale_opacity(field.opacity_logits[visible], share[visible]),
+        np.where(share == 1, logits, faded).astype(np.float32),
         harmonics.seen_colours(field.sh[visible], field.means[visible].astype(float), camera),
         q[2, visible].astype(np.float32),
     )
     return splats, ahead[visible]
-
-
-def _turn_axes(rotation: Float[Array, "3 3"], axes: Float[Array, "n 3 3"]) -> Float[Array, "3 3 n"]:
-    """The axes in the camera's frame. Gaussians come last: NumPy is slow along axes of 3."""
-    columns = np.ascontiguousarray(axes.transpose(1, 2, 0))
-    return (rotation @ columns.reshape(3, -1)).reshape(columns.shape)
 
 
 def _dot(one: Float[Array, "3 n"], other: Float[Array, "3 n"]) -> Float[Array, "n"]:
@@ -133,16 +134,3 @@ def _ellipses(across: Float[Array, "3 n"], along: Float[Array, "3 n"]):
     minor = area / np.maximum(major, THINNEST**2)
     variances = np.maximum(np.stack([major, minor], 1), THINNEST**2)
     return (0.5 * np.log(variances)).astype(np.float32), (0.5 * np.arctan2(2 * b, a - c)).astype(np.float32)
-
-
-def _fade_in(depth: Float[Array, "n"]) -> Float[Array, "n"]:
-    share = np.clip((depth - FADE_IN[0]) / (FADE_IN[1] - FADE_IN[0]), 0, 1)
-    return share * share * (3 - 2 * share)
-
-
-def _scale_opacity(logits: Float32[Array, "n"], share: Float[Array, "n"]) -> Float32[Array, "n"]:
-    """Logits of opacities times a share in (0, 1]; with a share of 1 they keep their bits."""
-    opacity = share / (1 + np.exp(-logits.astype(float)))
-    with np.errstate(divide="ignore"):
-        scaled = np.log(opacity) - np.log1p(-opacity)
-    return np.where(share == 1, logits, scaled).astype(np.float32)

@@ -14,7 +14,7 @@ from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.terrain import splats
+from dav_gswt.terrain import splats, visibility
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.choice import Vector
 from dav_gswt.terrain.endless import EndlessTerrain
@@ -22,15 +22,9 @@ from dav_gswt.terrain.heights import Slope, Sphere
 from dav_gswt.terrain.placement import group_by_cell, place_cell
 from dav_gswt.terrain.planet import place_on_sphere, visible_on_sphere
 from dav_gswt.terrain.sphere import frame_at, walk_from
-from dav_gswt.terrain.visibility import (
-    MAX_GAUSSIANS,
-    coarsen_to_budget,
-    count_gaussians,
-    drop_far_cells,
-    visible_cells,
-)
 from dav_gswt.threads import default_threads
 
+MAX_GAUSSIANS = 10_000_000  # in one picture
 TOGETHER = 64  # cells that are placed, then projected: what lies between the two is held
 ORBIT = 2.5  # height of `above` over a planet, in its radii: all of it is in view
 START = (20.0, 30.0)  # longitude and latitude that places on a sphere count from, in degrees
@@ -142,10 +136,10 @@ def render_view(
     eye, here, surface = camera.centre, replace(camera, translation=np.zeros(3)), terrain.heights
     sphere = surface if isinstance(surface, Sphere) else None
     with timing.measure("update"):
-        cells = visible_on_sphere(terrain, sphere, camera) if sphere else visible_cells(terrain, camera)
-        if count_gaussians(terrain, cells).sum() > MAX_GAUSSIANS:  # coarser levels first, then fewer cells
-            terrain = coarsen_to_budget(terrain, camera, MAX_GAUSSIANS, cells)
-            cells = drop_far_cells(terrain, cells)
+        cells = visible_on_sphere(terrain, sphere, camera) if sphere else visibility.visible_cells(terrain, camera)
+        if visibility.count_gaussians(terrain, cells).sum() > MAX_GAUSSIANS:  # coarser levels first, then fewer cells
+            terrain = visibility.coarsen_to_budget(terrain, camera, MAX_GAUSSIANS, cells)
+            cells = visibility.drop_far_cells(terrain, cells, MAX_GAUSSIANS)
         things = group_by_cell(terrain, cells, eye)
     backdrop = Backdrop.for_eye(terrain, eye, sky, ground_colour)
     far, close = [splats.EMPTY], [splats.EMPTY]

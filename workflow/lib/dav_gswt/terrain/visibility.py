@@ -11,7 +11,6 @@ from dav_gswt.terrain import draw_order
 from dav_gswt.terrain.choice import Floats, Ints, Vector, tiles_at
 from dav_gswt.terrain.endless import EndlessTerrain
 
-MAX_GAUSSIANS = 10_000_000  # in one picture
 PAD = 2.0  # pixels, rounded up, by which the rasterizer's dilation of splats reaches into the picture
 MIN_FACTOR, BISECTIONS = 1e-5, 16  # of the search for a factor on level distances
 
@@ -134,7 +133,7 @@ def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Ints:
     return (counts * active_levels(terrain, cells)).sum(0)
 
 
-def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int = MAX_GAUSSIANS) -> GridCells:
+def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int) -> GridCells:
     """The nearest cells whose Gaussians stay within a budget."""
     nearest_first = np.argsort(cells.nearest, kind="stable")
     count = np.cumsum(count_gaussians(terrain, cells)[nearest_first])
