@@ -2,7 +2,7 @@
 
 import hashlib
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -59,8 +59,15 @@ def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, dict[str
     Raises: InputError: a material that is not there, a picture that cannot be read, is too large or shows none of the
         materials; two painted files, or nothing but one; see also `read_paint`.
     """
-    names = {material.name: number for number, material in enumerate(manifest.materials)}
-    manifest, paint = _read_painted(manifest, rule)
+    names = [material.name for material in manifest.materials]
+    files, paint = [entry["file"] for entry in rule if entry["kind"] == "painted"], None
+    if files:
+        if len(files) > 1 or len(rule) == 1:
+            raise InputError("classes: `painted` takes one file, beside other terms such as {kind: noise}")
+        paint = read_paint(locate_path(files[0]), names)
+        if manifest.objects and manifest.scatter:
+            objects = scale_objects(manifest.objects, manifest.scatter.cells, paint)
+            manifest = replace(manifest, objects=objects)
     rule = [entry for entry in rule if entry["kind"] != "painted"]
     if manifest.classes is None:
         warn_of_rule(rule)
@@ -71,32 +78,21 @@ def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, dict[str
         noise = replace(noise, biases=[bias + offset for bias, offset in zip(noise.biases, offsets, strict=True)])
     terms, pictures = [], {}
     for entry in rule:
-        if entry["kind"] == "noise":
+        kind, weight = entry["kind"], float(entry.get("weight", 1.0))
+        if kind == "noise":
             if noise is None:
                 raise InputError("classes: the bundle has no noise of its own; make the bundle again")
-            terms.append(replace(noise, weight=float(entry.get("weight", 1.0))))
-        elif entry["kind"] == "image":
-            term, pixels = _read_picture(entry, names, f"classes{len(pictures)}.bin")
+            terms.append(replace(noise, weight=weight))
+        elif kind == "image":
+            term, pixels = _read_picture(entry, weight, names, f"classes{len(pictures)}.bin")
             terms.append(term)
             pictures[term.file] = pixels
-        else:
-            terms.append(_make_range(entry, names, manifest.tile_side))
+        else:  # heights of the config are in tile sides, slopes are rise over run
+            unit, material = manifest.tile_side if kind == "height" else 1.0, _find_material(entry["material"], names)
+            low, high = (None if entry.get(key) is None else float(entry[key]) * unit for key in ("low", "high"))
+            terms.append(RangeTerm(kind, weight, material, low, high, float(entry["soft"]) * unit))
     classes = replace(manifest.classes, rule=terms, painted=paint.runs if paint else manifest.classes.painted)
     return replace(manifest, classes=classes), pictures
-
-
-def _read_painted(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, PaintFile | None]:
-    """The painted file of a rule, if there is one, and the manifest with its densities of objects."""
-    files = [entry["file"] for entry in rule if entry["kind"] == "painted"]
-    if not files:
-        return manifest, None
-    if len(files) > 1 or len(rule) == 1:
-        raise InputError("classes: `painted` takes one file, beside other terms such as {kind: noise}")
-    paint = read_paint(locate_path(files[0]), [material.name for material in manifest.materials])
-    if manifest.objects and manifest.scatter:
-        objects = scale_objects(manifest.objects, manifest.scatter.cells, paint)
-        manifest = replace(manifest, objects=objects)
-    return manifest, paint
 
 
 def warn_of_missing(classes: Classes, names: Sequence[str]) -> None:
@@ -115,21 +111,13 @@ def warn_of_rule(rule: Sequence[dict[str, Any]]) -> None:
         _log.warning("classes: the terrain has one material; the rule changes nothing")
 
 
-def _make_range(entry: dict[str, Any], names: Mapping[str, int], side: float) -> RangeTerm:
-    """Heights of the config are in tile sides, slopes are rise over run."""
-    unit = side if entry["kind"] == "height" else 1.0
-    low, high = (None if entry.get(key) is None else float(entry[key]) * unit for key in ("low", "high"))
-    material = _find_material(entry["material"], names)
-    return RangeTerm(entry["kind"], float(entry.get("weight", 1.0)), material, low, high, float(entry["soft"]) * unit)
-
-
-def _find_material(name: str, names: Mapping[str, int]) -> int:
+def _find_material(name: str, names: Sequence[str]) -> int:
     if name not in names:
         raise InputError(f"classes: there is no material {name!r}; the terrain has {', '.join(names)}")
-    return names[name]
+    return names.index(name)
 
 
-def _read_picture(entry: dict[str, Any], names: Mapping[str, int], file: str) -> tuple[ImageTerm, Picture]:
+def _read_picture(entry: dict[str, Any], weight: float, names: Sequence[str], file: str) -> tuple[ImageTerm, Picture]:
     """A picture's pixels as numbers of materials: the nearest of the given colours; UNKNOWN if none is near."""
     path = locate_path(entry["file"])
     columns, rows = image_files.read_size(path)
@@ -146,8 +134,8 @@ def _read_picture(entry: dict[str, Any], names: Mapping[str, int], file: str) ->
         raise InputError(f"{path}: no pixel has the colour of a material ({', '.join(entry['colours'].values())})")
     if unknown:
         _log.warning("%s: %.1f %% of the pixels have the colour of no material", path, 100 * unknown)
-    weight, width = float(entry.get("weight", 1.0)), float(entry["width"])
     digest, beyond = hashlib.sha256(pixels).hexdigest(), entry.get("beyond", "mirror")
+    width = float(entry["width"])
     return ImageTerm("image", weight, file, pixels.size, digest, rows, columns, width, beyond), pixels
 
 
@@ -165,13 +153,10 @@ def read_paint(path: Path | str, names: Sequence[str]) -> PaintFile:
         raise InputError(f"{path}: densities: beyond 0 to {MAX_DENSITY:g}; {REMEDY}")
     if not all(abs(v) <= MAX_OFFSET for v in paint.offsets.values()):
         raise InputError(f"{path}: offsets: beyond {MAX_OFFSET:g} either way; {REMEDY}")
-    numbers = [names.index(name) if name in names else -1 for name in paint.materials]
-    for material in sorted({run[3] for run in paint.runs}):
-        if numbers[material] < 0:
-            raise InputError(
-                f"{path}: there is no material {paint.materials[material]!r}; the terrain has {', '.join(names)}"
-            )
-    runs = [[i, j, length, numbers[material]] for i, j, length, material in paint.runs]
+    painted = [paint.materials[run[3]] for run in paint.runs]
+    if strange := set(painted) - set(names):
+        raise InputError(f"{path}: there is no material {min(strange)!r}; the terrain has {', '.join(names)}")
+    runs = [[*run[:3], names.index(name)] for run, name in zip(paint.runs, painted, strict=True)]
     return replace(paint, materials=list(names), runs=runs)
 
 

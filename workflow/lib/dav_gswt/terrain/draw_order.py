@@ -17,8 +17,8 @@ def sort_cells(i: Ints, j: Ints, eye: tuple[int, int]) -> Ints:
     """Indices of cells from back to front, by their steps |i - i0| + |j - j0| from the eye's cell (i0, j0).
 
     A ray from the eye crosses cell edges only away from it, in i and in j, so each crossed edge adds a step: a cell
-    with more steps never hides one with fewer, and cells of equal steps never hide each other. Exact for everything
-    that stays in the column of its cell, whatever its height. Equal steps are ordered by j, then by i.
+    with more steps never hides one with fewer, and cells of equal steps never hide each other. This is exact for
+    everything that stays in the column of its cell. Equal steps are ordered by j, then by i.
     """
     return np.lexsort((i, j, -np.abs(i - eye[0]) - np.abs(j - eye[1])))
 

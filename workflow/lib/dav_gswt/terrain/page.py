@@ -110,7 +110,13 @@ def write_page(
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
     copies += [(bundle / name, name) for name in _list_chunks(bundle, value)]
     heights, pixels = (surface or FlatSurface()).describe()
-    value, pictures = _replace_classes(value, rule)
+    pictures: dict[str, Picture] = {}
+    if "classes" in value or any(entry["kind"] == "painted" for entry in rule):
+        made, pictures = apply_rule(Manifest.from_dict(value), rule)
+        changed = made.to_dict()
+        value |= {key: changed[key] for key in ("classes", "objects") if key in changed}
+    else:
+        warn_of_rule(rule)
     require_plain_cover(surface or FlatSurface(), value.get("classes"), value.get("objects"))
     with atomic_folder(out) as part:
         for source, name in copies:
@@ -138,18 +144,6 @@ def find_viewer(paths: Iterable[Path | str]) -> Path:
         if path.name == INDEX:
             return path.parent
     raise InputError("the viewer's files hold no index.html")
-
-
-def _replace_classes(
-    value: dict[str, Any], rule: Sequence[dict[str, Any]]
-) -> tuple[dict[str, Any], dict[str, Picture]]:
-    """A manifest with the classes of the config's rule, and the pixels of its pictures. Raises: as `apply_rule`."""
-    if "classes" not in value and not any(entry["kind"] == "painted" for entry in rule):
-        warn_of_rule(rule)
-        return value, {}
-    made, pictures = apply_rule(Manifest.from_dict(value), rule)
-    changed = made.to_dict()
-    return value | {key: changed[key] for key in ("classes", "objects") if key in changed}, pictures
 
 
 def _list_chunks(bundle: Path, manifest: dict[str, Any]) -> list[str]:
