@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dav_gswt.terrain.paint_file import read_paint
 from fixtures.land_covers import SIDE, two_classes
 
 from dav_gswt.bundle.land_cover import ImageTerm, ObjectOrders, RangeTerm, ScatterEntry
@@ -13,7 +12,7 @@ from dav_gswt.bundle.manifest import MaterialEntry, TileSetInfo
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.terrain import class_rules
-from dav_gswt.terrain.class_rules import apply_rule
+from dav_gswt.terrain.class_rules import apply_rule, read_paint
 
 NAMES = ["sand", "grass"]
 RANGE = {"material": "grass", "low": 1, "high": None, "soft": 0.5, "weight": 2}

@@ -12,7 +12,7 @@ from dav_gswt.bundle.build import BundleOptions, describe_tiles
 from dav_gswt.bundle.orders import DirectionRings
 from dav_gswt.lod.merge import compute_covariances
 from dav_gswt.materials import placing
-from dav_gswt.terrain import endless, object_placement, placement, stills, visibility
+from dav_gswt.terrain import endless, placement, stills, visibility
 from dav_gswt.terrain.scatter import concatenate_instances
 
 MAGENTA = [1.0, 0.0, 1.0]
@@ -38,7 +38,7 @@ def seen(cover):
     """Visible cells of a walker, and the objects by the cell that they are drawn with."""
     camera = walking(cover)
     cells = visibility.visible_cells(cover, camera)
-    return camera.centre, cells, object_placement.group_by_cell(cover, cells, camera.centre)
+    return camera.centre, cells, placement.group_by_cell(cover, cells, camera.centre)
 
 
 def test_a_picture_shows_both_materials_without_a_gap_and_the_objects(cover, bare):
@@ -75,18 +75,6 @@ def test_a_budget_counts_the_tiles_of_all_materials_in_a_cell(bare, seen):
     grass = replace(pure, materials=np.full(len(cells), 2), tile=cells.tile % TILES + TILES)
     counts = [visibility.count_gaussians(bare, each) for each in (pure, grass, both)]
     np.testing.assert_array_equal(counts[0] + counts[1], counts[2])
-
-
-def test_a_cell_is_placed_the_same_whatever_is_remembered(bare, seen, monkeypatch):
-    eye, cells, _ = seen
-    k = int(np.flatnonzero(cells.materials == 3)[0])
-    fresh = placement.place_cell(replace(bare), cells[k : k + 1], eye)[0].means
-    first, again = (placement.place_cell(bare, cells[k : k + 1], eye)[0].means for _ in range(2))
-    del bare.kept[next(place for place in bare.kept if place[:2] == (cells.i[k], cells.j[k]))]
-    monkeypatch.setattr(placement, "KEPT", 0)
-    forgotten = placement.place_cell(bare, cells[k : k + 1], eye)[0].means
-    for means in (first, again, forgotten):
-        np.testing.assert_array_equal(means, fresh)
 
 
 def test_an_object_is_turned_and_scaled_about_its_foot(cover):

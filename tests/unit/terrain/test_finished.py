@@ -10,10 +10,9 @@ from dav_gswt.geometry import cameras
 from dav_gswt.images import image_files
 from dav_gswt.images.metrics import psnr
 from dav_gswt.raster import render
-from dav_gswt.terrain import classes, endless, finished, finite, scatter, stills
-from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills
-from dav_gswt.terrain.page import describe_surface, write_page
-from dav_gswt.terrain.sphere import make_sphere
+from dav_gswt.terrain import endless, finite, heights, scatter, stills
+from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills, make_sphere
+from dav_gswt.terrain.page import write_page
 
 SURFACES = {
     "flat": FlatSurface(),
@@ -32,7 +31,7 @@ def test_a_page_is_the_terrain_that_it_was_made_of(root, tmp_path):
     rule = [*RULE, picture | {"colours": {"sand": "#c8b478", "grass": "#3c7832"}}]
     write_cover_bundle(tmp_path / "bundle", schema)
     write_page(tmp_path / "bundle", root / "workflow/viewer", tmp_path / "page", SURFACES["hills"], rule)
-    terrain = finished.terrain_from_page(store.read_bundle(tmp_path / "page", schema))
+    terrain = endless.terrain_from_page(store.read_bundle(tmp_path / "page", schema))
     surface = {"kind": "hills", "height": 2 / SIDE, "wavelength": 30 / SIDE, "octaves": 3, "seed": 5}
     wanted = endless.terrain_from_bundle(store.read_bundle(tmp_path / "bundle", schema), surface, rule)
     assert terrain.heights == wanted.heights == SURFACES["hills"]
@@ -45,9 +44,9 @@ def test_a_page_is_the_terrain_that_it_was_made_of(root, tmp_path):
 
 @pytest.mark.parametrize("surface", [*SURFACES.values(), make_sphere(10.0, 4.0)], ids=[*SURFACES, "sphere"])
 def test_a_surface_that_was_described_reads_back(tmp_path, surface):
-    entry, pixels = describe_surface(surface)
+    entry, pixels = surface.describe()
     (tmp_path / "heights.bin").write_bytes(pixels)
-    found = finished.read_surface(tmp_path, entry, 4.0)
+    found = heights.read_surface(tmp_path, entry, 4.0)
     assert vars(found).keys() == vars(surface).keys()
     for name, value in vars(surface).items():
         np.testing.assert_array_equal(getattr(found, name), value)
@@ -68,11 +67,11 @@ def test_a_surface_that_was_described_reads_back(tmp_path, surface):
     ],
 )
 def test_a_surface_that_is_damaged_is_named(tmp_path, changes, said):
-    entry, pixels = describe_surface(SURFACES["image"])
+    entry, pixels = SURFACES["image"].describe()
     (tmp_path / "heights.bin").write_bytes(pixels)
     (tmp_path / "nan.bin").write_bytes(pixels[:-4] + np.float32(np.nan).tobytes())
     with pytest.raises(InputError, match=said):
-        finished.read_surface(tmp_path, entry | changes, 4.0)
+        heights.read_surface(tmp_path, entry | changes, 4.0)
 
 
 @pytest.fixture(scope="module")
@@ -113,11 +112,9 @@ def test_a_wide_area_is_counted_in_slices(bundle, monkeypatch):
     whole = endless.terrain_from_bundle(bundle, HILLS)
     counts = finite.count_gaussians(whole, finite.list_grid(whole, area, eye))
     monkeypatch.setattr(finite, "SLICE", 20)
-    monkeypatch.setattr(classes, "SLICE", 20)
-    monkeypatch.setattr(classes, "CACHED", 40)
     monkeypatch.setattr(scatter, "CACHED", 40)
     sliced = endless.terrain_from_bundle(bundle, HILLS)
     np.testing.assert_array_equal(finite.count_cells(sliced, area, eye), counts)
-    assert len(sliced.classes._known) <= 40 and len(sliced.scatter._known) <= 40
+    assert len(sliced.scatter._known) <= 40
     blocks = finite.list_blocks(sliced, area, eye)
     assert sum(map(len, blocks)) == len(counts) and len(sliced.scatter._known) <= 40

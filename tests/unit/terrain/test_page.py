@@ -5,18 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dav_gswt.terrain.page_front import Front, fill_front, front_of_scene
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, read_scene_frame, write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.taken_photos import TakenPhoto
-from dav_gswt.terrain import page, page_front, page_story
-from dav_gswt.terrain.heights import HeightMap
-from dav_gswt.terrain.page import write_page
+from dav_gswt.terrain import page, page_story
+from dav_gswt.terrain.heights import HeightMap, make_sphere
+from dav_gswt.terrain.page import Front, fill_front, front_of_scene, write_page
 from dav_gswt.terrain.page_story import Story, tell_story
-from dav_gswt.terrain.sphere import make_sphere
 
 SOURCE = (
     '<meta content="An endless terrain made from a few photos"><title>Endless terrain</title><!-- modules -->'
@@ -68,7 +66,7 @@ def test_a_page_is_the_viewer_the_manifest_and_the_chunks_it_names(tmp_path, vie
 def test_the_front_of_a_scene_is_beside_its_page(root, tmp_path, viewer, bundle):
     (viewer / "index.html").write_text((root / "workflow/viewer/index.html").read_text())
     story = Story({"grade": None, "rounds": [], "photos": []}, b"sheet")
-    write_page(bundle, viewer, tmp_path / "page", front=Front("Desert", "A line", b"still", story))
+    write_page(bundle, viewer, tmp_path / "page", front=Front("Desert", "A line", b"still", story=story))
     assert (tmp_path / "page/first.jpg").read_bytes() == b"still"
     assert (tmp_path / "page/photos.jpg").read_bytes() == b"sheet"
     assert json.loads((tmp_path / "page/story.json").read_text()) == story.value
@@ -79,11 +77,9 @@ def test_the_front_of_a_scene_is_beside_its_page(root, tmp_path, viewer, bundle)
     "chunk, message",
     [
         pytest.param({"file": "chunks/b.bin", "bytes": 4}, r"b\.bin: this chunk is missing", id="missing"),
-        pytest.param({"file": "chunks/a.bin", "bytes": 5}, r"a\.bin: 4 bytes instead of 5", id="cut short"),
         pytest.param({"file": "../secret", "bytes": 4}, "lies outside", id="upwards"),
         pytest.param({"file": "/etc/hostname", "bytes": 4}, "lies outside", id="absolute"),
         pytest.param({"file": "", "bytes": 4}, "lies outside", id="no name"),
-        pytest.param({"bytes": 4}, "incomplete tile table", id="no entry"),
         pytest.param(None, "not a bundle of format 'davgswt', version 3", id="another version"),
     ],
 )
@@ -141,7 +137,7 @@ def test_name_line_still_and_modules_are_in_the_page_as_text():
 def test_a_still_is_small_and_the_same_each_time(tmp_path):
     image_files.write_png(tmp_path / "smooth.png", np.tile(np.linspace(0, 1, 640)[None, :, None], (360, 1, 3)))
     fronts = [front_of_scene("desert", None, tmp_path / "smooth.png") for _ in range(2)]
-    assert fronts[0] == fronts[1] and len(fronts[0].still) < page_front.STILL_BYTES
+    assert fronts[0] == fronts[1] and len(fronts[0].still) < page.STILL_BYTES
     (tmp_path / "still.jpg").write_bytes(fronts[0].still)
     assert image_files.read_size(tmp_path / "still.jpg") == (640, 360)
     seen = image_files.read_photo(tmp_path / "still.jpg")

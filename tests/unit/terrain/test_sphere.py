@@ -1,4 +1,4 @@
-"""The sphere: its bend in float32 and float64, neighbours by geometry, walks; cells in view, their order and edges."""
+"""The sphere: its bend in float32 and float64, walks; cells in view, their order and edges; pictures without holes."""
 
 import json
 from dataclasses import replace
@@ -6,21 +6,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dav_gswt.terrain.ground_mapping import camera_on
-from dav_gswt.terrain.sphere_edges import is_covered
-from fixtures.terrains import two_level_terrain
+from fixtures.terrains import MAGENTA, SKY, two_level_terrain
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dav_gswt.bundle.manifest import Sky
 from dav_gswt.errors import InputError
-from dav_gswt.terrain import sphere, sphere_cells, sphere_edges
+from dav_gswt.terrain import finite, planet, sphere, stills
+from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.choice import tiles_at
-from dav_gswt.terrain.sphere import EAST, FACES, NORTH, SOUTH, WEST, Sphere, bend, directions, make_sphere
+from dav_gswt.terrain.heights import QUARTER, FlatSurface, Sphere, make_sphere, require_plain_cover
+from dav_gswt.terrain.sphere import FACES, FaceCells, bend, directions, frame_at, is_covered
+from dav_gswt.terrain.stills import camera_on
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "sphere.json").read_text())
 ORDERS = GOLDEN["orders"]
-STEPS = {WEST: (-1, 0), EAST: (1, 0), SOUTH: (0, -1), NORTH: (0, 1)}
 SIDE = 4.0
+PINK = Sky(MAGENTA, MAGENTA)
 
 
 def cells_at_rims(n):
@@ -62,27 +64,8 @@ def test_float32_keeps_its_digits_at_every_edge_and_corner(radius):
         np.testing.assert_allclose(single, expected.astype(float), rtol=0, atol=2e-6)  # of a tile 4 wide: 3 float steps
 
 
-@pytest.mark.parametrize("n", [2, 5])
-def test_the_cell_beyond_each_edge_is_the_one_that_lies_there(n):
-    ball = Sphere(n * SIDE / 1.4, SIDE, n)
-    for face in range(6):
-        for i, j in np.ndindex(n, n):
-            for side, (di, dj) in STEPS.items():
-                over = np.array([[i + 0.5 + 0.501 * di, j + 0.5 + 0.501 * dj]])
-                there, place = sphere.locate(ball, directions(np.array([face]), ball.tangents(*over.T)))
-                found = sphere.step_cell(ball, face, i, j, side)
-                assert found[:3] == (int(there[0]), *np.floor(place[0]).astype(int).tolist())
-                assert sphere.step_cell(ball, *found[:3], _back(found[3], side))[:3] == (face, i, j)
-
-
-def _back(turns, side):
-    """The side of the neighbour that leads back: the opposite one, turned against the turn of its axes."""
-    around = [EAST, NORTH, WEST, SOUTH]
-    return around[(around.index(side) + 2 - turns) % 4]
-
-
 def test_a_straight_walk_crosses_edges_and_corners_without_a_jump():
-    begin = sphere.frame_at(10.0, 12.0)
+    begin = frame_at(10.0, 12.0)
     for way in ([0.0, 1.0], [0.8, 0.6], [-0.3, 0.95], [1.0, 1.0]):
         way = np.array(way) / np.hypot(*way)
         frames = [sphere.walk_from(begin, way * step, 10.0) for step in range(63)]
@@ -93,19 +76,11 @@ def test_a_straight_walk_crosses_edges_and_corners_without_a_jump():
 
 
 def test_frames_are_east_north_and_up_also_at_the_poles():
-    np.testing.assert_allclose(sphere.frame_at(0.0, 0.0), [[0, 1, 0], [0, 0, 1], [1, 0, 0]], atol=1e-15)
+    np.testing.assert_allclose(frame_at(0.0, 0.0), [[0, 1, 0], [0, 0, 1], [1, 0, 0]], atol=1e-15)
     for latitude in (90.0, -90.0, 89.999999):
-        frame = sphere.frame_at(33.0, latitude)
+        frame = frame_at(33.0, latitude)
         np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
         assert np.linalg.det(frame) == pytest.approx(1)
-
-
-def test_several_materials_and_objects_are_refused():
-    sphere.require_plain_cover("flat", {}, [1])
-    sphere.require_plain_cover("sphere", None, [])
-    for cover, what in (((None, [1]), "objects"), (([1], None), "several materials")):
-        with pytest.raises(InputError, match=f"{what}: give the scene `materials: one`"):
-            sphere.require_plain_cover("sphere", *cover)
 
 
 @pytest.mark.parametrize("entry", GOLDEN["spheres"], ids=lambda e: str(e["cells"]))
@@ -120,22 +95,28 @@ def test_bends_are_those_shared_with_the_page(entry):
 
 
 def all_cells(ball: Sphere):
-    face, i, j = (v.ravel() for v in np.mgrid[:6, -1 : ball.cells + 1, -1 : ball.cells + 1])
-    covered = is_covered(ball, face, i, j)
-    return face[covered], i[covered], j[covered]
+    cells = FaceCells(*(v.ravel() for v in np.mgrid[:6, -1 : ball.cells + 1, -1 : ball.cells + 1]))
+    return cells[is_covered(ball, cells)]
+
+
+def locate(ball: Sphere, points):
+    """The faces under points, and the places on them in cells."""
+    face = np.argmax(points @ FACES[:, 2].T, axis=1)
+    along = np.einsum("nc,nkc->nk", points, FACES[face])
+    return face, (np.arctan2(along[:, :2], along[:, 2:]) / QUARTER + 0.5) * ball.cells
 
 
 @pytest.fixture(scope="module")
-def planet():
-    return replace(two_level_terrain(), heights=make_sphere(8.0, 4.0), reach=48)
+def tiles():
+    return replace(two_level_terrain(), reach=48)
 
 
 @pytest.mark.parametrize("view", ORDERS["views"], ids=lambda v: str(v["eye"]))
 def test_cells_stand_in_the_order_shared_with_the_page(view):
     ball = Sphere(ORDERS["radius"], ORDERS["side"], ORDERS["cells"])
-    face, i, j = all_cells(ball)
-    order, close = sphere_cells.sort_on_sphere(ball, face, i, j, np.array(view["eye"], float))
-    assert np.stack([face, i, j], 1)[order].tolist() == view["order"]
+    cells = all_cells(ball)
+    order, close = planet.sort_on_sphere(ball, cells, np.array(view["eye"], float))
+    assert np.stack([cells.face, cells.i, cells.j], 1)[order].tolist() == view["order"]
     assert close[order].tolist() == view["close"]
 
 
@@ -143,19 +124,19 @@ def test_cells_stand_in_the_order_shared_with_the_page(view):
 @settings(max_examples=30)
 def test_no_ray_meets_a_cell_before_one_that_is_drawn_after_it(longitude, latitude, height, yaw, down):
     """The slow way: walk along a ray through the shell of tiles and note the cells in the order that it enters them."""
-    ball, axes = make_sphere(6.0, 1.0), sphere.frame_at(longitude, latitude)
+    ball, axes = make_sphere(6.0, 1.0), frame_at(longitude, latitude)
     eye = (ball.radius + height) * axes[2]
-    face, i, j = (v.ravel() for v in np.mgrid[:6, : ball.cells, : ball.cells])
-    order, close = sphere_cells.sort_on_sphere(ball, face, i, j, eye)
-    place = {(int(face[k]), int(i[k]), int(j[k])): at for at, k in enumerate(order)}
-    near = {(int(face[k]), int(i[k]), int(j[k])) for k in np.flatnonzero(close)}
+    cells = FaceCells(*(v.ravel() for v in np.mgrid[:6, : ball.cells, : ball.cells]))
+    order, close = planet.sort_on_sphere(ball, cells, eye)
+    names = list(zip(cells.face.tolist(), cells.i.tolist(), cells.j.tolist(), strict=True))
+    place, near = {names[k]: at for at, k in enumerate(order)}, {names[k] for k in np.flatnonzero(close)}
     dip = np.arccos(ball.radius / (ball.radius + height))
     pitch = -dip - down * (0.5 * np.pi - dip)
     turn = np.radians(yaw)
     way = np.array([np.cos(pitch) * np.cos(turn), np.cos(pitch) * np.sin(turn), np.sin(pitch)]) @ axes
     points = eye + np.arange(0, 8, 2e-3)[:, None] * way
     points = points[np.linalg.norm(points, axis=1) >= ball.radius - 0.3]
-    faces, places = sphere.locate(ball, points)
+    faces, places = locate(ball, points)
     met = np.concatenate([faces[:, None], np.floor(places).astype(int)], 1)
     entered = [(int(f), int(a), int(b)) for f, a, b in met[np.r_[True, (np.diff(met, axis=0) != 0).any(1)]]]
     drawn = [place[cell] for cell in entered if cell not in near]  # those are sorted by depth
@@ -163,23 +144,26 @@ def test_no_ray_meets_a_cell_before_one_that_is_drawn_after_it(longitude, latitu
 
 
 @pytest.mark.parametrize("height, point", [(0.3, (1, 1, 1)), (3.0, (-1, -1, 0)), (60.0, (0.3, -0.9, 1))])
-def test_no_cell_of_which_something_shows_is_lost(planet, point, height):
-    ball, up = planet.heights, np.array(point) / np.linalg.norm(point)
+def test_no_cell_of_which_something_shows_is_lost(tiles, point, height):
+    terrain = replace(tiles, heights=make_sphere(8.0, 4.0))
+    ball, up = terrain.heights, np.array(point) / np.linalg.norm(point)
     longitude, latitude = np.degrees([np.arctan2(up[1], up[0]), np.arcsin(up[2])])
-    axes = sphere.frame_at(longitude, latitude)
+    axes = frame_at(longitude, latitude)
     for yaw, pitch in ((20.0, -5.0), (200.0, -40.0), (0.0, -89.0)):
         camera = camera_on((ball.radius + height) * axes[2], axes, yaw, pitch, 64, 36)
-        cells = sphere_cells.visible_on_sphere(planet, ball, camera)
-        found = set(zip(*(v.tolist() for v in (*ball.split_column(cells.i), cells.j)), strict=True))
+        cells = planet.visible_on_sphere(terrain, ball, camera)
+        face, column = np.divmod(cells.i, ball.cells + 2)
+        found = set(zip(*(v.tolist() for v in (face, column - 1, cells.j)), strict=True))
         assert len(found) == len(cells)
-        face, i, j = all_cells(ball)
+        each = all_cells(ball)
+        face, i, j = each.face, each.i, each.j
         steps = np.linspace(0, 1, 5)
         a, b = (v.ravel() for v in np.meshgrid(steps, steps))
-        for z in (0.0, planet.z[1]):
+        for z in (0.0, terrain.z[1]):
             for k in range(len(a)):
                 points = (ball.radius + z) * directions(face, ball.tangents(i + a[k], j + b[k]))
                 pixels, depth = camera.project(points)
-                inside = ((pixels >= 0) & (pixels < [64, 36])).all(1) & (depth > planet.near)
+                inside = ((pixels >= 0) & (pixels < [64, 36])).all(1) & (depth > terrain.near)
                 square = ((points - camera.centre) ** 2).sum(1)
                 ahead = square < height * (2 * ball.radius + height)  # before the horizon
                 for row in np.flatnonzero(inside & ahead).tolist():
@@ -187,20 +171,18 @@ def test_no_cell_of_which_something_shows_is_lost(planet, point, height):
         assert (cells.nearest <= cells.farthest).all()
 
 
-def tile(ball, face, i, j, salt=7, variants=2):
-    cell = [np.array([v]) for v in (face, i, j)]
-    return int(sphere_edges.tiles_on(ball, cell[0], cell[1], cell[2], salt, variants)[0])
-
-
 @pytest.mark.parametrize("salt", [0, 7])
 def test_colours_agree_across_every_edge_without_a_turn(salt):
+    """The cell beyond an edge is found by geometry; the east of odd faces and the north of even ones are turned."""
     ball, crossed = make_sphere(4.0, 4.0), 0
-    cells = np.mgrid[:6, : ball.cells, : ball.cells].reshape(3, -1)
-    for side, (here, there) in {EAST: (1, 3), NORTH: (2, 0)}.items():
-        beyond = np.array([sphere.step_cell(ball, *cell, side) for cell in cells.T.tolist()]).T
-        straight = beyond[3] == 0
-        crossed += (beyond[0] != cells[0])[straight].sum()
-        mine, other = (sphere_edges.tiles_on(ball, *some[:3, straight], salt, 2) for some in (cells, beyond))
+    cells = FaceCells(*np.mgrid[:6, : ball.cells, : ball.cells].reshape(3, -1))
+    for (east, north), (here, there) in {(1, 0): (1, 3), (0, 1): (2, 0)}.items():
+        over = ball.tangents(cells.i + 0.5 + 0.501 * east, cells.j + 0.5 + 0.501 * north)
+        face, place = locate(ball, directions(cells.face, over))
+        straight = (face == cells.face) | (cells.face % 2 == north)
+        crossed += (face != cells.face)[straight].sum()
+        beyond = FaceCells(face, *np.floor(place).astype(int).T)
+        mine, other = (sphere.tiles_on(ball, some[straight], salt, 2) for some in (cells, beyond))
         assert ((mine >> here & 1) == (other >> there & 1)).all()
     assert crossed == 6 * ball.cells
 
@@ -217,11 +199,11 @@ def count_owners(ball: Sphere, points, salt: int):
     for face, (east, north, out) in enumerate(FACES):
         ahead = np.flatnonzero(points @ out > 0.1)
         tangents = points[ahead] @ np.stack([east, north], 1) / (points[ahead] @ out)[:, None]
-        at = (np.arctan(tangents) / sphere.QUARTER + 0.5) * ball.cells
-        cells = [np.full(len(at), face), *np.floor(at).astype(np.int64).T]
-        covered, frayed = is_covered(ball, *cells), sphere_edges.is_frayed(ball, *cells)
+        at = (np.arctan(tangents) / QUARTER + 0.5) * ball.cells
+        cells = FaceCells(np.full(len(at), face), *np.floor(at).astype(np.int64).T)
+        covered, frayed = is_covered(ball, cells), sphere.is_frayed(ball, cells)
         places = np.concatenate([at, np.zeros((len(at), 1))], 1)
-        stays = sphere_edges.find_kept(ball, face, places, salt)
+        stays = sphere.find_kept(ball, face, places, salt)
         owners[ahead] += covered & (~frayed | stays)
     return owners
 
@@ -243,7 +225,84 @@ def test_each_place_belongs_to_one_face_also_at_edges_and_corners(radius):
 def test_tiles_and_what_stays_are_those_shared_with_the_page(entry):
     ball = make_sphere(entry["radius"] / entry["side"], entry["side"])
     for one in entry["tiles"]:
-        assert tile(ball, one["face"], one["i"], one["j"], entry["salt"], entry["variants"]) == one["tile"]
+        cell = FaceCells(*(np.array([one[name]]) for name in ("face", "i", "j")))
+        assert sphere.tiles_on(ball, cell, entry["salt"], entry["variants"]).tolist() == [one["tile"]]
     for one in entry["kept"]:
         places = np.array([one["place"]])
-        assert sphere_edges.find_kept(ball, one["face"], places, entry["salt"])[0] == one["stays"]
+        assert sphere.find_kept(ball, one["face"], places, entry["salt"])[0] == one["stays"]
+
+
+def camera_over(terrain, point, height, pitch, yaw=20.0):
+    up = np.array(point) / np.linalg.norm(point)
+    axes = frame_at(*np.degrees([np.arctan2(up[1], up[0]), np.arcsin(up[2])]))
+    return camera_on((terrain.heights.radius + height) * axes[2], axes, yaw, pitch, 64, 36)
+
+
+def through(picture):
+    """How much magenta shows: green is a half in tiles and 0 behind them."""
+    return np.clip(1 - picture[..., 1] / 0.5, 0, 1)
+
+
+@pytest.mark.parametrize(
+    "radius, point, height, pitch",
+    [
+        pytest.param(8.0, (1, 1, 1), 6.0, -89.0, id="corner"),
+        pytest.param(300.0, (1, 0.2, 1), 1.0, -60.0, id="turned edge"),
+        pytest.param(8.0, (1, 1, 0.2), 1.0, -60.0, id="edge"),
+        pytest.param(1e6, (0, 0, 1), 1.0, -60.0, id="pole"),
+    ],
+)
+def test_the_ground_has_no_holes(tiles, radius, point, height, pitch):
+    terrain = replace(tiles, heights=make_sphere(radius, SIDE))
+    picture = stills.render_view(terrain, camera_over(terrain, point, height, pitch), PINK, MAGENTA)
+    assert through(picture).max() < 0.1  # opaque discs' deviation is 0.7 of their spacing, stretched to 1.26
+
+
+def test_a_large_sphere_is_the_plane(tiles):
+    """Over the middle of a face, with sides as wide as the plane's: radius 1e6 tiles bends 4 tiles by 1e-5 of one."""
+    ball = make_sphere(1e6, SIDE)
+    odd = replace(ball, cells=2 * (ball.cells // 2) + 1, radius=(2 * (ball.cells // 2) + 1) * SIDE * 2 / np.pi)
+    terrain = replace(tiles, heights=odd)
+    axes = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
+    eye = np.array([odd.radius + 2.0, 0, 0])
+    cells = planet.visible_on_sphere(terrain, odd, camera_on(eye, axes, 90.0, -89.9, 64, 36))
+    middle = np.flatnonzero(cells.close & (cells.nearest < 1))[:1]
+    field, jacobian = planet.place_on_sphere(terrain, odd, cells[middle], eye)
+    np.testing.assert_allclose(jacobian, np.broadcast_to(axes.T, jacobian.shape), atol=1e-5)
+    flat = terrain.tiles[0, int(cells.tile[middle][0])]
+    seen = field.means.astype(float) @ axes.T + [0, 0, 2.0]
+    seen[:, :2] -= np.round((seen - [0, 0, 0])[:, :2].mean(0) / SIDE) * SIDE - 0.5 * SIDE
+    first, second = (np.sort(values[:, 0] + 7 * values[:, 1]) for values in (seen, flat.means.astype(float)))
+    np.testing.assert_allclose(first, second, atol=1e-3)
+
+
+def backdrop_on(terrain, radius, height):
+    ball = make_sphere(radius, SIDE)
+    eye = np.array([0.0, 0.0, ball.radius + height])
+    return Backdrop.for_eye(replace(terrain, heights=ball), eye, SKY, [0.4, 0.3, 0.2])
+
+
+def test_far_out_the_sky_is_that_of_the_plane(tiles):
+    way = np.random.default_rng(2).normal(size=(50, 3))
+    flat = Backdrop.for_eye(tiles, np.array([0.0, 0.0, 2.0]), SKY, [0.4, 0.3, 0.2])
+    # the horizon lies 3e-4 lower
+    np.testing.assert_allclose(backdrop_on(tiles, 1e7, 2.0).colours_along(way), flat.colours_along(way), atol=0.02)
+
+
+@pytest.mark.parametrize("height", [1e-3, 1.0, 1e9])
+def test_the_backdrop_is_finite_and_dark_far_away(tiles, height):
+    backdrop = backdrop_on(tiles, 8.0, height)
+    colours = backdrop.colours_along(np.random.default_rng(1).normal(size=(200, 3)))
+    assert np.isfinite(colours).all() and colours.min() >= 0 and colours.max() <= 1
+    assert (backdrop.colours_along(np.array([[0.0, 0.0, 1.0]])).max() < 1e-3) == (height > 100)
+
+
+def test_a_sphere_has_one_material_no_objects_and_no_rectangles(tiles):
+    ball = make_sphere(8.0, SIDE)
+    with pytest.raises(InputError, match="plane"):
+        finite.list_cells(replace(tiles, heights=ball), 0, 0, 2, 2)
+    require_plain_cover(FlatSurface(), {}, [1])
+    require_plain_cover(ball, None, [])
+    for cover, what in (((None, [1]), "objects"), (([1], None), "several materials")):
+        with pytest.raises(InputError, match=f"{what}: give the scene `materials: one`"):
+            require_plain_cover(ball, *cover)

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dav_gswt.terrain.displacement import displace_field
 
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.lod.merge import compute_covariances
 from dav_gswt.raster import render
 from dav_gswt.terrain import splats
-from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills
+from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills, displace_field
 
 ORIGIN = np.zeros(3)
 HILLS = Hills(1.5, 6.0, 3, 4)

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dav_gswt.terrain.timing import FrameTiming
 from fixtures.terrains import MAGENTA, SKY, walking
 
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.terrain import placement, stills, visibility
+from dav_gswt.terrain.stills import FrameTiming
 
 
 def test_a_place_is_the_same_on_every_visit_and_far_out_too(terrain):

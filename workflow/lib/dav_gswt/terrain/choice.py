@@ -17,9 +17,8 @@ def hash_cell(
 ) -> int | Int64[Array, "..."]:
     """32 well mixed bits for cell (i, j): one round of the finaliser of MurmurHash3 for each coordinate.
 
-    h = mix(mix(i 0x8da6b343 ^ axis 0xcb1ab31f ^ salt) + j 0xd8163841), all modulo 2^32: negative coordinates count in
-    two's complement, and cells 2^32 apart are the same cell. Every integer is allowed. A single round over a
-    combination that is linear in i and j would mirror the world: h(i, j) = h(-i, -j) for a third of all cells.
+    All is modulo 2^32: negative coordinates count in two's complement, and cells 2^32 apart are the same cell. A single
+    round over a combination that is linear in i and j would mirror the world.
     """
     h = _mix(_low_word(i * 0x8DA6B343 ^ axis * 0xCB1AB31F ^ salt))
     return _mix(_low_word(h + j * 0xD8163841))
@@ -54,14 +53,11 @@ def tiles_at(
 ) -> Int64[Array, "*cells"]:
     """Numbers of the tiles in cells: T = 16 c + 8 W + 4 N + 2 E + S.
 
-    A cell's east edge is its neighbour's west edge, its north edge the south edge of the cell above, so each edge has
-    one colour. `variants` is C >= 1, the number of centres; T is in [0, 16 C).
+    With two centres or more, a cell with odd i + j takes the next centre that differs from its four neighbours, if
+    there is one. They are even and take the centre of the hash, so no choice depends on another.
 
-    Equal neighbours are the most visible repetition. With two centres or more, a cell with odd i + j therefore takes
-    the next centre that differs from its four neighbours; these are even and take the centre of the hash, so no choice
-    depends on another. Where the neighbours use every centre, the centre of the hash is kept.
-
-    Args:   period: (i + period, j + period) is the same cell as (i, j); 0: none.
+    Args:   variants: C >= 1, the number of centres. period: (i + period, j + period) is the same cell as (i, j), unless
+            it is 0.
     """
     edges, centre = _hash_edges(i, j, salt, period), _hash_centre(i, j, salt, variants, period)
     taken = 0  # a bit for each centre that a neighbour with the same edges has

@@ -1,26 +1,12 @@
 """Classes of the terrain: which material lies at a place, and which Gaussians stay where materials meet.
 
-Every material has a score; the highest one lies there. Scores are sums of terms (noise, ranges of height and slope, a
-picture) at the points of a lattice, LATTICE of them along a tile's side, and bilinear in between. So a cell is decided
-by its own lattice points, and most cells hold one material.
+Every material has a score, and the highest one lies there. Scores are sums of terms at the points of a lattice, or what
+a person painted there, and bilinear in between. Where materials meet, their tiles are placed together, and each
+Gaussian is kept or dropped by its own score, with fine noise that frays the border and a bonus for what rises above the
+ground. All Gaussians at one place see the same scores, and the highest one always passes: the ground has no holes.
 
-A person may paint points of the lattice. A painted point counts for the points up to two steps around it with the
-binomial weights SPREAD, so what is painted has a smooth border that crosses the lattice at about the steepness of a
-rule's, and the same jitter frays it. At a point whose surroundings are painted with a weight, the rule keeps the rest;
-there its scores are taken from the highest and cut, since a rule may have any lead.
-
-Where materials meet, their tiles are placed together and each Gaussian is kept or dropped on its own. A Gaussian of
-material m stays where
-
-    s_m + jitter_m + min(slope max(|z - ground_m| - clearance_m, 0), most) >= s_o + jitter_o    for all others o
-
-The jitter is fine noise of the place, which frays the border; what stands above the ground, or lies below it, reaches
-over it. All Gaussians at one place see the same scores and jitter, and the highest score always passes, so some
-material's disc covers every place: no hole, and no blend of colours. A random number for each Gaussian instead would
-drop neighbouring discs of both materials at once, and the ground would have holes.
-
-The viewer computes the same scores; tests/golden/classes.json holds both to them. Only sums, products, quotients,
-square roots, floor, minima and maxima of float64 are used, in the order written here.
+docs/formats.md has the formulas. The viewer computes the same scores; tests/golden/classes.json holds both to them.
+Only sums, products, quotients, square roots, floor, minima and maxima of float64 are used, in the order written here.
 """
 
 from collections.abc import Mapping, Sequence

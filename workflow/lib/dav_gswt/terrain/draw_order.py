@@ -37,8 +37,7 @@ def nearest_order(directions: Float[Array, "d 3"], orders: list[int], to: Vector
     Orders were sorted on level ground. On a surface with slopes s the depth along a direction d is
     d . (J p) = (J^T d) . p, so the angle to J^T d = (d_x + s_x d_z, d_y + s_y d_z, d_z) counts. Ties: the first.
 
-    Args:   orders: indices into `directions`, those that the tile keeps. to: from the eye to the tile's centre, of any
-            length. slope: of the surface there.
+    Args:   orders: of the tile, indices into `directions`. to: from the eye to the tile's centre. slope: there.
     """
     x, y, z = directions[orders].T
     return int(np.argmax(x * (to[0] + slope[0] * to[2]) + y * (to[1] + slope[1] * to[2]) + z * to[2]))
@@ -78,8 +77,7 @@ def level_weights(distance: Floats, switches: list[float], bands: list[float]) -
 def crossfade_opacity(opacity: Floats, weight: Floats) -> Floats:
     """Opacity of a Gaussian drawn with a weight w: 1 - (1 - opacity)^w, exactly the opacity at 1 and 0 at 0.
 
-    Transmittances multiply, so two equal Gaussians of weights w and 1 - w hide as much as one; a linear fade of 0.9
-    would dip to 0.7 half-way. Computed as -expm1(w log1p(-opacity)), with opacity at most MAX_OPACITY for 0 < w < 1.
+    Transmittances multiply, so two equal Gaussians of weights w and 1 - w hide as much as one.
     """
     partial = -np.expm1(weight * np.log1p(-np.minimum(opacity, MAX_OPACITY)))
     return np.where(weight == 1, opacity, np.where(weight == 0, 0.0, partial))

@@ -111,9 +111,7 @@ class FlatSurface(HeightField, kind="flat"):
 class Hills(HeightField, kind="hills"):
     """Gradient noise: h = sum over octaves k of a_k n(2^k x / wavelength + k SHIFT), a_k ~ GAIN^k, sum a_k = height.
 
-    n is 0 at the corners of unit cells and has a hash_cell gradient g in [-1, 1]^2 there; in between the four corners'
-    planes g . (p - corner) are blended by f(t) = t^3 (t (6 t - 15) + 10), so n is twice differentiable. With weights w
-    of the corners |n| <= sum w (|dx| + |dy|) <= 1, hence |h| <= height; in practice hills reach half of that.
+    |n| <= 1, hence |h| <= height; in practice hills reach half of that.
     """
 
     height: float
@@ -375,11 +373,10 @@ def displace_means(
 ) -> tuple[GaussianField, Float[Array, "n 2"]]:
     """Move centres from (x, y, z) to (x, y, z + h(x, y)); also returns the surface's slope at each.
 
-    Heights above the surface stay along z, so upright objects stay upright, no Gaussian leaves the column of its tile
-    and neighbouring tiles still meet. Shapes are unchanged; see `displaced_axes`.
+    No Gaussian leaves the column of its tile, so neighbouring tiles still meet. Shapes are unchanged; see
+    `displaced_axes`.
 
-    Args:   corner: world position of the origin of the field's means. origin: world position of the origin of the
-            returned means.
+    Args:   corner, origin: world positions of the origin of the field's means, and of the returned means.
     """
     means = field.means.astype(float)
     height, slope = heights.at(means[:, 0] + corner[0], means[:, 1] + corner[1])
@@ -391,9 +388,8 @@ def displace_means(
 def displaced_axes(field: GaussianField, slope: Slope) -> Float[Array, "n 3 3"]:
     """A = J R S of every Gaussian on a surface of these slopes; its covariance is A A^T = J Sigma J^T.
 
-    J = [[1, 0, 0], [0, 1, 0], [h_x, h_y, 1]] is the derivative of `displace_means`; its determinant is 1. The columns
-    of R S are the Gaussian's axes, scaled by their standard deviations. Discs on a slope are stretched along it, so
-    they stay as dense as on level ground. On a sphere J is given (see `sphere.bend`).
+    J = [[1, 0, 0], [0, 1, 0], [h_x, h_y, 1]] is the derivative of `displace_means`. The columns of R S are the
+    Gaussian's axes, scaled by their standard deviations. On a sphere J is given (see `sphere.bend`).
     """
     rotation = Rotation.from_quat(field.quats.astype(float), scalar_first=True).as_matrix()
     axes = rotation * np.exp(field.log_scales.astype(float))[:, None]

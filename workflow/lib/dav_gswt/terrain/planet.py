@@ -88,10 +88,9 @@ def _angle(chord: Floats) -> Floats:
 def sort_on_sphere(sphere: Sphere, cells: FaceCells, eye: Vector) -> tuple[Ints, Bool[Array, "n"]]:
     """Indices of cells from back to front, and which are in the block about the eye that is sorted by depth.
 
-    The planes between a face's columns and between its rows, and those between faces, pass through the planet's middle,
-    and a ray crosses each once. So of two faces the one whose middle is farther from the eye never hides the other, and
-    on a face a cell with more steps from the eye's own never hides one with fewer, as in the plane; behind a face it is
-    the other way round.
+    All planes between columns, rows and faces pass through the planet's middle, and a ray crosses each once. So a face
+    whose middle is farther from the eye never hides another, and on a face a cell with more steps from the eye's own
+    never hides one with fewer, as in the plane; behind a face it is the other way round.
     """
     face, i, j = cells.face, cells.i, cells.j
     along = FACES @ eye

@@ -1,13 +1,11 @@
 """Scatter: where objects stand on the endless terrain, as a pure function of the cell.
 
-A grid of `cells` x `cells` squares a tile holds one candidate each, at a place by hash. A candidate becomes one of the
-objects of the material under it by a second hash, or none. It stands if its footprint lies well inside that material,
-and if its priority, a third hash, is the highest of all candidates whose footprints overlap it, whether or not those
-stand themselves (Matern's second hard-core process). So no two overlap, every place is decided by the squares around
-it, and since places are uniform in their squares, no lattice shows in their density.
+Every square of a grid has one candidate, at a place by hash. A candidate stands if its footprint lies well inside its
+material, and if its priority is the highest of all candidates whose footprints overlap it, whether or not those stand
+themselves (Matern's second hard-core process). So every place is decided by the squares around it.
 
-The viewer computes the same instances; tests/golden/scatter.json holds both to them. Only sums, products, quotients and
-floor of float64 are used.
+docs/formats.md has the formulas. The viewer computes the same instances; tests/golden/scatter.json holds both to them.
+Only sums, products, quotients and floor of float64 are used.
 """
 
 from collections.abc import Sequence

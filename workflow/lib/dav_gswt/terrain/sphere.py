@@ -1,22 +1,12 @@
 """The sphere: a planet of tiles, six faces of n x n cells each, how a tile bends onto it, and where its faces meet.
 
 A face is a square of angles: the point (a, b) of a face, in cells from its south-western corner, lies in the direction
-tan(alpha) east + tan(beta) north + out with alpha = (a / n - 1/2) 90 degrees, and beta likewise. Cells along a face's
-middle are equally wide, and all planes between columns pass through the planet's middle, also beyond the face's edges:
-the columns of two faces that share an edge are the same pencil of planes.
+tan(alpha) east + tan(beta) north + out with alpha = (a / n - 1/2) 90 degrees, and beta likewise. The faces are an
+unfolded cube. Tiles go on across six of its edges. Across the other six, where faces meet turned by 90 degrees, the
+tilings of both faces reach over the edge, and a noise that both share decides to which face a place belongs.
 
-The six faces are an unfolded cube, a staircase: the east of an even face is the west of the next, the north of an odd
-face the south of the next, and after the sixth comes the first. Across these six edges tiles go on as in the plane. The
-other six join the north of an even face to the west of the next but one, and the east of an odd face to the south of
-the next but one, turned by 90 degrees: fewer than six turned edges are impossible, since at each of the eight corners
-three right angles meet, a quarter turn short of the plane's four, and a connected set of edges can only make up for a
-whole number of turns.
-
-Across a turned edge the strips of tiles cannot match. There the tilings of both faces reach over the edge, and a noise
-that both share decides to which face a place belongs: the edge frays as the border of two materials does.
-
-The viewer's `terrain/sphere.js` and `terrain/sphere_edges.js` compute the same numbers; tests/golden/sphere.json holds
-both to them.
+docs/formats.md has the formulas. The viewer's `terrain/sphere.js` and `terrain/sphere_edges.js` compute the same
+numbers; tests/golden/sphere.json holds both to them.
 """
 
 from dataclasses import dataclass
