@@ -97,15 +97,6 @@ def test_it_looks_as_the_terrain_does(bundle, surface, corner):
     assert np.abs(field.means[:, :2]).max() < 10 * SIDE, "positions count from the corner"
 
 
-def test_every_object_is_there_once(bundle):
-    terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
-    whole = finite.collect_cells(terrain, 0, 0, 6, 6, 1)
-    parts = [finite.collect_cells(terrain, i, j, 3, 3, 1) for i in (0, 3) for j in (0, 3)]
-    assert len(whole) == sum(len(part) for part in parts)
-    i, j, _, _ = finite.list_cells(terrain, 0, 0, 6, 6)
-    assert len(terrain.scatter.instances_in(i, j)) > 0
-
-
 def test_a_wide_area_is_counted_in_slices(bundle, monkeypatch):
     """The same counts and blocks, while no more cells are known at a time than a slice has."""
     area, eye = finite.Area(-7, 3, 8, 7), np.array([0.0, 0.0, 2.0])

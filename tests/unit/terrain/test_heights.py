@@ -105,11 +105,8 @@ def test_sixteen_bits_are_read_as_such(tmp_path, no_data):
         (np.float32([0, np.nan, 0]), None, "row 0, column 1 is not finite"),
         (np.int16([1, -2, 3]), None, r"its integers have a sign \(int16\)"),
         (np.float32([1, 2, -9999]), "-9999", r"row 0, column 2 is marked as no data \(2 such\); fill"),
-        (np.float32([1, 2, -3.4028234663852886e38]), "-3.4028234663852886e+38", "no data"),
         (np.uint16([1, 2, 65535]), "65535", "no data"),
-        (np.uint8([1, 2, 0]), "0", "no data"),
         (np.float32([0, 1, 1e36]), None, r"row 0, column 2 times heights\.height is beyond 1e\+09"),
-        (np.float32([0, 1, -1001]), None, r"row 0, column 2 times heights\.height is beyond"),
         (np.zeros(5, np.float32), None, "5 x 2 pixels; at most 4 a side"),
     ],
 )

@@ -14,7 +14,6 @@ from dav_gswt.bundle.manifest import Sky
 from dav_gswt.errors import InputError
 from dav_gswt.terrain import finite, planet, sphere, stills
 from dav_gswt.terrain.backdrop import Backdrop
-from dav_gswt.terrain.choice import tiles_at
 from dav_gswt.terrain.heights import QUARTER, FlatSurface, Sphere, make_sphere, require_plain_cover
 from dav_gswt.terrain.sphere import FACES, FaceCells, bend, directions, frame_at, is_covered
 from dav_gswt.terrain.stills import camera_on
@@ -73,14 +72,6 @@ def test_a_straight_walk_crosses_edges_and_corners_without_a_jump():
             np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
             assert np.abs(after - frame).max() < 0.101  # a tenth of a radian
         np.testing.assert_allclose(sphere.walk_from(begin, way * 2 * np.pi * 10.0, 10.0), begin, atol=1e-12)
-
-
-def test_frames_are_east_north_and_up_also_at_the_poles():
-    np.testing.assert_allclose(frame_at(0.0, 0.0), [[0, 1, 0], [0, 0, 1], [1, 0, 0]], atol=1e-15)
-    for latitude in (90.0, -90.0, 89.999999):
-        frame = frame_at(33.0, latitude)
-        np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
-        assert np.linalg.det(frame) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("entry", GOLDEN["spheres"], ids=lambda e: str(e["cells"]))
@@ -185,12 +176,6 @@ def test_colours_agree_across_every_edge_without_a_turn(salt):
         mine, other = (sphere.tiles_on(ball, some[straight], salt, 2) for some in (cells, beyond))
         assert ((mine >> here & 1) == (other >> there & 1)).all()
     assert crossed == 6 * ball.cells
-
-
-def test_without_a_period_tiles_are_those_of_the_plane():
-    i, j = np.meshgrid(np.arange(-20, 20), np.arange(-20, 20))
-    assert (tiles_at(i, j, 3, 2, 10**9) == tiles_at(i, j, 3, 2)).sum() >= 800  # all but those below the first lap
-    assert (tiles_at(i + 12, j + 12, 3, 2, 12) == tiles_at(i, j, 3, 2, 12)).all()
 
 
 def count_owners(ball: Sphere, points, salt: int):

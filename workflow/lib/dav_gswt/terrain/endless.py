@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.land_cover import ImageTerm, ObjectOrders
@@ -34,8 +34,7 @@ class EndlessTerrain:
     material's tiles. near: distance of the near plane. reach: distance to the last tiles, in tile sides; beyond it the
     ground has the terrain's mean colour. classes: which material lies where; None with one. objects:
     objects[number][level], about the foot. extents: of each object, the largest distance of a Gaussian's rim from the
-    foot. scatter: where they stand; None without objects. ordered: by object, order and levels, the Gaussians in that
-    order and the level of each, as far as they are known.
+    foot. scatter: where they stand; None without objects.
     """
 
     tiles: dict[tuple[int, int], GaussianField]
@@ -55,9 +54,6 @@ class EndlessTerrain:
     objects: list[list[GaussianField]] = field(default_factory=list)
     extents: list[float] = field(default_factory=list)
     scatter: Scatter | None = None
-    ordered: dict[tuple[int, ...], tuple[GaussianField, Int[Array, "k"]]] = field(
-        default_factory=dict, init=False, repr=False
-    )
 
     @property
     def object_entries(self) -> Sequence[ObjectOrders]:

@@ -34,11 +34,19 @@ VERDICTS = {"good": "The photos fit together well.", "doubtful": "It is doubtful
 
 
 @dataclass(frozen=True)
-class Front:
-    """What a page says of its scene.
+class FrontTexts:
+    """front.json: what a page says of its scene. verdict: what tests said of the photos and of the field."""
 
-    still: a JPEG of what the page shows first, see `encode_still`. verdict: what tests said of the photos and of the
-    field. story: how it was made, where that is known.
+    name: str
+    line: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Front:
+    """The front of a scene's page.
+
+    still: a JPEG of what the page shows first, see `encode_still`. story: how it was made, where that is known.
     """
 
     name: str

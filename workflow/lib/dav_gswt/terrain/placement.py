@@ -173,9 +173,6 @@ def _order_levels(
     """
     kept = terrain.object_entries[number].chunks[0].orders
     order = kept[nearest_order(terrain.directions, kept, to, slope)]
-    place = (number, order, *np.flatnonzero(active).tolist())
-    if place not in terrain.ordered:
-        parts = {level: terrain.objects[number][level] for level in place[2:]}
-        parts = parts or {len(terrain.switches) - 1: terrain.objects[number][-1][:0]}
-        terrain.ordered[place] = order_gaussians(parts, terrain.directions[order])
-    return terrain.ordered[place]
+    parts = {level: terrain.objects[number][level] for level in np.flatnonzero(active).tolist()}
+    parts = parts or {len(terrain.switches) - 1: terrain.objects[number][-1][:0]}
+    return order_gaussians(parts, terrain.directions[order])
