@@ -1,6 +1,7 @@
 """Classes: the numbers shared with the page, bounds of cells, what reaches over a border, and painted places."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -94,7 +95,7 @@ def test_weights_are_those_of_a_sum_over_all_points(shift):
     spread = {-2: 1, -1: 4, 0: 6, 1: 4, 2: 1}
     for (x, y), material in points.items():
         expected[:, material] += [spread.get(a - x, 0) * spread.get(b - y, 0) for a, b in zip(i, j, strict=True)]
-    painted = Painted([[x, y, 1, m] for (x, y), m in points.items()])
+    painted = Painted(replace(two_classes(), painted=[[x, y, 1, m] for (x, y), m in points.items()]))
     assert (painted.weights_at(i, j, 3) == expected).all()
 
 

@@ -118,7 +118,11 @@ def terrain_from_fields(
     heights.require_plain_cover(surface, manifest.classes, manifest.objects)
     classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, surface, pictures or {})
     beyond = (RIM - 3) * largest  # the manifest's heights reach three deviations beyond the centres
-    extents, things = [measure_extent(fields) for fields in objects], manifest.objects or []
+    extents, things = [], manifest.objects or []
+    for fields in objects:
+        reach = [RIM * np.exp(f.log_scales.astype(float)).max(1) for f in fields]
+        away = [np.linalg.norm(f.means.astype(float), axis=1) + r for f, r in zip(fields, reach, strict=True)]
+        extents.append(float(np.concatenate(away).max(initial=0.0)))
     z = [(entry.z[0] - beyond, entry.z[1] + beyond) for entry in entries]
     scatter, widest = None, 0.0
     if manifest.scatter is not None:
@@ -144,10 +148,3 @@ def terrain_from_fields(
         extents=extents,
         scatter=scatter,
     )
-
-
-def measure_extent(levels: list[GaussianField]) -> float:
-    """Largest distance of the rim of an object's Gaussians from its foot, over all levels."""
-    deviations = [np.exp(f.log_scales.astype(float)).max(1) for f in levels]
-    away = [np.linalg.norm(f.means.astype(float), axis=1) + RIM * d for f, d in zip(levels, deviations, strict=True)]
-    return float(np.concatenate(away).max(initial=0.0))
