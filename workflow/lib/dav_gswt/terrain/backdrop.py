@@ -42,18 +42,18 @@ class Backdrop:
     @staticmethod
     def for_eye(terrain: EndlessTerrain, eye: Vector, sky: Sky, ground_colour: Sequence[float] | Array) -> "Backdrop":
         """The backdrop that an eye sees behind a terrain."""
-        colours = [np.asarray(c, np.float32) for c in (sky.zenith, sky.horizon, ground_colour)]
+        zenith, horizon, ground = (np.asarray(c, np.float32) for c in (sky.zenith, sky.horizon, ground_colour))
         if isinstance(sphere := terrain.heights, Sphere):
             far, reach, radius = float(np.linalg.norm(eye)), find_reach(terrain, sphere, eye), sphere.radius
             height = max(far - radius, 0.0)
             square = height * (2 * radius + height)  # of the distance to the horizon
             dip = float(np.sqrt(square)) / far
             if reach * reach >= square:
-                return SphereBackdrop(*colours, NO_END, LOWEST, eye, dip, radius)
+                return SphereBackdrop(zenith, horizon, ground, NO_END, LOWEST, eye, dip, radius)
             low = max((square + reach * reach) / (2 * far * reach) - dip, LOWEST)
-            return SphereBackdrop(*colours, reach, low, eye, dip, radius)
+            return SphereBackdrop(zenith, horizon, ground, reach, low, eye, dip, radius)
         end = terrain.reach * terrain.side
-        return Backdrop(*colours, end, (eye[2] - terrain.heights.low) / end)
+        return Backdrop(zenith, horizon, ground, end, (eye[2] - terrain.heights.low) / end)
 
     def colours_along(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
         """Colours in directions of any length."""

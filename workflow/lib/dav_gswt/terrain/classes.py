@@ -164,7 +164,7 @@ class Classes:
             lattices, masks = self.cell_lattices(*np.array(some, np.int64).T), np.zeros(len(some), np.int64)
             for material in range(self.materials):
                 most = _over_corners(np.maximum, lattices[..., material, None] - lattices)
-                masks |= (most >= -slack).all(-1).any((1, 2)).astype(np.int64) << material
+                masks |= (most >= -slack).all(-1).any(-1).any(-1).astype(np.int64) << material
             self._known.update(zip(some, masks.tolist(), strict=True))
         return np.array([self._known[cell] for cell in cells], np.int64)
 
