@@ -18,7 +18,7 @@ from dav_gswt.terrain.heights import displace_means
 from dav_gswt.terrain.scatter import Instances
 from dav_gswt.terrain.visibility import GridCells, active_levels, active_range
 
-Part = tuple[GaussianField, Int[Array, "n"]]  # Gaussians, and the level of each
+Part = tuple[GaussianField, Int[Array, "_"]]  # Gaussians, and the level of each
 
 
 def place_cell(
