@@ -68,18 +68,6 @@ def test_every_place_keeps_the_disc_of_a_material(amplitude):
         assert not (sand & grass).any(), "flat discs of both at one place: a blend"
 
 
-def test_what_a_cell_may_not_hold_is_dropped_from_it(sand_and_grass):
-    rng, i, j = np.random.default_rng(2), *np.random.default_rng(3).integers(-500, 500, (2, 40))
-    for cell in zip(i.tolist(), j.tolist(), sand_and_grass.materials_in(i, j).tolist(), strict=True):
-        tall = discs_at(rng.random((300, 2)), z=5.0)
-        for material in (0, 1):
-            kept = sand_and_grass.keep(*cell[:2], tall, np.full(300, material))
-            if not cell[2] >> material & 1:
-                assert not kept.any()
-            if cell[2] == 1 << material:
-                assert kept.all()
-
-
 def lattice(low, high):
     i, j = np.mgrid[low:high, low:high].astype(np.int64)
     return i.ravel(), j.ravel()

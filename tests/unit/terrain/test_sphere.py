@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fixtures.terrains import MAGENTA, SKY, two_level_terrain
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.errors import InputError
@@ -109,29 +107,6 @@ def test_cells_stand_in_the_order_shared_with_the_page(view):
     order, close = planet.sort_on_sphere(ball, cells, np.array(view["eye"], float))
     assert np.stack([cells.face, cells.i, cells.j], 1)[order].tolist() == view["order"]
     assert close[order].tolist() == view["close"]
-
-
-@given(st.floats(-180, 180), st.floats(-90, 90), st.floats(0.01, 3), st.floats(-180, 180), st.floats(0, 1))
-@settings(max_examples=30)
-def test_no_ray_meets_a_cell_before_one_that_is_drawn_after_it(longitude, latitude, height, yaw, down):
-    """The slow way: walk along a ray through the shell of tiles and note the cells in the order that it enters them."""
-    ball, axes = make_sphere(6.0, 1.0), frame_at(longitude, latitude)
-    eye = (ball.radius + height) * axes[2]
-    cells = FaceCells(*(v.ravel() for v in np.mgrid[:6, : ball.cells, : ball.cells]))
-    order, close = planet.sort_on_sphere(ball, cells, eye)
-    names = list(zip(cells.face.tolist(), cells.i.tolist(), cells.j.tolist(), strict=True))
-    place, near = {names[k]: at for at, k in enumerate(order)}, {names[k] for k in np.flatnonzero(close)}
-    dip = np.arccos(ball.radius / (ball.radius + height))
-    pitch = -dip - down * (0.5 * np.pi - dip)
-    turn = np.radians(yaw)
-    way = np.array([np.cos(pitch) * np.cos(turn), np.cos(pitch) * np.sin(turn), np.sin(pitch)]) @ axes
-    points = eye + np.arange(0, 8, 2e-3)[:, None] * way
-    points = points[np.linalg.norm(points, axis=1) >= ball.radius - 0.3]
-    faces, places = locate(ball, points)
-    met = np.concatenate([faces[:, None], np.floor(places).astype(int)], 1)
-    entered = [(int(f), int(a), int(b)) for f, a, b in met[np.r_[True, (np.diff(met, axis=0) != 0).any(1)]]]
-    drawn = [place[cell] for cell in entered if cell not in near]  # those are sorted by depth
-    assert drawn == sorted(drawn, reverse=True)
 
 
 @pytest.mark.parametrize("height, point", [(0.3, (1, 1, 1)), (3.0, (-1, -1, 0)), (60.0, (0.3, -0.9, 1))])

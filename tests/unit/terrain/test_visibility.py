@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fixtures.terrains import SIDE, walking
-from hypothesis import given
-from hypothesis import strategies as st
 
 from dav_gswt.bundle import orders
 from dav_gswt.reconstruction import discs
@@ -105,20 +103,6 @@ def test_orders_are_those_shared_with_the_page():
     for entry in GOLDEN["orders"]:
         to, slope = np.array(entry["to"], float), np.array(entry["slope"], float)
         assert draw_order.nearest_order(along, entry["kept"], to, slope) == entry["position"]
-
-
-@given(st.floats(0, 1, exclude_max=True), st.floats(0, 1, exclude_max=True), st.floats(-np.pi, np.pi))
-def test_no_ray_meets_a_cell_before_one_that_is_drawn_after_it(x, y, angle):
-    """The slow way: walk along a ray from the eye and note the cells in the order that it enters them."""
-    i, j = window(-6, -6, 13, 13)
-    sequence = draw_order.sort_cells(i, j, (0, 0))
-    place = {(int(i[k]), int(j[k])): at for at, k in enumerate(sequence)}
-    t = np.arange(0, 6, 1e-3)
-    met = np.floor(np.stack([x + t * np.cos(angle), y + t * np.sin(angle)], 1)).astype(int)
-    entered = [tuple(int(v) for v in cell) for cell in met[np.r_[True, (np.diff(met, axis=0) != 0).any(1)]]]
-    # a step of 1e-3 may cut a corner where two edges are met at once: those cells hide nothing of each other
-    drawn = [place[cell] for cell in entered]
-    assert drawn == sorted(drawn, reverse=True)
 
 
 def test_weights_are_those_shared_with_the_page():
