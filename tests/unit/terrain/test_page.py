@@ -90,11 +90,7 @@ def test_an_unsound_chunk_is_refused_by_name(tmp_path, viewer, bundle, chunk, me
     assert not (tmp_path / "page").exists()
 
 
-def test_the_viewer_is_the_folder_of_index_html(tmp_path, bundle):
-    files = ["data/a.js", "index.html", "main.js"]
-    assert page.find_viewer([str(tmp_path / name) for name in files]) == tmp_path
-    with pytest.raises(InputError, match=r"no index\.html"):
-        page.find_viewer(["data/a.js"])
+def test_a_folder_without_a_viewer_is_refused(tmp_path, bundle):
     with pytest.raises(InputError, match="no viewer here"):
         write_page(bundle, tmp_path, tmp_path / "page")
 

@@ -1,6 +1,5 @@
 """Stills: ground without cracks under sky, draw order close to exact sorting, shots."""
 
-
 import numpy as np
 import pytest
 from fixtures.terrains import MAGENTA, SKY, walking

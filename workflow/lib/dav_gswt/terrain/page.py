@@ -146,14 +146,6 @@ def write_page(
         write_json(part / MANIFEST, value | {"heights": heights})
 
 
-def find_viewer(paths: Iterable[Path | str]) -> Path:
-    """The folder of the viewer, given its files. Raises: InputError: there is no index.html among them."""
-    for path in map(Path, paths):
-        if path.name == INDEX:
-            return path.parent
-    raise InputError("the viewer's files hold no index.html")
-
-
 def _list_chunks(bundle: Path, manifest: dict[str, Any]) -> list[str]:
     """The chunk files that a bundle's manifest names. Raises: InputError, as write_page."""
     holders = [*manifest["tiles"], *manifest.get("objects", [])]
