@@ -1,6 +1,6 @@
 """Rule render_candidates: what do some candidates truly show?"""
 
-from dav_gswt.study.calibration import true_pictures
+from dav_gswt_study.calibration import true_pictures
 
 from dav_gswt.files import atomic_folder
 from dav_gswt.geometry.scene_frame import read_scene_frame

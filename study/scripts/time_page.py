@@ -10,6 +10,7 @@ from dav_gswt_study.terrain import frames
 
 with logging_to(snakemake.log[0]):
     paths = snakemake.input
-    bundle, viewer = Path(paths.manifest).parent, page.find_viewer(paths.viewer)
+    viewer = next(Path(path).parent for path in paths.viewer if Path(path).name == page.INDEX)
+    bundle = Path(paths.manifest).parent
     rows = frames.time_page(bundle, viewer, read_json(paths.manifest), frames.FrameSettings(**snakemake.params.asked))
     csv_tables.write_table(snakemake.output.table, rows)

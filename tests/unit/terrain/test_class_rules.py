@@ -119,11 +119,9 @@ def test_with_one_material_densities_count_alone(manifest, write):
     "changes, message",
     [
         ({"version": 2}, "version"),
-        ({"runs": [[0, 0, 1.5, 0]]}, "runs"),
         ({"runs": [[0, 0, 1, 5]]}, "a material that is not there"),
         ({"materials": ["mud", "sand"]}, "no material 'mud'; the terrain has sand, grass"),
         ({"densities": {"shrub": 4}}, "densities: beyond 0 to 3"),
-        ({"densities": {"shrub": -1}}, "densities: beyond 0 to 3"),
         ({"offsets": {"sand": -9}}, "offsets: beyond 8"),
         ({"format": "x" * 2**24}, "more than 16777216 bytes"),
     ],

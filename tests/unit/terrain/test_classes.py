@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from fixtures.land_covers import SIDE, gaussians, two_classes
 
-from dav_gswt.bundle.land_cover import ClassesEntry, ImageTerm, RangeTerm, find_run_fault
+from dav_gswt.bundle.land_cover import ClassesEntry, ImageTerm, find_run_fault
 from dav_gswt.files import parse_record
-from dav_gswt.terrain.classes import LATTICE, Classes, Painted, paint_lead
-from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills
+from dav_gswt.terrain.classes import LATTICE, Classes, Painted
+from dav_gswt.terrain.heights import FlatSurface, Hills
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "classes.json").read_text())["terrains"]
 
@@ -32,14 +32,6 @@ def classes_of(terrain) -> Classes:
 @pytest.fixture
 def sand_and_grass():
     return Classes(two_classes(), 2, SIDE)
-
-
-@pytest.fixture
-def border(sand_and_grass):
-    """A cell of both materials."""
-    i, j = (v.ravel() for v in np.mgrid[0:9, 0:9].astype(np.int64))
-    mixed = np.flatnonzero(sand_and_grass.materials_in(i, j) == 3)
-    return int(i[mixed[0]]), int(j[mixed[0]])
 
 
 def discs_at(places, z=0.0):
@@ -76,55 +68,6 @@ def test_every_place_keeps_the_disc_of_a_material(amplitude):
         assert not (sand & grass).any(), "flat discs of both at one place: a blend"
 
 
-def test_what_a_cell_may_not_hold_is_dropped_from_it(sand_and_grass):
-    rng, i, j = np.random.default_rng(2), *np.random.default_rng(3).integers(-500, 500, (2, 40))
-    for cell in zip(i.tolist(), j.tolist(), sand_and_grass.materials_in(i, j).tolist(), strict=True):
-        tall = discs_at(rng.random((300, 2)), z=5.0)
-        for material in (0, 1):
-            kept = sand_and_grass.keep(*cell[:2], tall, np.full(300, material))
-            if not cell[2] >> material & 1:
-                assert not kept.any()
-            if cell[2] == 1 << material:
-                assert kept.all()
-
-
-def test_what_stands_above_the_ground_reaches_over_the_border(sand_and_grass, border):
-    places = np.random.default_rng(4).random((4000, 2))
-    low, tall, deep = (sand_and_grass.keep(*border, discs_at(places, z), np.ones(4000, int)) for z in (0.01, 0.3, -0.3))
-    assert (tall >= low).all() and tall.sum() > low.sum()
-    assert (deep == tall).all(), "what lies below the ground stays under the border as far"
-
-
-def rule_of(*terms, heights=None, pictures=None):
-    entry = replace(two_classes(0.0), rule=list(terms))
-    return Classes(entry, 2, SIDE, heights or FlatSurface(), pictures or {})
-
-
-def test_a_range_takes_a_material_from_where_the_surface_is_too_low():
-    ramp = HeightMap(np.tile(np.float32([0, 1, 2, 3]), (4, 1)), 16.0, "clamp")  # rises to the east, 4 units a pixel
-    classes = rule_of(RangeTerm("height", 2.0, 1, 2.0, None, 0.5), heights=ramp)
-    scores = classes.lattice_scores(np.array([-16, 4, 16]), np.zeros(3, int))  # heights 0, 2 and 3
-    height = ramp.at(np.array([-8.0, 2.0, 8.0]), np.zeros(3))[0]
-    np.testing.assert_allclose(scores[:, 1], -2.0 * np.minimum(np.maximum(2.0 - height, 0) / 0.5, 4.0))
-    assert not scores[:, 0].any()
-
-
-def test_a_picture_names_materials_in_the_middles_of_its_pixels():
-    pixels = np.array([[0, 1], [255, 0]], np.uint8)
-    term = ImageTerm("image", 1.0, "a.bin", 4, "0" * 64, 2, 2, 8.0, "clamp")
-    classes = rule_of(term, pictures={"a.bin": pixels})
-    middles = [(-4, 4), (4, 4), (-4, -4), (4, -4)]  # lattice points; two units from the origin each way
-    scores = classes.lattice_scores(*np.array(middles).T)
-    assert scores.tolist() == [[1, 0], [0, 1], [0, 0], [1, 0]]
-
-
-SQUARE = [[-8, j, 24, 1] for j in range(-8, 16)]  # the cell (0, 0) and all around it
-
-
-def with_paint(runs):
-    return Classes(replace(two_classes(), painted=runs), 2, SIDE)
-
-
 def lattice(low, high):
     i, j = np.mgrid[low:high, low:high].astype(np.int64)
     return i.ravel(), j.ravel()
@@ -140,18 +83,8 @@ def test_weights_are_those_of_a_sum_over_all_points(shift):
     spread = {-2: 1, -1: 4, 0: 6, 1: 4, 2: 1}
     for (x, y), material in points.items():
         expected[:, material] += [spread.get(a - x, 0) * spread.get(b - y, 0) for a, b in zip(i, j, strict=True)]
-    painted = Painted([[x, y, 1, m] for (x, y), m in points.items()])
+    painted = Painted(replace(two_classes(), painted=[[x, y, 1, m] for (x, y), m in points.items()]))
     assert (painted.weights_at(i, j, 3) == expected).all()
-
-
-def test_three_steps_beyond_paint_scores_are_those_of_the_rule():
-    i, j = lattice(-40, 48)
-    painted, plain = with_paint(SQUARE).lattice_scores(i, j), with_paint([]).lattice_scores(i, j)
-    beyond = np.maximum(np.abs(i - 3.5), np.abs(j - 3.5)) > 11.5 + 2
-    assert (painted[beyond] == plain[beyond]).all()
-    lead = paint_lead(two_classes())
-    inner = np.maximum(np.abs(i - 3.5), np.abs(j - 3.5)) <= 11.5 - 2
-    assert (painted[inner] == [-lead, 0]).all()
 
 
 @pytest.mark.parametrize(

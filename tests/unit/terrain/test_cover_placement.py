@@ -56,18 +56,6 @@ def test_a_picture_shows_both_materials_without_a_gap_and_the_objects(cover, bar
     assert full[changed].mean(0) == pytest.approx([0.2, 0.35, 0.15], abs=0.1)
 
 
-def test_a_cell_of_one_material_is_placed_as_without_the_others(bare, seen):
-    eye, cells, _ = seen
-    sand = replace(bare, tiles={key: field for key, field in bare.tiles.items() if key[1] < TILES}, classes=None)
-    pure, alone = np.flatnonzero(cells.materials == 1), replace(cells, materials=np.ones(len(cells), int))
-    for k in pure[:5]:
-        field, slope = placement.place_cell(bare, cells[k : k + 1], eye)
-        same, own = placement.place_cell(sand, alone[k : k + 1], eye)
-        np.testing.assert_array_equal(field.means, same.means)
-        np.testing.assert_array_equal(field.opacity_logits, same.opacity_logits)
-        np.testing.assert_array_equal(slope, own)
-
-
 def test_a_budget_counts_the_tiles_of_all_materials_in_a_cell(bare, seen):
     cells = seen[1]
     pure = replace(cells, materials=np.ones(len(cells), int), tile=cells.tile % TILES)

@@ -103,5 +103,4 @@ def test_objects_may_stand_on_the_only_material():
 
 
 def test_probabilities_of_one_material_sum_to_1_at_most():
-    capped = fits._cap(np.array([0.9, 0.9, 0.5]), np.array([0, 0, 1]))
-    assert capped == pytest.approx([0.5, 0.5, 0.5])
+    assert fits._cap(np.array([0.9, 0.9, 0.5]), np.array([0, 0, 1])) == pytest.approx([0.5, 0.5, 0.5])

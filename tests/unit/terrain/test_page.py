@@ -1,14 +1,13 @@
 """Page folders: whole or not at all, of sound bundles alone; the front, of which nothing becomes HTML; the story."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, read_scene_frame, write_scene_frame
+from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import TakenPhoto
 from dav_gswt.terrain import page, page_story
@@ -91,11 +90,7 @@ def test_an_unsound_chunk_is_refused_by_name(tmp_path, viewer, bundle, chunk, me
     assert not (tmp_path / "page").exists()
 
 
-def test_the_viewer_is_the_folder_of_index_html(tmp_path, bundle):
-    files = ["data/a.js", "index.html", "main.js"]
-    assert page.find_viewer([str(tmp_path / name) for name in files]) == tmp_path
-    with pytest.raises(InputError, match=r"no index\.html"):
-        page.find_viewer(["data/a.js"])
+def test_a_folder_without_a_viewer_is_refused(tmp_path, bundle):
     with pytest.raises(InputError, match="no viewer here"):
         write_page(bundle, tmp_path, tmp_path / "page")
 
@@ -175,9 +170,3 @@ def test_places_rounds_and_pictures_are_told(made):
     assert story.value["photos"][1]["look"][0] > 0, "it looks at the middle, which lies to the east"
     assert story.value["grade"] is None and story.value["half"] == 2 and story.sheet[:3] == b"\xff\xd8\xff"
     assert story == tell_story(made) and tell_story({"views": None}) is None, "a finished field has none"
-
-
-def test_of_real_photos_the_psnr_after_their_exposure_is_fitted_is_told(made):
-    write_scene_frame(made["frame"], replace(read_scene_frame(made["frame"]), kind="photos"))
-    made["metrics"][0].write_text(json.dumps({"psnr": 20.0, "psnr_colour_corrected": 27.5}))
-    assert [each["psnr"] for each in tell_story(made).value["rounds"]] == [27.5, None]

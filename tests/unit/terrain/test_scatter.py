@@ -68,16 +68,6 @@ def test_footprints_never_overlap(covered):
     assert len(pairs) > 100 and gap.min() >= 0
 
 
-@pytest.mark.parametrize("east, north", [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
-def test_a_footprint_lies_on_its_material(covered, east, north):
-    found = window_of(covered)
-    radius = np.array([each.radius for each in covered.objects])[found.number] * found.size / SIDE
-    x, y = found.i + found.u + east * radius, found.j + found.v + north * radius
-    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
-    scores = covered.classes.scores_at(i, j, x - i, y - j)
-    assert (scores.argmax(1) == [covered.objects[k].material for k in found.number]).all()
-
-
 @pytest.mark.parametrize("scatter", ["plain", "covered"])
 @pytest.mark.parametrize("west", [-3, 1_000_000])
 def test_a_cell_has_the_same_things_in_every_window(request, scatter, west):

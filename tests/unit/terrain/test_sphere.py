@@ -7,14 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fixtures.terrains import MAGENTA, SKY, two_level_terrain
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.errors import InputError
 from dav_gswt.terrain import finite, planet, sphere, stills
 from dav_gswt.terrain.backdrop import Backdrop
-from dav_gswt.terrain.choice import tiles_at
 from dav_gswt.terrain.heights import QUARTER, FlatSurface, Sphere, make_sphere, require_plain_cover
 from dav_gswt.terrain.sphere import FACES, FaceCells, bend, directions, frame_at, is_covered
 from dav_gswt.terrain.stills import camera_on
@@ -75,14 +72,6 @@ def test_a_straight_walk_crosses_edges_and_corners_without_a_jump():
         np.testing.assert_allclose(sphere.walk_from(begin, way * 2 * np.pi * 10.0, 10.0), begin, atol=1e-12)
 
 
-def test_frames_are_east_north_and_up_also_at_the_poles():
-    np.testing.assert_allclose(frame_at(0.0, 0.0), [[0, 1, 0], [0, 0, 1], [1, 0, 0]], atol=1e-15)
-    for latitude in (90.0, -90.0, 89.999999):
-        frame = frame_at(33.0, latitude)
-        np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
-        assert np.linalg.det(frame) == pytest.approx(1)
-
-
 @pytest.mark.parametrize("entry", GOLDEN["spheres"], ids=lambda e: str(e["cells"]))
 def test_bends_are_those_shared_with_the_page(entry):
     ball = make_sphere(entry["radius"] / entry["side"], entry["side"])
@@ -118,29 +107,6 @@ def test_cells_stand_in_the_order_shared_with_the_page(view):
     order, close = planet.sort_on_sphere(ball, cells, np.array(view["eye"], float))
     assert np.stack([cells.face, cells.i, cells.j], 1)[order].tolist() == view["order"]
     assert close[order].tolist() == view["close"]
-
-
-@given(st.floats(-180, 180), st.floats(-90, 90), st.floats(0.01, 3), st.floats(-180, 180), st.floats(0, 1))
-@settings(max_examples=30)
-def test_no_ray_meets_a_cell_before_one_that_is_drawn_after_it(longitude, latitude, height, yaw, down):
-    """The slow way: walk along a ray through the shell of tiles and note the cells in the order that it enters them."""
-    ball, axes = make_sphere(6.0, 1.0), frame_at(longitude, latitude)
-    eye = (ball.radius + height) * axes[2]
-    cells = FaceCells(*(v.ravel() for v in np.mgrid[:6, : ball.cells, : ball.cells]))
-    order, close = planet.sort_on_sphere(ball, cells, eye)
-    names = list(zip(cells.face.tolist(), cells.i.tolist(), cells.j.tolist(), strict=True))
-    place, near = {names[k]: at for at, k in enumerate(order)}, {names[k] for k in np.flatnonzero(close)}
-    dip = np.arccos(ball.radius / (ball.radius + height))
-    pitch = -dip - down * (0.5 * np.pi - dip)
-    turn = np.radians(yaw)
-    way = np.array([np.cos(pitch) * np.cos(turn), np.cos(pitch) * np.sin(turn), np.sin(pitch)]) @ axes
-    points = eye + np.arange(0, 8, 2e-3)[:, None] * way
-    points = points[np.linalg.norm(points, axis=1) >= ball.radius - 0.3]
-    faces, places = locate(ball, points)
-    met = np.concatenate([faces[:, None], np.floor(places).astype(int)], 1)
-    entered = [(int(f), int(a), int(b)) for f, a, b in met[np.r_[True, (np.diff(met, axis=0) != 0).any(1)]]]
-    drawn = [place[cell] for cell in entered if cell not in near]  # those are sorted by depth
-    assert drawn == sorted(drawn, reverse=True)
 
 
 @pytest.mark.parametrize("height, point", [(0.3, (1, 1, 1)), (3.0, (-1, -1, 0)), (60.0, (0.3, -0.9, 1))])
@@ -185,12 +151,6 @@ def test_colours_agree_across_every_edge_without_a_turn(salt):
         mine, other = (sphere.tiles_on(ball, some[straight], salt, 2) for some in (cells, beyond))
         assert ((mine >> here & 1) == (other >> there & 1)).all()
     assert crossed == 6 * ball.cells
-
-
-def test_without_a_period_tiles_are_those_of_the_plane():
-    i, j = np.meshgrid(np.arange(-20, 20), np.arange(-20, 20))
-    assert (tiles_at(i, j, 3, 2, 10**9) == tiles_at(i, j, 3, 2)).sum() >= 800  # all but those below the first lap
-    assert (tiles_at(i + 12, j + 12, 3, 2, 12) == tiles_at(i, j, 3, 2, 12)).all()
 
 
 def count_owners(ball: Sphere, points, salt: int):

@@ -109,13 +109,6 @@ def test_what_is_behind_or_too_near_or_out_of_sight_is_left_out():
     assert seen.depths == pytest.approx([(CAMERA.rotation @ means[3])[2]])
 
 
-def test_what_reaches_into_the_picture_from_beside_it_is_kept():
-    big = replace(made(1), means=np.array([[6, 5.5, 0]], np.float32), log_scales=np.zeros((1, 3), np.float32))
-    big = replace(big, opacity_logits=np.full(1, 5, np.float32))
-    seen = splats.project(big, level(big), CAMERA, 0.01)
-    assert seen.centres[0, 0] < 0 and splats.blend(seen, CAMERA).alpha.max() > 0.05
-
-
 def test_discs_underfoot_fade_instead_of_rising_over_the_horizon():
     """A disc one deviation below the eye is drawn by no plane through its centre; one far off keeps its bits."""
     two = replace(made(2), means=np.array([[1, 0, -0.5], [8, 0, -2]], np.float32))

@@ -18,6 +18,7 @@ FADE = 0.5  # share of the reach at which the transition begins
 CLIMB = 3.0  # times the reach on the ground by which the reach grows with the eye's height over a planet, at most
 AIR = 0.12  # height at which the sky of a planet is 1/e as bright, as a share of its radius
 NO_END = 1e30  # distance of the last tiles where they reach the horizon
+LOWEST = 1e-4  # least sine of the angle of the last tiles below the horizon
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,18 @@ class Backdrop:
     @staticmethod
     def for_eye(terrain: EndlessTerrain, eye: Vector, sky: Sky, ground_colour: Sequence[float] | Array) -> "Backdrop":
         """The backdrop that an eye sees behind a terrain."""
-        colours = [np.asarray(c, np.float32) for c in (sky.zenith, sky.horizon, ground_colour)]
+        zenith, horizon, ground = (np.asarray(c, np.float32) for c in (sky.zenith, sky.horizon, ground_colour))
         if isinstance(sphere := terrain.heights, Sphere):
-            end, low, dip = find_end(sphere.radius, float(np.linalg.norm(eye)), find_reach(terrain, sphere, eye))
-            return SphereBackdrop(*colours, end, low, eye, dip, sphere.radius)
+            far, reach, radius = float(np.linalg.norm(eye)), find_reach(terrain, sphere, eye), sphere.radius
+            height = max(far - radius, 0.0)
+            square = height * (2 * radius + height)  # of the distance to the horizon
+            dip = float(np.sqrt(square)) / far
+            if reach * reach >= square:
+                return SphereBackdrop(zenith, horizon, ground, NO_END, LOWEST, eye, dip, radius)
+            low = max((square + reach * reach) / (2 * far * reach) - dip, LOWEST)
+            return SphereBackdrop(zenith, horizon, ground, reach, low, eye, dip, radius)
         end = terrain.reach * terrain.side
-        return Backdrop(*colours, end, (eye[2] - terrain.heights.low) / end)
+        return Backdrop(zenith, horizon, ground, end, (eye[2] - terrain.heights.low) / end)
 
     def colours_along(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
         """Colours in directions of any length."""
@@ -105,17 +112,3 @@ def find_reach(terrain: EndlessTerrain, sphere: Sphere, eye: Vector) -> float:
     """Distance to the last tiles of a planet: longer from above, where more of the ground is in view."""
     reach = terrain.reach * terrain.side
     return reach + min(max(float(np.linalg.norm(eye)) - sphere.radius, 0.0), CLIMB * reach)
-
-
-def find_end(radius: float, far: float, reach: float) -> tuple[float, float, float]:
-    """Distance at which the last tiles are blended into the backdrop, sine of the angle there below the horizon (at
-    least 1e-4), and that of the horizon below the level.
-
-    Args:   far: distance of the eye from the planet's middle.
-    """
-    height = max(far - radius, 0.0)
-    square = height * (2 * radius + height)  # of the distance to the horizon
-    dip = float(np.sqrt(square)) / far
-    if reach * reach >= square:
-        return NO_END, 1e-4, dip
-    return reach, max((square + reach * reach) / (2 * far * reach) - dip, 1e-4), dip

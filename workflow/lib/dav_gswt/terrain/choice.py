@@ -7,7 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int64
 from numpy import ndarray as Array
 
-Ints, Floats, Vector = Int64[Array, "n"], Float[Array, "n"], Float[Array, "3"]
+Ints = Int64[Array, "n"]
+Floats = Float[Array, "n"]
+Vector = Float[Array, "3"]
 
 WEST, SOUTH, CENTRE = 0, 1, 2  # axis of a hash: colour of the west edge, of the south edge, centre variant
 

@@ -41,22 +41,21 @@ REACH = 2  # steps of the lattice to the farthest of them
 LEAD = 1.25  # of what is painted over all others, as a multiple of what border effects can change
 
 
-def paint_lead(entry: ClassesEntry) -> float:
-    """By how much the score of what is painted exceeds the others: just enough that nothing of them is left."""
-    return LEAD * (2 * entry.jitter.amplitude + entry.rise.most) or 1.0
-
-
 class Painted:
-    """A sparse set of painted points.
+    """The painted points of a terrain.
 
-    Args:   runs: [I, J, length, material], from (I, J) to the east; of two runs over a point the later one counts.
+    A painted point counts for the points up to two steps around it with the binomial weights SPREAD, so what is painted
+    has a smooth border. At a point whose surroundings are painted with a weight, the rule keeps the rest.
     """
 
-    def __init__(self, runs: Sequence[Sequence[int]]):
-        points = {(x, j): material for i, j, length, material in runs for x in range(i, i + length)}
+    def __init__(self, entry: ClassesEntry):
+        # of two runs over a point the later one counts
+        points = {(x, j): material for i, j, length, material in entry.painted for x in range(i, i + length)}
         keys = np.array([x * WIDE + j for x, j in points], np.int64)
         order = np.argsort(keys)
         self._keys, self._materials = keys[order], np.array(list(points.values()), np.int64)[order]
+        # what is painted exceeds the others by just enough that nothing of them is left
+        self._lead = LEAD * (2 * entry.jitter.amplitude + entry.rise.most) or 1.0
 
     def weights_at(self, i: Ints, j: Ints, materials: int) -> Int64[Array, "n m"]:
         """Weights of the materials painted at and around points, in units of 1 / WHOLE."""
@@ -69,17 +68,15 @@ class Painted:
             weights[rows[hit], self._materials[at[hit]]] += SPREAD[x] * SPREAD[y]
         return weights
 
-
-def apply_paint(scores: Float[Array, "n m"], weights: Int64[Array, "n m"], lead: float) -> Float[Array, "n m"]:
-    """Scores at points with paint at or around some of them: what is painted has 0 and all others -lead with its
-    weight, and the rule's scores, less the highest and cut at -lead, have the rest.
-
-    All materials of a point may be lifted by the same amount without effect, so points without paint keep the rule's.
-    """
-    total = weights.sum(1, keepdims=True)
-    rest = np.maximum(scores - scores.max(1, keepdims=True), -lead)
-    mixed = ((WHOLE - total) * rest - lead * (total - weights)) / WHOLE
-    return np.where(total > 0, mixed, scores)
+    def apply(self, scores: Float[Array, "n m"], i: Ints, j: Ints) -> Float[Array, "n m"]:
+        """Scores at points: what is painted has 0 and all others -lead with its weight, and the rule's scores, less the
+        highest and cut at -lead, have the rest. Points without paint keep the rule's scores.
+        """
+        lead, weights = self._lead, self.weights_at(i, j, scores.shape[1])
+        total = weights.sum(1, keepdims=True)
+        rest = np.maximum(scores - scores.max(1, keepdims=True), -lead)
+        mixed = ((WHOLE - total) * rest - lead * (total - weights)) / WHOLE
+        return np.where(total > 0, mixed, scores)
 
 
 @dataclass(frozen=True)
@@ -106,13 +103,11 @@ class Classes:
         scores = np.zeros((len(i), self.materials))
         for term in self.entry.rule:
             scores += term.weight * self._evaluate_term(term, i, j)
-        if self.entry.painted:
-            scores = apply_paint(scores, self._painted.weights_at(i, j, self.materials), paint_lead(self.entry))
-        return scores
+        return self._painted.apply(scores, i, j) if self.entry.painted else scores
 
     @cached_property
     def _painted(self) -> Painted:
-        return Painted(self.entry.painted)
+        return Painted(self.entry)
 
     def cell_lattices(self, i: Ints, j: Ints) -> Float[Array, "n y x m"]:
         """Scores at the LATTICE + 1 points along each side of cells."""
@@ -169,7 +164,7 @@ class Classes:
             lattices, masks = self.cell_lattices(*np.array(some, np.int64).T), np.zeros(len(some), np.int64)
             for material in range(self.materials):
                 most = _over_corners(np.maximum, lattices[..., material, None] - lattices)
-                masks |= (most >= -slack).all(-1).any((1, 2)).astype(np.int64) << material
+                masks |= (most >= -slack).all(-1).any(-1).any(-1).astype(np.int64) << material
             self._known.update(zip(some, masks.tolist(), strict=True))
         return np.array([self._known[cell] for cell in cells], np.int64)
 

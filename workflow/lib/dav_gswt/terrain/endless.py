@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.land_cover import ImageTerm, ObjectOrders
@@ -34,8 +34,7 @@ class EndlessTerrain:
     material's tiles. near: distance of the near plane. reach: distance to the last tiles, in tile sides; beyond it the
     ground has the terrain's mean colour. classes: which material lies where; None with one. objects:
     objects[number][level], about the foot. extents: of each object, the largest distance of a Gaussian's rim from the
-    foot. scatter: where they stand; None without objects. ordered: by object, order and levels, the Gaussians in that
-    order and the level of each, as far as they are known.
+    foot. scatter: where they stand; None without objects.
     """
 
     tiles: dict[tuple[int, int], GaussianField]
@@ -55,9 +54,6 @@ class EndlessTerrain:
     objects: list[list[GaussianField]] = field(default_factory=list)
     extents: list[float] = field(default_factory=list)
     scatter: Scatter | None = None
-    ordered: dict[tuple[int, ...], tuple[GaussianField, Int[Array, "k"]]] = field(
-        default_factory=dict, init=False, repr=False
-    )
 
     @property
     def object_entries(self) -> Sequence[ObjectOrders]:
@@ -122,7 +118,11 @@ def terrain_from_fields(
     heights.require_plain_cover(surface, manifest.classes, manifest.objects)
     classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, surface, pictures or {})
     beyond = (RIM - 3) * largest  # the manifest's heights reach three deviations beyond the centres
-    extents, things = [measure_extent(fields) for fields in objects], manifest.objects or []
+    extents, things = [], manifest.objects or []
+    for fields in objects:
+        reach = [RIM * np.exp(f.log_scales.astype(float)).max(1) for f in fields]
+        away = [np.linalg.norm(f.means.astype(float), axis=1) + r for f, r in zip(fields, reach, strict=True)]
+        extents.append(float(np.concatenate(away).max(initial=0.0)))
     z = [(entry.z[0] - beyond, entry.z[1] + beyond) for entry in entries]
     scatter, widest = None, 0.0
     if manifest.scatter is not None:
@@ -148,10 +148,3 @@ def terrain_from_fields(
         extents=extents,
         scatter=scatter,
     )
-
-
-def measure_extent(levels: list[GaussianField]) -> float:
-    """Largest distance of the rim of an object's Gaussians from its foot, over all levels."""
-    deviations = [np.exp(f.log_scales.astype(float)).max(1) for f in levels]
-    away = [np.linalg.norm(f.means.astype(float), axis=1) + RIM * d for f, d in zip(levels, deviations, strict=True)]
-    return float(np.concatenate(away).max(initial=0.0))

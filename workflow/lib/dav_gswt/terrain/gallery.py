@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import atomic_folder, read_json
+from dav_gswt.files import atomic_folder, read_record
 from dav_gswt.templates import render_template
-from dav_gswt.terrain.page import FRONT, STILL
+from dav_gswt.terrain.page import FRONT, STILL, FrontTexts
 
 TEMPLATE, STYLE = "index.html", "gallery.css"
 BY_SYSTEMS = ".DS_Store", "Thumbs.db"  # that file browsers leave
-TEXTS = ("name", "line", "verdict")
-LONGEST = 400  # letters of a text
 
 
 @dataclass(frozen=True)
@@ -62,20 +60,15 @@ def list_entries(pages: Sequence[Path | str]) -> list[Entry]:
     """What the gallery says of each page; pages of the same name have numbered folders. Raises: as `write_gallery`."""
     entries: list[Entry] = []
     for page in map(Path, pages):
-        name, line, verdict = _read_front(page)
+        if not ((page / FRONT).is_file() and (page / STILL).is_file()):
+            raise InputError(f"{page}: a page without name and still ({FRONT}, {STILL}); make it again with `make run`")
+        front = read_record(page / FRONT, FrontTexts, "make the page again")
         size = sum(path.stat().st_size for path in page.rglob("*") if path.is_file())
-        wanted, taken = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "terrain", {e.folder for e in entries}
+        wanted, taken = (
+            re.sub(r"[^a-z0-9]+", "-", front.name.lower()).strip("-") or "terrain",
+            {e.folder for e in entries},
+        )
         names = [wanted, *(f"{wanted}-{number}" for number in range(2, len(taken) + 2))]
         folder = next(each for each in names if each not in taken)
-        entries.append(Entry(page, folder, name, line, verdict, f"{size / 1e6:.1f}"))
+        entries.append(Entry(page, folder, front.name, front.line, front.verdict, f"{size / 1e6:.1f}"))
     return entries
-
-
-def _read_front(page: Path) -> tuple[str, ...]:
-    if not ((page / FRONT).is_file() and (page / STILL).is_file()):
-        raise InputError(f"{page}: a page without name and still ({FRONT}, {STILL}); make it again with `make run`")
-    value = read_json(page / FRONT)
-    texts = tuple(value.get(key) for key in TEXTS) if isinstance(value, dict) else ()
-    if not texts or not all(isinstance(text, str) and len(text) <= LONGEST for text in texts):
-        raise InputError(f"{page / FRONT}: no name, line and verdict; make the page again")
-    return tuple(str(text) for text in texts)

@@ -34,11 +34,19 @@ VERDICTS = {"good": "The photos fit together well.", "doubtful": "It is doubtful
 
 
 @dataclass(frozen=True)
-class Front:
-    """What a page says of its scene.
+class FrontTexts:
+    """front.json: what a page says of its scene. verdict: what tests said of the photos and of the field."""
 
-    still: a JPEG of what the page shows first, see `encode_still`. verdict: what tests said of the photos and of the
-    field. story: how it was made, where that is known.
+    name: str
+    line: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Front:
+    """The front of a scene's page.
+
+    still: a JPEG of what the page shows first, see `encode_still`. story: how it was made, where that is known.
     """
 
     name: str
@@ -136,14 +144,6 @@ def write_page(
             write_json(part / STORY, front.story.value)
             (part / SHEET).write_bytes(front.story.sheet)
         write_json(part / MANIFEST, value | {"heights": heights})
-
-
-def find_viewer(paths: Iterable[Path | str]) -> Path:
-    """The folder of the viewer, given its files. Raises: InputError: there is no index.html among them."""
-    for path in map(Path, paths):
-        if path.name == INDEX:
-            return path.parent
-    raise InputError("the viewer's files hold no index.html")
 
 
 def _list_chunks(bundle: Path, manifest: dict[str, Any]) -> list[str]:

@@ -18,7 +18,7 @@ from dav_gswt.terrain.heights import displace_means
 from dav_gswt.terrain.scatter import Instances
 from dav_gswt.terrain.visibility import GridCells, active_levels, active_range
 
-Part = tuple[GaussianField, Int[Array, "n"]]  # Gaussians, and the level of each
+Part = tuple[GaussianField, Int[Array, "_"]]  # Gaussians, and the level of each
 
 
 def place_cell(
@@ -151,7 +151,13 @@ def place_objects(terrain: EndlessTerrain, found: Instances, cell: tuple[int, in
     back = np.stack([cos * to[:, 0] + sin * to[:, 1], cos * to[:, 1] - sin * to[:, 0], to[:, 2]], 1)
     tilt = np.stack([cos * slope[:, 0] + sin * slope[:, 1], cos * slope[:, 1] - sin * slope[:, 0]], 1)
     sequence = np.argsort(-distance, kind="stable").tolist()
-    parts = [_order_levels(terrain, int(found.number[k]), active[:, k], back[k], tilt[k]) for k in sequence]
+    parts = []
+    for k in sequence:
+        number = int(found.number[k])
+        kept, levels = terrain.object_entries[number].chunks[0].orders, terrain.objects[number]
+        order = kept[nearest_order(terrain.directions, kept, back[k], tilt[k])]  # as seen by the object
+        shown = {level: levels[level] for level in np.flatnonzero(active[:, k]).tolist()}
+        parts.append(order_gaussians(shown or {len(levels) - 1: levels[-1][:0]}, terrain.directions[order]))
     field, level = concatenate_parts(parts)
     row = np.repeat(sequence, [len(levels) for _, levels in parts])
     return turn_and_scale(field, turn_rows(angle)[row], found.size[row], feet[row]), level
@@ -162,20 +168,3 @@ def active_objects(terrain: EndlessTerrain, found: Instances, distance: Floats) 
     extent = np.array(terrain.extents)[found.number] * found.size
     reach = extent * (1 + terrain.heights.steepest)
     return active_range(terrain, distance - reach, distance + reach)
-
-
-def _order_levels(
-    terrain: EndlessTerrain, number: int, active: Bool[Array, "levels"], to: Vector, slope: Float[Array, "2"]
-) -> Part:
-    """An object's Gaussians of the active levels in the order nearest to the viewing direction, and their levels.
-
-    Args:   to, slope: from the eye to the foot, and of the surface there, turned back with the object.
-    """
-    kept = terrain.object_entries[number].chunks[0].orders
-    order = kept[nearest_order(terrain.directions, kept, to, slope)]
-    place = (number, order, *np.flatnonzero(active).tolist())
-    if place not in terrain.ordered:
-        parts = {level: terrain.objects[number][level] for level in place[2:]}
-        parts = parts or {len(terrain.switches) - 1: terrain.objects[number][-1][:0]}
-        terrain.ordered[place] = order_gaussians(parts, terrain.directions[order])
-    return terrain.ordered[place]

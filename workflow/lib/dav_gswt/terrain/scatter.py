@@ -52,12 +52,10 @@ class Instances:
         return Instances(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
-EMPTY = Instances(*(np.zeros(0, kind) for kind in (int, int, float, float, int, float, float)))
-
-
 def concatenate_instances(parts: Sequence[Instances]) -> Instances:
     """All instances of all parts, in their order."""
-    return Instances(*(np.concatenate([getattr(part, f.name) for part in (EMPTY, *parts)]) for f in fields(Instances)))
+    none = Instances(*(np.zeros(0, kind) for kind in (int, int, float, float, int, float, float)))
+    return Instances(*(np.concatenate([getattr(part, f.name) for part in (none, *parts)]) for f in fields(Instances)))
 
 
 @dataclass(frozen=True)

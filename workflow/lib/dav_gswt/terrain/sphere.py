@@ -44,9 +44,6 @@ class FaceCells:
     i: Ints
     j: Ints
 
-    def __len__(self) -> int:
-        return len(self.face)
-
     def __getitem__(self, index) -> "FaceCells":
         return FaceCells(self.face[index], self.i[index], self.j[index])
 

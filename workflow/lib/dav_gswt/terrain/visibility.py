@@ -123,13 +123,15 @@ def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Ints:
     levels, each = range(len(terrain.switches)), terrain.tiles_each
     kinds = 1 if terrain.classes is None else terrain.classes.materials
     sizes = np.array([[len(terrain.tiles[level, t]) for t in range(kinds * each)] for level in levels], np.int64)
-    counts = sum(sizes[:, m * each + cells.tile % each] * (cells.materials >> m & 1) for m in range(kinds))
+    counts = np.zeros((len(levels), len(cells)), np.int64)
+    for m in range(kinds):
+        counts += sizes[:, m * each + cells.tile % each] * (cells.materials >> m & 1)
     if terrain.scatter is not None:
         found = terrain.scatter.instances_in(cells.i, cells.j)
         index = {cell: k for k, cell in enumerate(zip(cells.i.tolist(), cells.j.tolist(), strict=True))}
         owner = np.array([index[cell] for cell in zip(found.i.tolist(), found.j.tolist(), strict=True)], int)
         sizes = np.array([[len(fields[level]) for fields in terrain.objects] for level in levels])
-        counts = counts + [np.bincount(owner, size[found.number], len(cells)).astype(np.int64) for size in sizes]
+        counts += np.array([np.bincount(owner, size[found.number], len(cells)) for size in sizes]).astype(np.int64)
     return (counts * active_levels(terrain, cells)).sum(0)
 
 
