@@ -1,11 +1,9 @@
 """Rule render_candidates: what do some candidates truly show?"""
 
-from dav_gswt_study.calibration import true_pictures
-
 from dav_gswt.files import atomic_folder
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
-from dav_gswt.views import candidates
+from dav_gswt.views import candidates, true_pictures
 
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene

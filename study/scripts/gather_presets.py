@@ -1,5 +1,6 @@
 """Rule gather_preset_costs: what presets cost and are worth, as a table and as a page."""
 
+from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
 from dav_gswt_study import markdown
 from dav_gswt_study.tradeoff import preset_costs

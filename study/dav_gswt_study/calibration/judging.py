@@ -15,7 +15,7 @@ from dav_gswt.photos.training_views import TrainingView, read_training_views
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground, read_ground
-from dav_gswt.views import policy_inputs
+from dav_gswt.views import policy_inputs, true_pictures
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.pose_maps import PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
@@ -23,7 +23,7 @@ from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import PHOTO_WIDTH, build_conditions, ground_mask
 from dav_gswt.views.terms import weighted_mean
 from dav_gswt.views.uncertainty import combine_terms
-from dav_gswt_study.calibration import controls, measures, true_pictures
+from dav_gswt_study.calibration import controls, measures
 
 
 @dataclass(frozen=True)

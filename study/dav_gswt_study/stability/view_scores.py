@@ -9,6 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt.bundle.orders import DirectionRings
 from dav_gswt.views import uncertainty as un
 from dav_gswt.views.uncertainty import Quantiles, Scales
+from dav_gswt_study.stability.formula import FLOAT32, FLOAT32_EPS, Case, Check
 
 SIZES = tuple(10.0**power for power in range(-12, 7, 2))
 SHIFTS = (0.0, 1.0, 1e6)

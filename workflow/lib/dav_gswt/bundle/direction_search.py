@@ -17,7 +17,7 @@ from dav_gswt.bundle.orders import DirectionRings
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images.metrics import mse_to_psnr
-from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 
 _log = logging.getLogger(__name__)
 
@@ -148,7 +148,7 @@ def render_in_order(
     depth = side * (1 + place / max(len(field), 1))
     means += (depth - means @ along)[:, None] * along
     moved = replace(field, means=means.astype(np.float32))
-    return Rasterizer(near=1e-6).forward(**to_raster_arrays(moved), camera=camera).colour
+    return make_rasterizer(near=1e-6).forward(**to_raster_arrays(moved), camera=camera).colour
 
 
 def compute_psnr(pairs: list[tuple[Picture, Picture]]) -> float | None:

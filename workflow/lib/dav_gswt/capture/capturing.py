@@ -17,7 +17,7 @@ from dav_gswt.photos.lenses import undistort_scene_photo
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views import candidates as pools
-from dav_gswt.views import collision, feasibility
+from dav_gswt.views import feasibility
 from dav_gswt.views.candidates import Candidates
 
 RequestedPose = tuple[Pose, Camera]
@@ -86,7 +86,7 @@ def filter_attainable(
         candidates = agent.keep_reachable(scene, frame, candidates)
     clearance = feasibility.CLEARANCE * frame.flying_height
     feasible = feasibility.filter_feasible(candidates, grid, scene.get("feasibility"), clearance)
-    return collision.drop_blocked(feasible, field, grid)
+    return feasibility.drop_blocked(feasible, field, grid)
 
 
 def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[Pose], folder: Path) -> None:

@@ -31,7 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def find_pages(results: Path) -> list[Path]:
     """The newest page with a front of each scene, by the scenes' names."""
-    from dav_gswt.terrain.page_front import FRONT  # here, not above: it is slow to load
+    from dav_gswt.terrain.page import FRONT  # here, not above: it is slow to load
 
     newest: dict[str, Path] = {}
     for front in sorted(results.glob(f"*/seed*/**/terrain/page/{FRONT}"), key=lambda path: path.stat().st_mtime):

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
 from dav_gswt.config.exports import Export
@@ -108,11 +108,9 @@ class Config(ConfigModel):
     def _check_swept_values(self) -> "Config":
         """Each value of a sweep is one that the setting itself can have."""
         for name, values in self.sweeps.items():
-            field = type(self).model_fields[name]
-            allowed = TypeAdapter(Annotated[field.annotation, *field.metadata])
             for value in values:
                 try:
-                    allowed.validate_python(value, strict=True)
+                    self.__pydantic_validator__.validate_assignment(self.model_construct(), name, value)
                 except ValidationError as error:
                     raise ValueError(f"sweeps.{name}: {value}: {error.errors()[0]['msg'].lower()}") from None
         return self

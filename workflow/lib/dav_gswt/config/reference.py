@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from dav_gswt.bundle import manifest
 from dav_gswt.config.base import ANY, Place, Schema, iterate_tables
 from dav_gswt.config.model import Config
-from dav_gswt.views.policy_names import POLICY_SPECS
+from dav_gswt.views.policies import POLICIES
 
 HEAD = """# Config reference
 
@@ -39,7 +39,7 @@ def describe_tables(model: type[BaseModel], place: Place = ()) -> str:
 
 def describe_policies() -> str:
     """The page docs/reference/policies.md."""
-    rows = [f"| `{spec.name}` | {spec.chooses} | {spec.describe_inputs()} |" for spec in POLICY_SPECS]
+    rows = [f"| `{spec.name}` | {spec.chooses} | {spec.describe_inputs()} |" for spec in POLICIES.values()]
     return "\n".join([POLICIES_HEAD, "| policy | chooses | reads |", "|---|---|---|", *rows]) + "\n"
 
 

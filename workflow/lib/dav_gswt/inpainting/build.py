@@ -22,7 +22,7 @@ from dav_gswt.prior import conditions
 from dav_gswt.prior.conditions import ReferencePhotos
 from dav_gswt.reconstruction import evaluation, underlay
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.views import collision
+from dav_gswt.views import feasibility
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.prior_sampling import PriorConfig
 
@@ -186,7 +186,7 @@ def place_camera(
     distance = RADIUS * frame.flying_height
     camera = camera_layouts.orbit(ELEVATION, 0.0, distance, target, size, size, FIELD_OF_VIEW)
     centre = camera.centre[None]
-    if (collision.find_below_ground(centre, grid) | collision.find_inside_objects(centre, field)).any():
+    if (feasibility.find_below_ground(centre, grid) | feasibility.find_inside_objects(centre, field)).any():
         return []
     return [(pose_of_camera("virtual", camera, frame), camera)]
 

@@ -23,7 +23,7 @@ from scipy.special import expit
 
 from dav_gswt.bundle import store as bundles
 from dav_gswt.errors import InputError
-from dav_gswt.export.splats import TILES_PER_ROW
+from dav_gswt.export.terrain_files import TILES_PER_ROW
 from dav_gswt.field import GaussianField, read_field
 from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera, camera_from_json
@@ -39,7 +39,7 @@ from dav_gswt.tiles import store as tiles
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import EDGES, LABELS, arrange_torus
 from dav_gswt.views import pose_maps
-from dav_gswt.views.score_colours import HIGHEST, candidate_values
+from dav_gswt.views.policies import HIGHEST, candidate_values
 from dav_gswt.views.scores import Scores, read_scores
 from dav_gswt.views.selection import read_pose_selection
 

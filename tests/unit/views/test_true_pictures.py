@@ -9,8 +9,8 @@ from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose, pose_offset
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import scene
+from dav_gswt.views import true_pictures
 from dav_gswt.views.scoring import scoring_camera
-from dav_gswt_study.calibration import true_pictures
 
 SIDE = 48
 GRID, FIELD = ground.grid(), ground.field()
