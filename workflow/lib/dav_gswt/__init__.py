@@ -9,7 +9,7 @@ __version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> Any:
-    """Load a function of `dav_gswt.api` when it is first used: loading takes time, and jobs of the workflow use none."""
+    """Load a function of `dav_gswt.api` when it is first used: loading takes time, and jobs use none."""
     if name.startswith("_") or name == "api":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from dav_gswt import api
