@@ -111,8 +111,8 @@ def _read_shot(label: str, shot, cameras: dict[str, pycolmap.Camera], photos: Pa
     camera = check_entry(shot, "camera", str, where)
     if camera not in cameras:
         raise InputError(f"{where}: there is no camera {camera[:80]!r}; export the file again")
-    axis = check_numbers(check_entry(shot, "rotation", list, where), (3,), f"{where}: rotation")
-    shift = check_numbers(check_entry(shot, "translation", list, where), (3,), f"{where}: translation")
+    axis = check_numbers(check_entry(shot, "rotation", list, where), 3, f"{where}: rotation")
+    shift = check_numbers(check_entry(shot, "translation", list, where), 3, f"{where}: translation")
     if not np.abs(axis).max() < 100:  # a few full turns at most, in radians
         raise InputError(
             f"{where}: rotation {axis.tolist()} is no axis times an angle in radians; export the file again"

@@ -5,14 +5,12 @@ from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-import numpy as np
 import pycolmap
 from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos.importers import lens_models
 from dav_gswt.photos.importers.checks import ImportedModel
 from dav_gswt.photos.importers.lens_models import fit_camera_to_photo
 from dav_gswt.photos.photo_files import name_pictures, split_name
@@ -22,17 +20,12 @@ MOST_FILES = 200_000  # looked through for photos
 
 @dataclass(frozen=True)
 class MatchedPhoto:
-    """A photo and its place. lens: upright, at the photo's size. index: of the shot in the model.
-
-    turns: quarter turns clockwise from the picture that the model speaks of to the upright one; rotation and
-    translation are the upright camera's.
-    """
+    """A photo and its camera. lens: at the photo's size. index: of the shot in the model."""
 
     path: Path
     key: str
     index: int
     lens: pycolmap.Camera
-    turns: int
     rotation: Float[Array, "3 3"]
     translation: Float[Array, "3"]
 
@@ -70,11 +63,6 @@ class PhotoFolder:
                 return found[0]
         return None
 
-    def stored_size(self, name: str) -> tuple[int, int] | None:
-        """Width and height of a photo as stored, without EXIF's orientation; None where there is no such photo."""
-        found = self.find(name)
-        return None if found is None else image_files.read_stored_size(self.photos[found])[:2]
-
 
 def match_photos_to_images(
     given: ImportedModel, folder: PhotoFolder, source: Path
@@ -104,8 +92,6 @@ def match_photos_to_images(
     for name, key in zip(names, name_pictures(names), strict=True):
         shot, path = given.shots[owners[name]], folder.photos[name]
         width, height, orientation = image_files.read_stored_size(path)
-        assert shot.lens is not None  # its photo is there, so its size is known
-        lens, turns = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
-        turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
-        out.append(MatchedPhoto(path, key, owners[name], lens, turns, turn @ shot.rotation, turn @ shot.translation))
+        lens = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
+        out.append(MatchedPhoto(path, key, owners[name], lens, shot.rotation, shot.translation))
     return sorted(out, key=lambda p: p.key), tuple(left_out)

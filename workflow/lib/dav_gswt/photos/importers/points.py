@@ -17,7 +17,6 @@ from scipy.spatial import cKDTree
 
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.importers import lens_models
 from dav_gswt.photos.importers.checks import ImportedModel
 from dav_gswt.photos.importers.lens_models import camera_key, shrink_camera, unproject_pixels
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto
@@ -49,29 +48,25 @@ def collect_observations(given: ImportedModel, placed: Sequence[MatchedPhoto]) -
     views = []
     for place in placed:
         shot, own = given.shots[place.index], given.image_of == place.index
-        assert shot.lens is not None  # its photo is there, so its size is known
         views.append((shot.lens, shot.rotation, shot.translation, given.point_of[own], given.pixels[own]))
-    turns = [np.linalg.matrix_power(lens_models.QUARTER, place.turns)[:2, :2] for place in placed]
-    return _unproject_views(given.points, given.colours, views, turns)
+    return _unproject_views(given.points, given.colours, views)
 
 
 def _unproject_views(
-    points: Float[Array, "n 3"], colours: Float32[Array, "n 3"], views: Sequence[tuple], turns: Sequence[Array]
+    points: Float[Array, "n 3"], colours: Float32[Array, "n 3"], views: Sequence[tuple]
 ) -> Observations:
-    """Observations as rays. views: of each photo its lens, rotation, translation, and which points
-    it sees where.
+    """Observations as rays, without those that the lens cannot have made.
 
-    turns: rotation of each photo's rays about its axis. Observations that the lens cannot have made
-    are left out.
+    views: of each photo its lens, rotation, translation, and which points it sees where.
     """
     errors, rays, point_of = [], [], []
-    for (lens, rotation, translation, which, pixels), turn in zip(views, turns, strict=True):
+    for lens, rotation, translation, which, pixels in views:
         found = unproject_pixels(lens, pixels)
         known = np.isfinite(found).all(1)
         at = points[which[known]] @ rotation.T + translation
         seen = np.asarray(lens.img_from_cam(np.ascontiguousarray(at))).reshape(-1, 2)  # NaN behind the camera
         errors.append(np.linalg.norm(seen - pixels[known], axis=1))
-        rays.append(found[known] @ turn.T)
+        rays.append(found[known])
         point_of.append(which[known])
     image_of = np.repeat(np.arange(len(rays)), [len(own) for own in rays])
     every = np.concatenate(errors)
@@ -149,5 +144,5 @@ def _read_observations(found: pycolmap.Reconstruction, photos: int, middle: Arra
         which = np.searchsorted(ids, own[:, 0].astype(np.int64))
         pose = image.cam_from_world().matrix()
         views.append((found.cameras[image.camera_id], pose[:, :3], pose[:, 3], which, own[:, 1:]))
-    seen = _unproject_views(points, colours, views, [np.eye(2)] * photos)
+    seen = _unproject_views(points, colours, views)
     return replace(seen, points=points + middle)
