@@ -1,4 +1,4 @@
-"""The grass family: tall wild grass in stands, tussocks and ears, with trodden paths where it lies flat."""
+"""The grass family: tall wild grass in stands and ears, with trodden paths where it lies flat."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ SIZES = (0.5, 1.4, 3.0)  # metres across stands
 KINDS = (4, 2, 1)  # stands of each tint
 BLADES = (115, 520, 1500)  # of a stand
 TRODDEN = (Tint(FRESH, 0.45), Tint(STRAW, 0.5), Tint(FRESH, 0.6))
-REACH = 26.0  # metres from the origin to the last single tussocks and ears
+REACH = 26.0  # metres from the origin to the last single ears
 
 
 @dataclass(frozen=True)
@@ -96,20 +96,11 @@ def _draw_albedo(rng, sward: Sward) -> Float32[Array, "n n 3"]:
 
 
 def _plant_groups(rng, sward: Sward) -> Iterator[PlantGroup]:
-    thinning = 0.7 * REACH, REACH
     yield from _ring_groups(rng, sward)
-    for share, tint in zip(sward.tints, TINTS, strict=True):
-        where = sward.stands * share * land.make_patches(rng, 0.6, 2.5)
-        rows = land.scatter_plants(rng, where, 55.0 * share.mean(), (0.38, 0.72), thinning)
-        yield PlantGroup([plants.make_tussock(rng, tint) for _ in range(3)], rows)
-    for make_ear in plants.EARS:
-        where = sward.stands * land.make_patches(rng, 0.45, 3.5)
-        rows = land.scatter_plants(rng, where, 330.0 / len(plants.EARS), (0.48, 0.80), thinning)
-        rows[:, 2] *= np.clip(land.interpolate(sward.tall)(*rows[:, :2].T), 0.8, 1.15) * GRASS / 0.46
-        yield PlantGroup([make_ear(rng) for _ in range(5)], rows)
-    where = sward.stands * land.make_patches(rng, 0.2, 3.0)
-    rows = land.scatter_plants(rng, where, 5.0, (0.55, 0.85), thinning)
-    yield PlantGroup([plants.make_dock(rng) for _ in range(3)], rows)
+    where = sward.stands * land.make_patches(rng, 0.6, 3.5)
+    rows = land.scatter_plants(rng, where, 380.0, (0.48, 0.80), (0.7 * REACH, REACH))
+    rows[:, 2] *= np.clip(land.interpolate(sward.tall)(*rows[:, :2].T), 0.8, 1.15)
+    yield PlantGroup([plants.make_seed_grass(rng) for _ in range(8)], rows)
 
 
 def _ring_groups(rng, sward: Sward) -> Iterator[PlantGroup]:
