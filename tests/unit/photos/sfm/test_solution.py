@@ -79,7 +79,7 @@ def test_where_the_first_way_gives_no_model_others_are_tried(solutions, monkeypa
 
 
 def test_photos_left_out_alone_ask_for_no_other_way(solutions):
-    assert len(solutions(verdict("doubtful", "placed", "groups"))[1]) == 1
+    assert len(solutions(verdict("doubtful", "placed"))[1]) == 1
 
 
 def test_photos_none_of_which_match_are_mapped_once(solutions, monkeypatch):

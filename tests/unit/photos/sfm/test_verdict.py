@@ -11,7 +11,6 @@ from dav_gswt.photos.sfm.verdict import (
     THRESHOLDS,
     SfmEvidence,
     combine_grades,
-    find_groups,
     judge_model,
 )
 
@@ -88,13 +87,6 @@ def test_points_that_two_photos_see_are_no_good_sign(model):
     assert grades(judge(short))["track length"] == "refused"
 
 
-def test_two_groups_make_a_model_doubtful(model):
-    groups = find_groups(list("abcdefgh"), [(0, 1, 90), (1, 2, 90), (3, 4, 90), (4, 5, 90), (5, 6, 90), (2, 3, 12)])
-    assert groups == (tuple("defg"), tuple("abc"))
-    assert find_groups(list("abcd"), [(0, 1, 90), (2, 3, 90)], placed=[0, 3]) == (tuple("abcd"),)
-    assert judge(model, groups=groups).grade == "doubtful"
-
-
 def signs(*grades: tuple[str, str]) -> list[SfmSign]:
     return [SfmSign(name, grade, "a reason") for name, grade in grades]
 
@@ -108,7 +100,7 @@ def signs(*grades: tuple[str, str]) -> list[SfmSign]:
         ([("tilt", "refused"), ("GPS", "doubtful")], "refused"),
         ([("tilt", "doubtful"), ("GPS", "doubtful"), ("relief", "doubtful")], "refused"),
         ([("reprojection error", "refused")], "refused"),
-        ([("placed", "refused"), ("groups", "doubtful"), ("tilt", "doubtful")], "doubtful"),
+        ([("placed", "refused"), ("tilt", "doubtful")], "doubtful"),
     ],
 )
 def test_signs_are_weighed_together(found, grade):

@@ -27,7 +27,7 @@ from dav_gswt.photos.colmap_model import bundle_adjust, model_from_reconstructio
 from dav_gswt.photos.ground_frame import fit_plane
 from dav_gswt.photos.sfm.features import run_cancellable
 from dav_gswt.photos.sfm.gps import GpsPositions
-from dav_gswt.photos.sfm.verdict import COVERAGE, LEAST_INLIERS, SfmEvidence, find_groups, judge_model
+from dav_gswt.photos.sfm.verdict import COVERAGE, LEAST_INLIERS, SfmEvidence, judge_model
 
 _log = logging.getLogger(__name__)
 
@@ -177,7 +177,6 @@ def _solve(approach: Approach, scene: SfmScene, seed: int) -> SfmSolution:
         images=len(photos),
         focal_ratio=settled.free / settled.exif if settled.free and settled.exif else None,
         positions=np.stack([gps[name] for name in model.names]) if gps else None,
-        groups=find_groups([photo.path.name for photo in photos], pairs, [i - 1 for i in best.reg_image_ids()]),
     )
     verdict = judge_model(model, evidence, np.random.default_rng(seed))
     return SfmSolution(best, left_out, settled, verdict, unsure)

@@ -4,14 +4,12 @@ Every photo can be registered in a model that is nonsense, and no single number 
 two signs, one of them refused, or three doubts refuse the model.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from dav_gswt.errors import InputError
@@ -43,10 +41,9 @@ THRESHOLDS = {
     "placed": Threshold(0.5, 0.9, "of the photos that found no place; then the set is not what was meant"),
 }  # fmt: skip
 FAR = 10 * ACROSS  # metres: no receiver is so wrong, however long the flight
-COVERAGE = ("placed", "groups")  # signs about what is missing: they contradict nothing
+COVERAGE = ("placed",)  # signs about what is missing: they contradict nothing
 NEIGHBOURS = 6  # points beside a point in a photo
 LEAST_INLIERS = 30  # matches that hold two photos together; mapping needs as many
-LEAST_GROUP = 3  # photos
 FEW = 5  # photos; in smaller sets tracks are short anyway
 
 
@@ -56,14 +53,13 @@ class SfmEvidence:
 
     error: mean reprojection error at the size of features, pixels. images: of the set. focal_ratio: the freely adjusted
     focal length over EXIF's. positions: by GPS, of the model's images, metres east, north and up; NaN where a photo has
-    none. groups: names of photos that hang together, see `find_groups`.
+    none.
     """
 
     error: float
     images: int
     focal_ratio: float | None = None
     positions: Float[Array, "n 3"] | None = None
-    groups: tuple[tuple[str, ...], ...] = ()
 
 
 def judge_model(model: ColmapModel, evidence: SfmEvidence, rng: np.random.Generator) -> SfmVerdict:
@@ -86,10 +82,6 @@ def judge_model(model: ColmapModel, evidence: SfmEvidence, rng: np.random.Genera
     signs.append(_grade("relief", relief, f"points lie {relief:.2f} flying heights off their plane"))
     placed, images = len(model.names), evidence.images
     signs.append(_grade("placed", 1 - placed / images, f"{placed} of {images} photos found a place"))
-    if (groups := evidence.groups)[1:]:
-        said = " | ".join(f"{group[0]} ... {group[-1]}" for group in groups)
-        reason = f"groups ({said}) that share no ground: only one of them can be used"
-        signs.append(SfmSign("groups", "doubtful", f"your photos fall into {len(groups)} {reason}"))
     known = tuple(sign for sign in signs if sign)
     return SfmVerdict(combine_grades(known), known)
 
@@ -102,23 +94,6 @@ def combine_grades(signs: Iterable[SfmSign]) -> Grade:
     if len(against) >= 3 or (refused and len(against) >= 2) or any(THRESHOLDS[sign.name].alone for sign in refused):
         return "refused"
     return "doubtful" if bad else "good"
-
-
-def find_groups(
-    names: list[str], pairs: Iterable[tuple[int, int, int]], placed: Sequence[int] = ()
-) -> tuple[tuple[str, ...], ...]:
-    """Groups of photos that matches hold together, the largest first; those of fewer than three photos are left out.
-
-    pairs: indices of two photos, and how many matches of theirs one rigid scene explains. placed: those of one model,
-    which are one group whatever their matches.
-    """
-    edges = [(i, j) for i, j, inliers in pairs if inliers >= LEAST_INLIERS]
-    edges += [(placed[0], i) for i in placed[1:]]
-    rows, columns = zip(*edges, strict=True) if edges else ((), ())
-    graph = coo_array((np.ones(len(edges)), (rows, columns)), shape=(len(names), len(names)))
-    count, label = connected_components(graph, directed=False)
-    groups = [tuple(np.array(names, object)[label == k]) for k in range(count)]
-    return tuple(sorted((g for g in groups if len(g) >= LEAST_GROUP), key=lambda g: (-len(g), g[0])))
 
 
 def _grade(name: str, value: float, reason: str) -> SfmSign:

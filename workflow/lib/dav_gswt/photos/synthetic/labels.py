@@ -1,7 +1,7 @@
 """The true materials and objects of synthetic ground, and their map from above, which evaluations read.
 
-The map is a pair of files in truth/: ground_labels.exr, with the channels material and object, and ground_labels.json,
-with what their numbers mean. The product reads neither.
+The map is truth/ground_labels.exr, with the channels material and object; its header says what their numbers mean. The
+product does not read it.
 """
 
 import json
@@ -14,15 +14,13 @@ from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 from scipy import ndimage
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import read_record, write_json
+from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.geometry.scene_frame import Extent, Square
 from dav_gswt.images import image_files
 
-MAP, NAMES = "ground_labels.exr", "ground_labels.json"
+MAP = "ground_labels.exr"
 CELLS = 600  # of the map along a side of the exemplar: 1 cm each
 GAP = 3  # cells: gaps between twigs and leaves up to twice as wide belong to a footprint
-REMEDY = "make the photos stage again"
 
 
 @dataclass(frozen=True)
@@ -66,15 +64,6 @@ class ObjectLabel:
     x: float
     y: float
     radius: float
-
-
-@dataclass(frozen=True)
-class _Names:
-    """The content of NAMES."""
-
-    extent: Extent
-    materials: dict[str, int]
-    objects: tuple[ObjectLabel, ...]
 
 
 @dataclass(frozen=True)
@@ -129,28 +118,23 @@ def rasterize_footprint(vertices: Float32[Array, "v 3"], square: Square, cells: 
 
 
 def write_label_map(folder: Path | str, labels: LabelMap) -> None:
-    """Write the two files of a map. On disk the first row is the northern one, as in any image of a map."""
-    names = asdict(_Names(labels.extent, labels.materials, labels.objects))
+    """Write a map. On disk the first row is the northern one, as in any image of a map."""
     channels = {"material": labels.material[::-1], "object": labels.object[::-1]}
-    texts = {key: json.dumps(names[key]) for key in ("extent", "materials")}
-    image_files.write_exr(Path(folder) / MAP, {k: v.astype(np.float32) for k, v in channels.items()}, texts)
-    write_json(Path(folder) / NAMES, names)
+    names = {key: json.dumps(asdict(labels)[key]) for key in ("extent", "materials", "objects")}
+    image_files.write_exr(Path(folder) / MAP, {k: v.astype(np.float32) for k, v in channels.items()}, names)
 
 
 def read_label_map(folder: Path | str) -> LabelMap:
     """Read the map of a photo set from its truth/ folder.
 
-    Raises: InputError: there is none, as for families without labels, or the files are of another kind.
+    Raises: InputError: there is none, as for families without labels, or the file is of another kind.
     """
     path = Path(folder) / MAP
-    names = read_record(Path(folder) / NAMES, _Names, REMEDY)
-    channels, _ = image_files.read_exr(path)
+    channels, header = image_files.read_exr(path)
     try:
         material, objects = (np.rint(channels[name][::-1]).astype(int) for name in ("material", "object"))
-    except KeyError as error:
-        raise InputError(f"{path}: has no channel {error}; {REMEDY}") from error
-    unknown = set(np.unique(material)) - {0, *names.materials.values()}
-    unknown |= set(np.unique(objects)) - {0, *(thing.id for thing in names.objects)}
-    if unknown:
-        raise InputError(f"{path}: has labels that {NAMES} does not name ({min(unknown)}); {REMEDY}")
-    return LabelMap(material, objects, names.extent, names.materials, names.objects)
+        extent, materials, named = (json.loads(header[key]) for key in ("extent", "materials", "objects"))
+        labelled = tuple(ObjectLabel(**row) for row in named)
+        return LabelMap(material, objects, Extent(**extent), materials, labelled)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: not a map of labels ({summarize_error(error)}); make the photos again") from error

@@ -2,8 +2,9 @@
 
 import logging
 import tempfile
+from contextlib import closing
 from dataclasses import replace
-from itertools import islice
+from itertools import combinations, islice
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import ColmapModel, model_from_reconstruction, silence_pycolmap, write_colmap_model
+from dav_gswt.photos.colmap_model import ColmapModel, model_from_reconstruction, write_colmap_model
+from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_image_pairs
 from dav_gswt.photos.synthetic import labels, mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 
@@ -66,41 +68,28 @@ def triangulate_points(folder: Path, shots: list[tuple[str, Camera]], seed: int)
 
     Up to EXHAUSTIVE pictures every pair is matched, else those of `find_overlapping_pairs`.
     """
-    silence_pycolmap()
     names, cameras = (list(column) for column in zip(*shots, strict=True))
     none = np.zeros(0, int)
     known = ColmapModel(
         tuple(names), tuple(cameras), np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
     )
-    extraction = pycolmap.FeatureExtractionOptions(num_threads=1, use_gpu=False)
-    extraction.sift.max_num_features = FEATURES
-    matching = pycolmap.FeatureMatchingOptions(num_threads=1, use_gpu=False)
-    verification = pycolmap.TwoViewGeometryOptions()
-    verification.ransac.random_seed = seed
-    reader = pycolmap.ImageReaderOptions(camera_model="PINHOLE")
-    reader.camera_params = ",".join(str(v) for v in (cameras[0].fx, cameras[0].fy, cameras[0].cx, cameras[0].cy))
+    first = cameras[0]
+    lens = pycolmap.Camera(
+        model="PINHOLE", width=first.width, height=first.height, params=[first.fx, first.fy, first.cx, first.cy]
+    )
+    lens.has_prior_focal_length = True
     with tempfile.TemporaryDirectory(prefix="points-") as scratch:
         database, sparse = Path(scratch) / "database.db", Path(scratch) / "sparse"
         sparse.mkdir()
-        _log.info("find features of %d views", len(names))
-        pycolmap.extract_features(
-            database,
-            folder,
-            image_names=names,
-            camera_mode=pycolmap.CameraMode.SINGLE,
-            reader_options=reader,
-            extraction_options=extraction,
-            device=pycolmap.Device.cpu,
-        )
-        if len(names) <= EXHAUSTIVE:
-            pycolmap.match_exhaustive(database, matching, verification_options=verification, device=pycolmap.Device.cpu)
-        else:
-            some, every = find_overlapping_pairs(cameras), len(names) * (len(names) - 1) // 2
-            _log.info("match %d of %d pairs of views: those that see the same ground alike", len(some), every)
-            listed = Path(scratch) / "pairs.txt"
-            listed.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in some), encoding="utf-8")
-            choice = pycolmap.ImportedPairingOptions(match_list_path=listed)
-            pycolmap.match_image_pairs(database, matching, choice, verification, pycolmap.Device.cpu)
+        with closing(pycolmap.Database.open(database)) as store:
+            numbers = enter_camera(store, lens)
+            for name in names:
+                enter_image(store, name, *numbers)
+        extract_features(folder, database, max(first.width, first.height), FEATURES, 1)
+        every = list(combinations(range(len(names)), 2))
+        pairs = every if len(names) <= EXHAUSTIVE else find_overlapping_pairs(cameras)
+        _log.info("match %d of %d pairs of views: those that see the same ground alike", len(pairs), len(every))
+        match_image_pairs([(names[i], names[j]) for i, j in pairs], database, 1, seed)
         write_colmap_model(known, sparse)
         options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed)
         stored = pycolmap.triangulate_points(
