@@ -1,7 +1,6 @@
 """Camera models of other programs: one made-up scene in two formats, the same cameras, pictures and points."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pycolmap
@@ -11,7 +10,6 @@ from fixtures.imported_models import (
     NUMBERS,
     SCENE,
     WORLD,
-    lens,
     reconstruction,
     shoot,
     write_colmap,
@@ -22,9 +20,9 @@ from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos import importers
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
-from dav_gswt.photos.importers import import_model, points
-from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder
-from dav_gswt.photos.importers.points import find_near_pairs, triangulate_features
+from dav_gswt.photos.importers import import_model
+from dav_gswt.photos.importers.photo_matching import PhotoFolder
+from dav_gswt.photos.importers.points import triangulate_features
 from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.sfm.registration import undistort_image
 
@@ -85,14 +83,6 @@ def test_points_lie_on_the_ground(read):
     assert found.error < 0.7 and np.median(reprojection_errors(found.model)) < 0.7
 
 
-@pytest.mark.slow
-def test_a_run_repeats_to_the_bit_whatever_the_threads(read, photos, tmp_path):
-    write_colmap(tmp_path / "m")
-    again = import_model(tmp_path / "m", photos, replace(OPTIONS, threads=2))
-    for name in ("points", "colours", "point_of", "image_of", "pixels"):
-        assert np.array_equal(getattr(again.model, name), getattr(read["colmap"].model, name)), name
-
-
 @pytest.mark.parametrize("binary", [False, True], ids=["text", "binary"])
 def test_observations_of_a_colmap_model_are_its_own(photos, tmp_path, binary):
     write_colmap(tmp_path / "sparse" / "0", sees=True)
@@ -151,34 +141,6 @@ def test_one_photo_of_two_images_and_fewer_than_three_photos_are_refused(tmp_pat
     values[0]["shots"] = dict(list(shots.items())[:2])
     with pytest.raises(InputError, match="2 of its 2 images have a photo"):
         import_model(write_json(tmp_path / "r.json", values), photos, OPTIONS)
-
-
-@pytest.mark.slow
-def test_a_world_of_large_coordinates_keeps_its_points_sharp(read, photos, tmp_path):
-    far = np.array([5.1e6, 4.2e5, 300.0])
-    values = reconstruction()
-    for i, shot in enumerate(values[0]["shots"].values()):
-        shot["translation"] = (SCENE.translations[i] - SCENE.rotations[i] @ far).tolist()
-    del values[0]["points"]
-    found = import_model(write_json(tmp_path / "r.json", values), photos, OPTIONS)
-    near = read["colmap"].model
-    assert abs(len(found.model.points) - len(near.points)) <= 0.01 * len(near.points)
-    assert np.median(np.abs((found.model.points - far) @ WORLD[:, 2])) < 0.003
-
-
-def test_many_photos_are_matched_with_those_near_them_only():
-    def place(x, turned):
-        turn = np.diag([1.0, -1, -1]) if turned else np.eye(3)
-        return MatchedPhoto(Path(), "", 0, lens(), turn, -turn @ [x, 0.0, 0.0])
-
-    line = [place(float(i), False) for i in range(61)]
-    pairs = find_near_pairs(line)
-    assert all(i < j for i, j in pairs) and len(set(pairs)) == len(pairs)
-    assert {j for i, j in pairs if i == 30} | {i for i, j in pairs if j == 30} >= set(range(20, 41)) - {30}
-    assert max(j - i for i, j in pairs) <= points.NEAREST
-    assert len(find_near_pairs(line[:60])) == 60 * 59 // 2
-    opposed = [place(float(i), i % 2 == 1) for i in range(61)]
-    assert all((j - i) % 2 == 0 for i, j in find_near_pairs(opposed))
 
 
 def test_the_stage_goes_on_from_a_given_model(photos, found_once, tmp_path, monkeypatch):

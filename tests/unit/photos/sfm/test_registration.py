@@ -213,17 +213,6 @@ def test_photos_that_cannot_be_used_are_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_positions_that_contradict_the_photos_are_not_used(photos, locate):
-    locate(np.random.default_rng(5).normal(0, 60, (8, 3)))
-    found = register_photos(photos, OPTIONS)
-    assert found.positions is None and found.model.names == NAMES
-    assert found.verdict.grade == "doubtful" and [sign.name for sign in found.verdict.objections] == ["GPS"]
-    tried = [text.split(":")[0] for text in found.verdict.tried]
-    assert tried == ["incremental mapping", "global mapping, EXIF focal length held"]
-    assert apart(found.model.cameras, flight()) < 0.01
-
-
-@pytest.mark.slow
 def test_the_global_mapper_finds_the_same_places(photos, monkeypatch):
     monkeypatch.setattr(
         registration, "find_solution", lambda scene, seed: mapping._solve(Approach("global"), scene, seed)

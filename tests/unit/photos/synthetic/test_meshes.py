@@ -23,7 +23,6 @@ STONES = {
 MATS = {
     "mat": partial(plants.make_mat, count=40, length=0.12, dry=0.2),
     "stand": partial(plants.make_stand, count=40, length=0.9, width=0.01, tint=plants.TINTS[1]),
-    "flat": partial(plants.make_flat_grass, count=40, length=0.9, width=0.01, tint=plants.TINTS[1]),
     "swathe": lambda rng: plants.make_swathe(rng, [PLANTS["flower 3"](rng) for _ in range(2)], 4, (0.3, 0.4)),
 }
 EVERY = PLANTS | STONES | MATS

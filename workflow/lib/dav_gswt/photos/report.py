@@ -72,12 +72,6 @@ class ReportFacts:
     cover: Coverage
     error: float | None
 
-    def length(self, of: float) -> str:
-        """A length of the world, with its unit."""
-        if self.frame.unit == "flying height":
-            return f"{of:.2f} flying heights"
-        return f"{of:.0f} m" if abs(of) >= 20 else f"{of:.1f} m"
-
 
 def write_report(folder: Path | str, template: Path | str, scene: str, out: Path | str) -> None:
     """Write the report on a photos/ folder (images/, sparse/, ground.json) to `out`.
@@ -150,7 +144,7 @@ def find_weaknesses(points: int, error: float, shared: int, usual: float) -> tup
 
 
 def _summarize(found: ReportFacts) -> str:
-    frame, side = found.frame, found.length(found.frame.exemplar.side)
+    frame, side = found.frame, f"{found.frame.exemplar.side:.2f} {found.frame.unit}s"
     tests = sum(photo.tests for photo in found.photos)
     if frame.kind == "synthetic":
         first = f"{len(found.photos) - tests} photos were rendered, and {tests} for testing; their cameras are exact."
@@ -227,12 +221,8 @@ def _list_facts(found: ReportFacts) -> list[tuple[str, str]]:
     if frame.focal:
         ratio = f"{frame.focal_ratio:.3f} times EXIF's; " if frame.focal_ratio else ""
         facts.append(("Focal length", ratio + frame.focal.decision))
-    if frame.unit == "metre":
-        facts.append(("Flying height", found.length(frame.flying_height)))
     if frame.georeference:
         facts.append(("Place", f"{frame.georeference.latitude:.6f}, {frame.georeference.longitude:.6f}"))
-    elif frame.kind == "photos":
-        facts.append(("Place", "unknown: the photos have no GPS positions, or none that agree with them"))
     return facts
 
 

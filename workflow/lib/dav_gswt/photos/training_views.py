@@ -88,34 +88,12 @@ def one_by_one(views: Iterable[TrainingView]) -> Iterator[TrainingView]:
         view.release()
 
 
-def open_array_file(cameras: Iterable[Camera], size: int, folder: Path | str) -> ArrayFile | None:
-    """Where photos of these cameras, at most `size` pixels wide or high, lie; None: in memory, as they take little."""
-    shares = [(camera, min(1.0, size / max(camera.width, camera.height))) for camera in cameras]
-    total = sum(12 * camera.width * camera.height * share**2 for camera, share in shares)
-    return ArrayFile(folder) if total > IN_MEMORY else None
-
-
-def make_training_view(
-    name: str,
-    camera: Camera,
-    image: Float32[Array, "h w 3"],
-    size: int,
-    cover: Float32[Array, "h w"] | None = None,
-) -> TrainingView:
-    """A view at most `size` pixels wide or high; photos are never enlarged. cover: 0 where the photo is masked."""
-    width, height = image_files.fit_size(camera.width, camera.height, size)
-    if (width, height) != (camera.width, camera.height):
-        image, camera = image_files.shrink_image(image, width, height), camera.resized(width, height)
-        cover = cover if cover is None else image_files.shrink_image(cover[..., None], width, height)[..., 0]
-    weight = np.ones(image.shape[:2]) if cover is None else cover > WHOLE
-    return TrainingView(name, camera, image, weight.astype(np.float32))
-
-
 def read_training_view(
     name: str, camera: Camera, path: Path | str, size: int, arrays: ArrayFile | None = None
 ) -> TrainingView:
-    """The view of a picture file; what its alpha masks does not count. arrays: where it lies; None: in memory.
+    """The view of a picture file, at most `size` pixels wide or high; photos are never enlarged.
 
+    What its alpha masks does not count. arrays: where it lies; None: in memory.
     Raises: InputError: not readable as an image, or smaller than the camera's picture.
     """
     image, cover = image_files.read_photo_and_alpha(path)
@@ -124,8 +102,12 @@ def read_training_view(
             f"{path}: {image.shape[1]} x {image.shape[0]} pixels, its camera takes {camera.width} x {camera.height}; "
             "make the photos again"
         )
-    view = replace(make_training_view(name, camera, image, size, cover), arrays=arrays)
-    return view.with_pixels(image=view.image, weight=view.weight)
+    width, height = image_files.fit_size(camera.width, camera.height, size)
+    if (width, height) != (camera.width, camera.height):
+        image, camera = image_files.shrink_image(image, width, height), camera.resized(width, height)
+        cover = image_files.shrink_image(cover[..., None], width, height)[..., 0]
+    weight = (cover > WHOLE).astype(np.float32)
+    return TrainingView(name, camera, image, weight, arrays=arrays).with_pixels(image=image, weight=weight)
 
 
 def read_captured_views(folder: Path | str, size: int, arrays: ArrayFile | None = None) -> list[TrainingView]:
@@ -164,7 +146,9 @@ def read_training_views(
     known = read_colmap_model(model)
     cameras = [known.camera(name) for name in names]
     taken = [photo.camera for folder in captures for photo in read_capture_record(folder)]
-    arrays = None if files is None else open_array_file([*cameras, *taken], size, files)
+    sides = [image_files.fit_size(camera.width, camera.height, size) for camera in [*cameras, *taken]]
+    fits = files is None or sum(12 * width * height for width, height in sides) <= IN_MEMORY
+    arrays = None if fits else ArrayFile(files)
     start = [
         read_training_view(name, camera, Path(images_folder) / name, size, arrays)
         for name, camera in zip(names, cameras, strict=True)

@@ -1,10 +1,9 @@
 """The photo set of a synthetic scene: start and test views, and points triangulated with their exact poses."""
 
-import logging
 import tempfile
 from contextlib import closing
 from dataclasses import replace
-from itertools import combinations, islice
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -15,17 +14,12 @@ from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import ColmapModel, model_from_reconstruction, write_colmap_model
-from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_image_pairs
+from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
 from dav_gswt.photos.synthetic import labels, mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 
-_log = logging.getLogger(__name__)
-
 FEATURES = 4096
-EXHAUSTIVE = 40  # views up to which every pair is matched
-NEIGHBOURS = 20  # matched with each view if there are more views
-WIDEST = 60.0  # degrees between two views that are matched
-LEAST_OVERLAP = 0.1  # share of the exemplar that both views of a pair must see
+NEIGHBOURS = 20  # views that each is matched with, if there are many
 
 
 def render_set(entry: dict, folder: Path) -> None:
@@ -64,10 +58,7 @@ def _name_views(kind: str, views: list[Camera]) -> list[tuple[str, Camera]]:
 
 
 def triangulate_points(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> ColmapModel:
-    """Triangulate points of matched SIFT features of pictures with known cameras, which are not changed.
-
-    Up to EXHAUSTIVE pictures every pair is matched, else those of `find_overlapping_pairs`.
-    """
+    """Triangulate points of matched SIFT features of pictures with known cameras, which are not changed."""
     names, cameras = (list(column) for column in zip(*shots, strict=True))
     none = np.zeros(0, int)
     known = ColmapModel(
@@ -86,38 +77,13 @@ def triangulate_points(folder: Path, shots: list[tuple[str, Camera]], seed: int)
             for name in names:
                 enter_image(store, name, *numbers)
         extract_features(folder, database, max(first.width, first.height), FEATURES, 1)
-        every = list(combinations(range(len(names)), 2))
-        pairs = every if len(names) <= EXHAUSTIVE else find_overlapping_pairs(cameras)
-        _log.info("match %d of %d pairs of views: those that see the same ground alike", len(pairs), len(every))
-        match_image_pairs([(names[i], names[j]) for i, j in pairs], database, 1, seed)
+        match_photos(len(names), database, NEIGHBOURS, 1, seed)
         write_colmap_model(known, sparse)
         options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed)
         stored = pycolmap.triangulate_points(
             pycolmap.Reconstruction(str(sparse)), database, folder, sparse, options=options
         )
         return model_from_reconstruction(stored)
-
-
-def find_overlapping_pairs(cameras: list[Camera], side: float = synthetic.EXEMPLAR) -> list[tuple[int, int]]:
-    """Pairs i < j of views to match: each with its NEIGHBOURS by overlap.
-
-    Both see LEAST_OVERLAP of the exemplar, a square about the origin, or more, and the angle between them at its centre
-    is at most WIDEST. Neighbours are ranked by the shared ground times the cosine of that angle.
-    """
-    at = (np.arange(16) + 0.5) / 16 * side - side / 2
-    x, y = np.meshgrid(at, at)
-    ground = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], 1)
-    sees = np.zeros((len(cameras), len(ground)))
-    for i, camera in enumerate(cameras):
-        pixels, depth = camera.project(ground)
-        sees[i] = (depth > 0) & (pixels > 0).all(1) & (pixels < [camera.width, camera.height]).all(1)
-    towards = np.stack([camera.centre / np.linalg.norm(camera.centre) for camera in cameras])
-    shared, cosine = sees @ sees.T / len(ground), towards @ towards.T
-    score = np.where((shared >= LEAST_OVERLAP) & (cosine >= np.cos(np.radians(WIDEST))), shared * cosine, 0.0)
-    np.fill_diagonal(score, 0.0)
-    best = np.argsort(-score, axis=1, kind="stable")[:, :NEIGHBOURS]
-    pairs = {(min(i, int(j)), max(i, int(j))) for i, row in enumerate(best) for j in row if score[i, j] > 0}
-    return sorted(pairs)
 
 
 def add_cameras(found: ColmapModel, more: list[tuple[str, Camera]]) -> ColmapModel:

@@ -1,7 +1,7 @@
 """Plants as coloured meshes: shrubs, grasses, clover and flowers.
 
 They are about 1 high (mats, stands and swathes: about 1 across) with their root at the origin, and each face has one
-colour. Stands and trodden grass lean towards +x, so that their yaw is the direction of the lean.
+colour.
 """
 
 from dataclasses import dataclass
@@ -171,16 +171,6 @@ def make_stand(rng: np.random.Generator, count: int, length: float, width: float
     sweep = 0.16 * long[:, None, None] * (np.linspace(0, 1, 5) ** 2)[None, :, None] * np.array([1.0, 0.0, -0.35])
     paths = grow_paths(rng, root, heading, long, joints=5, bend=0.07, droop=0.12) + sweep
     return _make_grass(rng, paths, width * TAPER, tint, (0.6, 1.5))
-
-
-def make_flat_grass(rng: np.random.Generator, count: int, length: float, width: float, tint: Tint) -> Mesh:
-    """Trodden grass on a disc about 1 across: blades on top of each other, most of them towards +x."""
-    root = scatter_on_disc(rng, count, 0.06 * (0.3 * length))
-    heading = to_direction(np.radians(rng.uniform(60, 88, count)), rng.normal(0, 0.55, count))
-    paths = grow_paths(rng, root, heading, length * rng.uniform(0.5, 1.2, count), joints=5, bend=0.10, droop=0.10)
-    paths[..., 2] = np.abs(paths[..., 2]) * 0.6 + rng.uniform(0, 0.05 * length, (count, 1))
-    paths[:, 0, 2] = -0.03 * length
-    return _make_grass(rng, paths, width * TAPER, tint, (0.85, 1.1))
 
 
 def _make_heads(rng, stems, kind: Flower, up: float, spread: float) -> list[Mesh]:
