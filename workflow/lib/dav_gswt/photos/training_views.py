@@ -147,8 +147,8 @@ def read_training_views(
     cameras = [known.camera(name) for name in names]
     taken = [photo.camera for folder in captures for photo in read_capture_record(folder)]
     sides = [image_files.fit_size(camera.width, camera.height, size) for camera in [*cameras, *taken]]
-    fits = files is None or sum(12 * width * height for width, height in sides) <= IN_MEMORY
-    arrays = None if fits else ArrayFile(files)
+    large = sum(12 * width * height for width, height in sides) > IN_MEMORY
+    arrays = ArrayFile(files) if files is not None and large else None
     start = [
         read_training_view(name, camera, Path(images_folder) / name, size, arrays)
         for name, camera in zip(names, cameras, strict=True)

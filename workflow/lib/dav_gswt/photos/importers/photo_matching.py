@@ -35,7 +35,8 @@ class PhotoFolder:
         if not folder.is_dir():
             raise InputError(f"{folder}: there is no such folder of photos")
         self.folder = folder
-        found = (path for path in sorted(folder.rglob("*")) if path.suffix.lower() in image_files.SUFFIXES)
+        files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+        found = (path for path in files if path.suffix.lower() in image_files.SUFFIXES)
         names = {path.relative_to(folder).as_posix(): path for path in found}
         self.photos = {name: path for name, path in names.items() if not re.search(r"(^|/)\.", name)}
         if not self.photos:
