@@ -31,7 +31,7 @@ def parts_of(made):
     yield np.stack([made.light.sun, made.light.zenith, made.light.horizon, made.light.below])
     if made.labels:
         yield made.labels.material.ravel()
-        yield from (thing.vertices for thing in made.labels.objects)
+        yield from made.labels.objects
 
 
 @every_family
