@@ -8,7 +8,7 @@ import pytest
 from fixtures import photos as synth
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos.colmap_model import measure_parallax, triangulate_model, write_colmap_model
+from dav_gswt.photos.colmap_model import intersect_rays, triangulate_model, write_colmap_model
 from dav_gswt.photos.sfm import gps
 from dav_gswt.photos.sfm.mapping import OBLIQUE, settle_focal_length
 from dav_gswt.photos.sfm.registration import require_parallax
@@ -138,7 +138,8 @@ def test_without_exif_the_photos_alone_say_the_focal_length(reconstruct):
 
 def test_photos_from_one_spot_are_refused():
     for step, fits in ((0.2, True), (0.005, False)):
-        spread = measure_parallax(synth.model(synth.flight(2, 2, step), synth.plain(50, 0.3, np.random.default_rng(0))))
+        model = synth.model(synth.flight(2, 2, step), synth.plain(50, 0.3, np.random.default_rng(0)))
+        _, spread = intersect_rays(model)
         if fits:
             require_parallax(spread)
         else:

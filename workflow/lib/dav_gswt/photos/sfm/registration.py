@@ -20,7 +20,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import FocalLength, SfmVerdict
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import ColmapModel, measure_parallax, model_from_reconstruction
+from dav_gswt.photos.colmap_model import ColmapModel, intersect_rays, model_from_reconstruction
 from dav_gswt.photos.lenses import undistort_photo
 from dav_gswt.photos.photo_files import convert_equivalent, name_pictures, read_focal_length
 from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
@@ -111,7 +111,7 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
     if positions and not align_to_gps(solution.best, scene.gps):
         positions = None
     made = _finish_registration(photos, solution, options, positions)
-    require_parallax(measure_parallax(made.model))
+    require_parallax(intersect_rays(made.model)[1])
     return made
 
 
