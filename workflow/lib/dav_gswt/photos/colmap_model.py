@@ -251,6 +251,12 @@ def model_from_reconstruction(
     )
 
 
+def make_lens(camera: Camera) -> pycolmap.Camera:
+    """The lens of a camera for pycolmap."""
+    params = [camera.fx, camera.fy, camera.cx, camera.cy]
+    return pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
+
+
 def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
     """Write a COLMAP model (binary) into an existing folder; images are numbered from 1 in the model's order."""
     silence_pycolmap()
@@ -261,11 +267,9 @@ def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
         lens = (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
         if lens not in numbers:
             numbers[lens] = len(numbers) + 1
-            stored.add_camera_with_trivial_rig(
-                pycolmap.Camera(
-                    camera_id=numbers[lens], model="PINHOLE", width=lens[0], height=lens[1], params=lens[2:]
-                )
-            )
+            new = make_lens(camera)
+            new.camera_id = numbers[lens]
+            stored.add_camera_with_trivial_rig(new)
         own = np.flatnonzero(model.image_of == i)
         place[own] = np.arange(len(own))
         image = pycolmap.Image(name=name, keypoints=model.pixels[own], camera_id=numbers[lens], image_id=i + 1)

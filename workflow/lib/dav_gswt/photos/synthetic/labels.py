@@ -33,7 +33,7 @@ class GroundLabels:
     materials: dict[str, int]
     material: Int[Array, "n n"]
     period: float
-    objects: tuple[Float32[Array, "v 3"], ...]
+    objects: tuple[Float32[Array, "_ 3"], ...]
 
 
 @dataclass(frozen=True)

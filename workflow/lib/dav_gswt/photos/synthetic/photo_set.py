@@ -13,7 +13,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import ColmapModel, model_from_reconstruction, write_colmap_model
+from dav_gswt.photos.colmap_model import ColmapModel, make_lens, model_from_reconstruction, write_colmap_model
 from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
 from dav_gswt.photos.synthetic import labels, mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
@@ -65,9 +65,7 @@ def triangulate_points(folder: Path, shots: list[tuple[str, Camera]], seed: int)
         tuple(names), tuple(cameras), np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
     )
     first = cameras[0]
-    lens = pycolmap.Camera(
-        model="PINHOLE", width=first.width, height=first.height, params=[first.fx, first.fy, first.cx, first.cy]
-    )
+    lens = make_lens(first)
     lens.has_prior_focal_length = True
     with tempfile.TemporaryDirectory(prefix="points-") as scratch:
         database, sparse = Path(scratch) / "database.db", Path(scratch) / "sparse"
