@@ -212,7 +212,7 @@ class PhotoScene(_PhotographedScene):
         read_by=REGISTERED,
     )
     model: Text | None = key(
-        "known cameras: a COLMAP folder, `transforms.json` (nerfstudio) or `reconstruction.json` (OpenSfM)",
+        "known cameras: a COLMAP folder, or `reconstruction.json` of OpenSfM",
         None,
         read_by=REGISTERED,
     )
@@ -231,30 +231,10 @@ class PhotoScene(_PhotographedScene):
         False,
         read_by=("split_views", *FITTING),
     )
-    sfm: Literal["quick", "careful"] = key(
-        "`quick`: 4096 features a photo, 12 partners; `careful`: 8192 and 40", "quick", read_by=REGISTERED
-    )
-    mapper: Literal["incremental", "global"] = key(
-        "`global`: all photos at once, faster for hundreds", "incremental", read_by=REGISTERED
-    )
-    verdict: Literal["stop", "warn"] = key(
-        "what follows where structure from motion gives a model that several signs refuse: `stop` ends the run, `warn` "
-        "goes on with it",
-        "stop",
-        read_by=REGISTERED,
-    )
-    cameras: Literal["auto", "one", "each"] = key(
-        "`auto`: one camera for all photos of equal size and EXIF focal length; `one`: for all of equal size",
-        "auto",
-        read_by=REGISTERED,
-    )
     focal: float | None = key(
         "where EXIF has none or is wrong", None, unit="mm (35 mm equivalent)", read_by=REGISTERED, ge=4, le=2000
     )
     materials: Materials = _materials("auto")
-    masks: Text | None = key(
-        "a folder of masks named as the photos: black pixels are not ground", None, read_by=REGISTERED
-    )
     masks: Text | None = key(
         "a folder of masks named as the photos: black pixels are not ground", None, read_by=REGISTERED
     )

@@ -8,7 +8,6 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
@@ -33,12 +32,11 @@ class ImportedImage:
     """One image of a model. A world point p has camera coordinates rotation @ p + translation (x
     right, y down).
 
-    name: relative to the photos' folder, with slashes. lens: at the size that the model gives, of the picture as it is
-    stored; None where no size is known because there is no such photo.
+    name: relative to the photos' folder, with slashes. lens: at the size that the model gives.
     """
 
     name: str
-    lens: pycolmap.Camera | None
+    lens: pycolmap.Camera
     rotation: Float[Array, "3 3"]
     translation: Float[Array, "3"]
 
@@ -48,10 +46,8 @@ class ImportedModel:
     """The images of a model. If the file has observations, image image_of[k] sees point point_of[k]
     at pixels[k].
 
-    colours: sRGB in [0, 1]. reasons: of images that the file has, but that cannot be used with the
-    others.
-    about: the place of the world's origin, if the world is known to be in metres east, north and
-    up.
+    colours: sRGB in [0, 1]. about: the place of the world's origin, if the world is known to be in
+    metres east, north and up.
     """
 
     shots: tuple[ImportedImage, ...]
@@ -60,7 +56,6 @@ class ImportedModel:
     point_of: Int[Array, "m"] = field(default_factory=lambda: np.zeros(0, int))
     image_of: Int[Array, "m"] = field(default_factory=lambda: np.zeros(0, int))
     pixels: Float[Array, "m 2"] = field(default_factory=lambda: np.zeros((0, 2)))
-    reasons: Mapping[str, str] = field(default_factory=dict)
     about: Georeference | None = None
 
 
@@ -113,13 +108,11 @@ def check_number(value, where: str) -> float:
     raise InputError(f"{where} is {str(value)[:40]!r}, which is no finite number; correct it or export the file again")
 
 
-def check_numbers(values, shape: tuple[int, ...], where: str) -> Array:
-    """Nested lists of finite numbers as an array. Raises: InputError: another shape, or a number that is not finite."""
-    if not isinstance(values, list) or len(values) != shape[0]:
-        raise InputError(f"{where} does not hold {' x '.join(map(str, shape))} numbers; export the file again")
-    if len(shape) == 1:
-        return np.array([check_number(v, where) for v in values])
-    return np.array([check_numbers(row, shape[1:], where) for row in values])
+def check_numbers(values, count: int, where: str) -> Array:
+    """A list of finite numbers as an array. Raises: InputError: of another length, or a number that is not finite."""
+    if not isinstance(values, list) or len(values) != count:
+        raise InputError(f"{where} does not hold {count} numbers; export the file again")
+    return np.array([check_number(v, where) for v in values])
 
 
 def check_finite(values: Array, where: str) -> Array:

@@ -13,20 +13,14 @@ import numpy as np
 import pycolmap
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
-from scipy.spatial import cKDTree
 
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.importers import lens_models
 from dav_gswt.photos.importers.checks import ImportedModel
 from dav_gswt.photos.importers.lens_models import camera_key, shrink_camera, unproject_pixels
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto
-from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_image_pairs
-from dav_gswt.photos.sfm.registration import SfmOptions
-
-ALL_PAIRS = 60  # photos up to which each is matched with every other
-NEAREST = 20  # photos with which each is matched otherwise
-WIDEST = 90.0  # degrees between two viewing directions, beyond which features do not match
+from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
+from dav_gswt.photos.sfm.registration import NEIGHBOURS, SfmOptions
 
 
 @dataclass(frozen=True)
@@ -49,29 +43,25 @@ def collect_observations(given: ImportedModel, placed: Sequence[MatchedPhoto]) -
     views = []
     for place in placed:
         shot, own = given.shots[place.index], given.image_of == place.index
-        assert shot.lens is not None  # its photo is there, so its size is known
         views.append((shot.lens, shot.rotation, shot.translation, given.point_of[own], given.pixels[own]))
-    turns = [np.linalg.matrix_power(lens_models.QUARTER, place.turns)[:2, :2] for place in placed]
-    return _unproject_views(given.points, given.colours, views, turns)
+    return _unproject_views(given.points, given.colours, views)
 
 
 def _unproject_views(
-    points: Float[Array, "n 3"], colours: Float32[Array, "n 3"], views: Sequence[tuple], turns: Sequence[Array]
+    points: Float[Array, "n 3"], colours: Float32[Array, "n 3"], views: Sequence[tuple]
 ) -> Observations:
-    """Observations as rays. views: of each photo its lens, rotation, translation, and which points
-    it sees where.
+    """Observations as rays, without those that the lens cannot have made.
 
-    turns: rotation of each photo's rays about its axis. Observations that the lens cannot have made
-    are left out.
+    views: of each photo its lens, rotation, translation, and which points it sees where.
     """
     errors, rays, point_of = [], [], []
-    for (lens, rotation, translation, which, pixels), turn in zip(views, turns, strict=True):
+    for lens, rotation, translation, which, pixels in views:
         found = unproject_pixels(lens, pixels)
         known = np.isfinite(found).all(1)
         at = points[which[known]] @ rotation.T + translation
         seen = np.asarray(lens.img_from_cam(np.ascontiguousarray(at))).reshape(-1, 2)  # NaN behind the camera
         errors.append(np.linalg.norm(seen - pixels[known], axis=1))
-        rays.append(found[known] @ turn.T)
+        rays.append(found[known])
         point_of.append(which[known])
     image_of = np.repeat(np.arange(len(rays)), [len(own) for own in rays])
     every = np.concatenate(errors)
@@ -95,31 +85,12 @@ def triangulate_features(placed: Sequence[MatchedPhoto], options: SfmOptions) ->
             photo = image_files.read_photo(placed[i].path)
             image_files.write_png(folder / names[i], image_files.shrink_image(photo, camera.width, camera.height))
         extract_features(folder, database, options.size, options.features, options.threads)
-        pairs = [(names[i], names[j]) for i, j in find_near_pairs(placed)]
-        match_image_pairs(pairs, database, options.threads, options.seed)
+        match_photos(len(names), database, NEIGHBOURS, options.threads, options.seed)
         choice = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=options.seed)
         choice.triangulation.random_seed = choice.mapper.random_seed = options.seed
         choice.mapper.num_threads = 1
         found = pycolmap.triangulate_points(known, database, folder, folder, options=choice)
         return _read_observations(found, len(placed), middle)
-
-
-def find_near_pairs(placed: Sequence[MatchedPhoto]) -> list[tuple[int, int]]:
-    """Pairs of photos to match, the lower number first: all, or those near each other that look the same way.
-
-    Beyond ALL_PAIRS photos each is paired with the NEAREST ones whose viewing direction differs by less than WIDEST.
-    """
-    n = len(placed)
-    if n <= ALL_PAIRS:
-        return [(i, j) for i in range(n) for j in range(i + 1, n)]
-    centres = np.array([-p.rotation.T @ p.translation for p in placed])
-    forward = np.array([p.rotation[2] for p in placed])
-    order = np.asarray(cKDTree(centres).query(centres, min(n, 8 * NEAREST + 1))[1])
-    pairs = set()
-    for i in range(n):
-        alike = [int(j) for j in order[i] if j != i and forward[i] @ forward[j] > np.cos(np.radians(WIDEST))]
-        pairs |= {(min(i, j), max(i, j)) for j in alike[:NEAREST]}
-    return sorted(pairs)
 
 
 def _enter_images(placed: Sequence[MatchedPhoto], middle: Array, database: Path, size: int) -> pycolmap.Reconstruction:
@@ -149,5 +120,5 @@ def _read_observations(found: pycolmap.Reconstruction, photos: int, middle: Arra
         which = np.searchsorted(ids, own[:, 0].astype(np.int64))
         pose = image.cam_from_world().matrix()
         views.append((found.cameras[image.camera_id], pose[:, :3], pose[:, 3], which, own[:, 1:]))
-    seen = _unproject_views(points, colours, views, [np.eye(2)] * photos)
+    seen = _unproject_views(points, colours, views)
     return replace(seen, points=points + middle)

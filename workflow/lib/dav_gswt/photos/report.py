@@ -5,15 +5,22 @@ The page is one HTML file that loads nothing. The same photos/ folder and templa
 bytes.
 """
 
+import base64
+import io
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Int
+from matplotlib import colormaps
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.patches import Rectangle
 from numpy import ndarray as Array
 
 from dav_gswt.files import atomic_file
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
+from dav_gswt.images import figures, image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos import view_split
 from dav_gswt.photos.colmap_model import (
@@ -24,8 +31,8 @@ from dav_gswt.photos.colmap_model import (
     transform_model,
 )
 from dav_gswt.photos.ground_frame import Coverage, count_coverage
-from dav_gswt.photos.report.figures import draw_map, make_thumbnail
 from dav_gswt.photos.sfm import mapping
+from dav_gswt.photos.view_split import find_aim_point
 from dav_gswt.templates import render_template
 
 LEAST_POINTS, LEAST_SHARE = 100, 0.2  # points that hold a photo: as a number, and as a share of the set's median
@@ -34,6 +41,11 @@ WORST_MEAN = 1.0  # pixels: the set's mean error, likewise
 LEAST_SIDE = 0.5  # flying heights: side of an exemplar with room for tiles that differ
 TOO_FEW = 0.02  # share of the exemplar that may be seen by fewer photos than are needed
 NAMES = ("upper", "upper right", "right", "lower right", "lower", "lower left", "left", "upper left")
+DOWN = 5.0  # degrees off straight down, within which a camera has no arrow
+THUMBNAIL = 200  # pixels of the longer side
+MASKED = np.array([0.85, 0.1, 0.5], np.float32)
+FEW, MARK = "#b3471f", "#d55e00"  # colours of ground that too few photos see, and of photos that are weakly placed
+MOST_COLOURS = 6
 
 
 @dataclass(frozen=True)
@@ -59,12 +71,6 @@ class ReportFacts:
     need: int
     cover: Coverage
     error: float | None
-
-    def length(self, of: float) -> str:
-        """A length of the world, with its unit."""
-        if self.frame.unit == "flying height":
-            return f"{of:.2f} flying heights"
-        return f"{of:.0f} m" if abs(of) >= 20 else f"{of:.1f} m"
 
 
 def write_report(folder: Path | str, template: Path | str, scene: str, out: Path | str) -> None:
@@ -138,7 +144,7 @@ def find_weaknesses(points: int, error: float, shared: int, usual: float) -> tup
 
 
 def _summarize(found: ReportFacts) -> str:
-    frame, side = found.frame, found.length(found.frame.exemplar.side)
+    frame, side = found.frame, f"{found.frame.exemplar.side:.2f} {found.frame.unit}s"
     tests = sum(photo.tests for photo in found.photos)
     if frame.kind == "synthetic":
         first = f"{len(found.photos) - tests} photos were rendered, and {tests} for testing; their cameras are exact."
@@ -215,10 +221,68 @@ def _list_facts(found: ReportFacts) -> list[tuple[str, str]]:
     if frame.focal:
         ratio = f"{frame.focal_ratio:.3f} times EXIF's; " if frame.focal_ratio else ""
         facts.append(("Focal length", ratio + frame.focal.decision))
-    if frame.unit == "metre":
-        facts.append(("Flying height", found.length(frame.flying_height)))
     if frame.georeference:
         facts.append(("Place", f"{frame.georeference.latitude:.6f}, {frame.georeference.longitude:.6f}"))
-    elif frame.kind == "photos":
-        facts.append(("Place", "unknown: the photos have no GPS positions, or none that agree with them"))
     return facts
+
+
+def draw_map(found: ReportFacts) -> str:
+    """The coverage of the ground from above, with the exemplar and the cameras, as a data URI.
+
+    Arrows point to where a camera looks. Weakly placed photos have their names, test photos are
+    hollow.
+    """
+    frame, cover = found.frame, found.cover
+    figure = figures.make_figure(8.0, 6.4)
+    axes = figure.subplots()
+    rows, columns = cover.counts.shape
+    box = (cover.west, cover.west + columns * cover.cell, cover.south, cover.south + rows * cover.cell)
+    most = max(int(cover.counts.max()), found.need)
+    bounds = np.unique(np.linspace(found.need, most + 1, MOST_COLOURS + 1).astype(int))
+    colours = [FEW, *colormaps["viridis"](np.linspace(0.25, 1, len(bounds) - 1))]
+    norm = BoundaryNorm([1, *bounds], len(colours))  # at least two photos are needed
+    counts = np.ma.masked_equal(cover.counts, 0)
+    shown = axes.imshow(counts, ListedColormap(colours), norm, extent=box, origin="lower", interpolation="nearest")
+    figure.colorbar(shown, label=f"photos that see a place (at least {found.need} are needed)", shrink=0.7)
+    square = frame.exemplar
+    side = Rectangle((square.west, square.south), square.side, square.side, fill=False, ls="--", lw=1.5, ec="k")
+    axes.add_patch(side)
+    for photo, camera in zip(found.photos, found.model.cameras, strict=True):
+        _draw_camera(axes, camera, MARK if photo.weak else "k", photo.tests, frame.flying_height)
+        if photo.weak:
+            axes.annotate(
+                photo.name, tuple(camera.centre[:2]), (4, 4), textcoords="offset points", fontsize=7, color=MARK
+            )
+    if frame.georeference:
+        turn = np.radians(frame.georeference.north)
+        tip = np.array([0.93, 0.93]) + 0.07 * np.array([-np.sin(turn), np.cos(turn)])
+        arrow = {"arrowstyle": "<-"}
+        axes.annotate("N", (0.93, 0.93), tuple(tip), "axes fraction", "axes fraction", arrow, ha="center", va="center")
+    unit = "m" if frame.unit == "metre" else "flying heights"
+    axes.set(xlabel=f"x, {unit}", ylabel=f"y, {unit}", aspect="equal")
+    axes.autoscale()
+    file = io.BytesIO()
+    figure.savefig(file, format="png", metadata={"Software": None})
+    return _encode_uri(file.getvalue(), "png")
+
+
+def _draw_camera(axes, camera: Camera, colour: str, hollow: bool, unit: float) -> None:
+    """A dot, and an arrow of at most half a flying height to where the middle of the picture looks."""
+    start, ahead = camera.centre[:2], find_aim_point(camera) - camera.centre[:2]
+    if camera.forward[2] > -0.1:  # it looks to the horizon
+        ahead = unit * camera.forward[:2]
+    if -camera.forward[2] < np.cos(np.radians(DOWN)):
+        ahead = ahead * min(1.0, 0.5 * unit / max(float(np.linalg.norm(ahead)), 1e-12))
+        axes.annotate("", start + ahead, start, arrowprops={"arrowstyle": "->", "color": colour, "shrinkA": 0})
+    axes.plot(*start, "o", ms=5, color=colour, mfc="w" if hollow else colour)
+
+
+def make_thumbnail(path: Path) -> str:
+    """A small picture as a data URI, what is masked in pink."""
+    image, cover = image_files.read_photo_and_alpha(path)
+    small, counts = (image_files.shrink_to(part, THUMBNAIL) for part in (image, cover[..., None]))
+    return _encode_uri(figures.encode_jpeg(counts * small + (1 - counts) * (0.5 * small + 0.5 * MASKED), 80), "jpeg")
+
+
+def _encode_uri(data: bytes, kind: str) -> str:
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"

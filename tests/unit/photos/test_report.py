@@ -11,7 +11,7 @@ from fixtures.frames import scene_frame
 from dav_gswt.geometry.scene_frame import FocalLength, LeftOutPhoto, SfmSign, SfmVerdict, Square
 from dav_gswt.photos.colmap_model import transform_model
 from dav_gswt.photos.photo_set import write_photo_folder
-from dav_gswt.photos.report.page import collect_facts, find_weaknesses, list_advice, write_report
+from dav_gswt.photos.report import collect_facts, find_weaknesses, list_advice, write_report
 
 FRAME = scene_frame(
     kind="photos",
