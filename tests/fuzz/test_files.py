@@ -171,6 +171,12 @@ READERS = [
         350,
     ),
     Reader(
+        "nerfstudio",
+        lambda folder: write_json(folder / "model.json", imported_models.transforms()),
+        read_model,
+        is_model,
+    ),
+    Reader(
         "OpenSfM",
         lambda folder: write_json(folder / "model.json", imported_models.reconstruction()),
         read_model,

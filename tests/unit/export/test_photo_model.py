@@ -16,6 +16,7 @@ from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import CapturedPhoto, list_taken_photos, write_capture_record
 from dav_gswt.photos.colmap_model import read_colmap_model
+from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.view_split import ViewSplit
 
 HALF = 1.0
@@ -92,15 +93,15 @@ def test_points_lie_where_the_photos_see_them(written, known):
     assert np.ptp(colours.mean(1)) > 30  # of the pictures, not the model's grey
 
 
-def test_transforms_json_has_the_cameras_with_the_axes_of_opengl(written, taken):
-    values = json.loads((written / "transforms.json").read_text())
-    assert tuple(frame["file_path"] for frame in values["frames"]) == tuple(f"images/{name}" for name in NAMES)
-    for frame, photo in zip(values["frames"], taken, strict=True):
-        camera, pose = photo.camera, np.array(frame["transform_matrix"])
-        assert pytest.approx(camera.rotation, abs=1e-9) == (pose[:3, :3] * [1, -1, -1]).T
-        assert pose[:3, 3] == pytest.approx(camera.centre, abs=1e-9)
-        lens = [(frame | values)[key] if key in values else frame[key] for key in ("fl_x", "fl_y", "cx", "cy")]
-        assert lens == pytest.approx([camera.fx, camera.fy, camera.cx, camera.cy])
+def test_the_importer_reads_the_poses_of_transforms_json_back(written, taken):
+    path = written / "transforms.json"
+    read = import_nerfstudio(path, json.loads(path.read_text()), written, lambda name: None)
+    assert tuple(shot.name for shot in read.shots) == tuple(f"images/{name}" for name in NAMES)
+    for shot, photo in zip(read.shots, taken, strict=True):
+        camera = photo.camera
+        assert shot.rotation == pytest.approx(camera.rotation, abs=1e-9)
+        assert shot.translation == pytest.approx(camera.translation, abs=1e-9)
+        assert shot.lens.params == pytest.approx(np.array([camera.fx, camera.fy, camera.cx, camera.cy]))
     stored = read_colmap_model(written / "sparse/0")
     rows = PlyData.read(str(written / "sparse_pc.ply"))["vertex"].data
     assert np.stack([rows[axis] for axis in "xyz"], -1) == pytest.approx(stored.points, abs=1e-6)

@@ -1,17 +1,22 @@
-"""Camera models of other programs: one made-up scene in two formats, the same cameras, pictures and points."""
+"""Camera models of other programs: one made-up scene in three formats, the same cameras, pictures and points."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 import pycolmap
 import pytest
 from fixtures import imported_models as made
 from fixtures.imported_models import (
+    HEIGHT,
     NUMBERS,
     SCENE,
+    WIDTH,
     WORLD,
     reconstruction,
     shoot,
+    transforms,
     write_colmap,
     write_json,
 )
@@ -21,6 +26,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos import importers
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
 from dav_gswt.photos.importers import import_model
+from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.photo_matching import PhotoFolder
 from dav_gswt.photos.importers.points import triangulate_features
 from dav_gswt.photos.photo_set import prepare_photos
@@ -49,12 +55,13 @@ def found_once():
 
 
 @pytest.fixture(scope="module")
-def read(photos, found_once, tmp_path_factory):
-    """The scene read from each of the formats."""
+def three(photos, found_once, tmp_path_factory):
+    """The scene read from each of the three formats."""
     folder = tmp_path_factory.mktemp("models")
     write_colmap(folder / "colmap")
     sources = {
         "colmap": folder / "colmap",
+        "nerfstudio": write_json(folder / "transforms.json", transforms()),
         "opensfm": write_json(folder / "reconstruction.json", reconstruction()),
     }
     with pytest.MonkeyPatch.context() as patch:
@@ -62,9 +69,9 @@ def read(photos, found_once, tmp_path_factory):
         return {kind: import_model(path, photos, OPTIONS) for kind, path in sources.items()}
 
 
-@pytest.mark.parametrize("kind", ["colmap", "opensfm"])
-def test_cameras_pictures_and_points_are_those_of_the_scene(read, kind):
-    found, one = read[kind], read["colmap"]
+@pytest.mark.parametrize("kind", ["colmap", "nerfstudio", "opensfm"])
+def test_cameras_pictures_and_points_are_those_of_the_scene(three, kind):
+    found, one = three[kind], three["colmap"]
     assert found.model.names == SCENE.names and not found.left_out
     for i, camera in enumerate(found.model.cameras):
         assert camera.rotation == pytest.approx(SCENE.rotations[i], abs=1e-9)
@@ -75,8 +82,8 @@ def test_cameras_pictures_and_points_are_those_of_the_scene(read, kind):
     assert found.model.points == pytest.approx(one.model.points, abs=1e-5)
 
 
-def test_points_lie_on_the_ground(read):
-    found = read["colmap"]
+def test_points_lie_on_the_ground(three):
+    found = three["colmap"]
     assert len(found.model.points) > 200
     # Features lie a fifth of a pixel of 1/300 off; over base lines of a fifth of the height that is five times as much.
     assert np.median(np.abs(found.model.points @ WORLD[:, 2])) < 0.003
@@ -133,14 +140,31 @@ def test_names_are_found_by_path_then_by_stem(tmp_path):
 
 
 def test_one_photo_of_two_images_and_fewer_than_three_photos_are_refused(tmp_path, photos):
-    values = reconstruction()
-    shots = values[0]["shots"]
-    shots["elsewhere/000.jpg"] = shots["000.png"]
+    values = transforms()
+    values["frames"][1]["file_path"] = "elsewhere/000.jpg"
     with pytest.raises(InputError, match=r"are one photo: 000.png"):
-        import_model(write_json(tmp_path / "r.json", values), photos, OPTIONS)
-    values[0]["shots"] = dict(list(shots.items())[:2])
+        import_model(write_json(tmp_path / "t.json", values), photos, OPTIONS)
+    values["frames"] = transforms()["frames"][:2]
     with pytest.raises(InputError, match="2 of its 2 images have a photo"):
-        import_model(write_json(tmp_path / "r.json", values), photos, OPTIONS)
+        import_model(write_json(tmp_path / "t.json", values), photos, OPTIONS)
+
+
+def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path):
+    """Programs that make models read the stored picture; we read the upright one. What is seen where stays."""
+    shoot(tmp_path / "plain")
+    for path in sorted((tmp_path / "plain").iterdir()):
+        spec = oiio.ImageSpec(WIDTH, HEIGHT, 3, oiio.UINT8)
+        spec["Orientation"] = 6
+        (tmp_path / "tagged").mkdir(exist_ok=True)
+        file = oiio.ImageOutput.create("x.tif")
+        assert file.open(str(tmp_path / "tagged" / f"{path.stem}.tif"), spec)
+        file.write_image(np.rint(image_files.read_photo(path) * 255).astype(np.uint8))
+        file.close()
+    write_colmap(tmp_path / "m", [f"{n[:3]}.tif" for n in SCENE.names], sees=True)
+    found = import_model(tmp_path / "m", tmp_path / "tagged", OPTIONS)
+    upright = image_files.read_size(tmp_path / "tagged" / "000.tif")
+    assert (found.lenses[0].width, found.lenses[0].height) == upright
+    assert reprojection_errors(found.model).max() < 1e-4
 
 
 def test_the_stage_goes_on_from_a_given_model(photos, found_once, tmp_path, monkeypatch):
@@ -166,3 +190,29 @@ def test_of_several_reconstructions_the_largest_is_taken_and_a_reference_makes_i
     assert found.positions.at == pytest.approx(np.array([c.centre for c in found.model.cameras]))
     whole["reference_lla"] = dict.fromkeys(whole["reference_lla"], 0.0)  # what OpenSfM counts from without GPS
     assert importers._read_model(write_json(tmp_path / "r.json", [whole]), PhotoFolder(photos)).about is None
+
+
+def read_transforms(values, photos):
+    return import_nerfstudio(Path("t.json"), values, photos, PhotoFolder(photos).stored_size)
+
+
+def test_frames_may_have_intrinsics_of_their_own_and_a_field_of_view_instead(photos):
+    values = transforms()
+    angle = 2 * np.arctan(0.5 * WIDTH / 310.0)
+    values["frames"][3] |= {"camera_angle_x": angle, "fl_y": 311.0, "cx": 150.0, "k1": 0.0, "camera_model": "OPENCV"}
+    given = read_transforms(values, photos)
+    own = [310, 311, 150, *NUMBERS[3:4], 0, *NUMBERS[5:]]
+    assert given.shots[3].lens.params == pytest.approx(np.array(own))
+    assert given.shots[2].lens.params == pytest.approx(np.array(NUMBERS))
+
+
+def test_a_file_without_sizes_takes_those_of_the_photos(photos):
+    """Blender's scenes name no suffix."""
+    frames = transforms()["frames"]
+    for frame in frames:
+        frame["file_path"] = "./train/" + frame["file_path"].removesuffix(".png")
+    angle = 2 * np.arctan(0.5 * WIDTH / 300.0)
+    given = read_transforms({"camera_angle_x": angle, "frames": frames}, photos)
+    assert given.shots[0].lens.model_name == "PINHOLE"
+    assert given.shots[0].lens.params == pytest.approx(np.array([300, 300, WIDTH / 2, HEIGHT / 2]))
+    assert np.array([shot.translation for shot in given.shots]) == pytest.approx(SCENE.translations)

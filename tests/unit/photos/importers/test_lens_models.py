@@ -1,13 +1,15 @@
 """Lenses of other programs: their own formulas against the cameras that stand for them, and what no lens can be."""
 
 import numpy as np
+import pycolmap
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos.importers import opensfm
+from dav_gswt.photos.importers import lens_models, nerfstudio, opensfm
 from dav_gswt.photos.importers.lens_models import (
     fit_camera_to_photo,
     make_camera,
+    make_perspective_camera,
     undistort_camera,
     unproject_pixels,
 )
@@ -66,21 +68,62 @@ def test_a_portrait_picture_of_opensfm_is_measured_by_its_height():
     assert found.params[:4] == pytest.approx(np.array([0.8 * W, 0.8 * W, H / 2, W / 2]))
 
 
-def test_a_lens_must_fit_the_photo_as_exif_turns_it():
-    camera = make_camera("PINHOLE", H, W, (320.0, 320.0, H / 2, W / 2), "")
-    same = fit_camera_to_photo(camera, (W, H), 6, "there")
-    assert (same.width, same.height) == (H, W)
-    for orientation in (3, 6):
-        with pytest.raises(InputError, match="there: its EXIF orientation turns the photo"):
-            fit_camera_to_photo(
-                make_camera("PINHOLE", W, H, (320.0, 320.0, 200.0, 150.0), ""), (W, H), orientation, "there"
-            )
+@pytest.mark.parametrize(
+    "said, formula",
+    [
+        ({"camera_model": "OPENCV"}, lambda *a: brown(*a, K[:3], P)),
+        ({"camera_model": "OPENCV_FISHEYE", "p1": 0, "p2": 0, "k4": K[3]}, lambda *a: bent(*a, K)),
+        ({"is_fisheye": True, "p1": 0, "p2": 0, "k4": K[3]}, lambda *a: bent(*a, K)),
+        ({"k1": 0, "k2": 0, "k3": 0, "p1": 0, "p2": 0}, lambda *a: brown(*a, (), (0, 0))),
+    ],
+)
+def test_nerfstudio_cameras_project_as_its_own_formula_says(said, formula):
+    base = {"w": W, "h": H, "fl_x": 320.0, "fl_y": 322.0, "cx": 203.0, "cy": 148.0}
+    base |= {"k1": K[0], "k2": K[1], "k3": K[2], "p1": P[0], "p2": P[1]}
+    wanted = nerfstudio._intrinsics(base | said, {}, "x", lambda name: None, "there")
+    found = nerfstudio._lens(dict(wanted), "there")
+    assert found.img_from_cam(RAYS) == pytest.approx(formula(RAYS, 320.0, 322.0, 203.0, 148.0), abs=1e-9)
+
+
+MODELS = [n for n in pycolmap.CameraModelId.__members__ if n not in ("INVALID", "EQUIRECTANGULAR")]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_turned_lens_sees_turned_rays_at_turned_places(name):
+    """Every model of COLMAP's: clockwise once, (x, y) is at (height - y, x)."""
+    plain = pycolmap.Camera.create_from_model_name(1, name, 320.0, W, H)
+    params = plain.params.copy()
+    small = RNG.uniform(-0.03, 0.03, len(params))
+    for i in plain.extra_params_idxs():
+        params[i] += small[i] if name not in ("FOV", "EUCM") else abs(small[i])
+    for i in plain.principal_point_idxs():
+        params[i] += 100 * small[i]
+    if len(plain.focal_length_idxs()) == 2:
+        params[plain.focal_length_idxs()[1]] += 4
+    plain.params = params
+    for turns, orientation in ((1, 6), (2, 3), (3, 8)):
+        turned, count = fit_camera_to_photo(plain, (W, H), orientation, "there")
+        at = np.asarray(plain.img_from_cam(RAYS))
+        size = np.array([W, H])
+        for _ in range(turns):
+            at, size = np.c_[size[1] - at[:, 1], at[:, 0]], size[::-1]
+        rays = RAYS @ np.linalg.matrix_power(lens_models.QUARTER, turns).T
+        assert count == turns and (turned.width, turned.height) == tuple(size)
+        assert turned.img_from_cam(np.ascontiguousarray(rays)) == pytest.approx(at, abs=1e-9)
+
+
+def test_a_lens_that_fits_the_upright_photo_alone_is_not_turned_and_mirrored_photos_are_refused():
+    camera = make_perspective_camera(H, W, (320.0, 320.0, H / 2, W / 2))
+    same, turns = fit_camera_to_photo(camera, (W, H), 6, "there")
+    assert turns == 0 and (same.width, same.height) == (H, W)
+    with pytest.raises(InputError, match="there: its EXIF orientation mirrors"):
+        fit_camera_to_photo(make_perspective_camera(W, H, (320.0, 320.0, 200.0, 150.0)), (W, H), 2, "there")
 
 
 def test_a_scaled_copy_fits_and_another_shape_does_not():
     camera = make_camera("PINHOLE", W, H, (320.0, 320.0, 200.0, 150.0), "")
     for size in ((133, 100), (4000, 3000), (401, 300)):
-        found = fit_camera_to_photo(camera, size, 1, "there")
+        found, _ = fit_camera_to_photo(camera, size, 1, "there")
         assert found.focal_length_x == pytest.approx(320 * size[0] / W)
     for size in ((400, 296), (4000, 2980)):
         with pytest.raises(InputError, match="there: the photo has"):

@@ -41,6 +41,37 @@ def put(values, where, value):
     return values
 
 
+SHEARED = (np.eye(4) + np.diag([0.01, 0, 0], 1)).tolist()
+
+
+@pytest.mark.parametrize(
+    "where, value, match",
+    [
+        (["frames"], 7, "frames is not a list"),
+        (["frames", 2], "x", "frame 2: file_path is missing"),
+        (["frames", 2, "file_path"], "../../secret.png", "secret.png' leads out"),
+        (["frames", 2, "file_path"], "C:\\photos\\1.png", "leads out of the photos' folder"),
+        (["frames", 2, "file_path"], "a\0b.png", "is no name of a picture"),
+        (["frames", 2, "file_path"], "./001.png", "001.png is there twice"),
+        (["frames", 2, "transform_matrix"], [[1, 2], [3, 4]], "frame 002.png: transform_matrix does not hold 3 x 4"),
+        (["frames", 2, "transform_matrix"], SHEARED, "frame 002.png: transform_matrix: its rotation is none"),
+        (["frames", 2, "transform_matrix"], np.diag([-1.0, 1, 1, 1]).tolist(), "frame 002.png: .*rotation is none"),
+        (["frames", 2, "transform_matrix", 0, 3], float("nan"), "frame 002.png: transform_matrix is 'nan'"),
+        (["frames", 2, "transform_matrix", 0, 3], 10**400, "frame 002.png: transform_matrix is '1000"),
+        (["frames", 2, "transform_matrix", 3], [0, 0, 1, 1], "its last row is not 0 0 0 1"),
+        (["fl_x"], ..., "frame 000.png: neither fl_x nor camera_angle_x"),
+        (["fl_x"], -300, "frame 000.png: focal lengths -300"),
+        (["frames", 2, "camera_angle_x"], 4.0, "camera_angle_x is 4; a field of view"),
+        (["w"], 0, "frame 000.png: w is 0"),
+        (["w"], 999999, "pixels; 1 pixel to"),
+        (["k4"], 0.1, "frame 000.png: k4 is not read with camera_model OPENCV"),
+        (["camera_model"], "EQUIRECTANGULAR", "camera_model EQUIRECTANGULAR is not read"),
+    ],
+)
+def test_transforms_that_cannot_be_are_refused_by_key(photos, tmp_path, where, value, match):
+    refused(made.write_json(tmp_path / "transforms.json", put(made.transforms(), where, value)), photos, match)
+
+
 @pytest.mark.parametrize(
     "where, value, match",
     [
@@ -67,8 +98,8 @@ def test_reconstructions_that_cannot_be_are_refused_by_key(photos, tmp_path, whe
     "text, match",
     [
         ("[" * 100_000, "not readable as JSON"),
-        ('[{"a": 1}]', "not a reconstruction.json"),
-        ('{"shots": [], "shots": []}', "the key 'shots' is there twice"),
+        ('[{"a": 1}]', "neither a transforms.json"),
+        ('{"frames": [], "frames": []}', "the key 'frames' is there twice"),
     ],
 )
 def test_other_files_are_refused(photos, tmp_path, text, match):

@@ -212,7 +212,7 @@ class PhotoScene(_PhotographedScene):
         read_by=REGISTERED,
     )
     model: Text | None = key(
-        "known cameras: a COLMAP folder, or `reconstruction.json` of OpenSfM",
+        "known cameras: a COLMAP folder, `transforms.json` (nerfstudio) or `reconstruction.json` (OpenSfM)",
         None,
         read_by=REGISTERED,
     )

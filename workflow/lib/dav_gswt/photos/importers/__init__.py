@@ -1,8 +1,9 @@
 """Import of camera models, which take the place of structure from motion.
 
-`import_model` takes a folder of COLMAP or a reconstruction.json (OpenSfM, OpenDroneMap), and returns
-a `Registration`. Positions stay in the world of the model. A further format needs a reader that
-returns an `ImportedModel`, and a line in `_read_model`.
+`import_model` takes a folder of COLMAP, a transforms.json (nerfstudio, instant-ngp) or a
+reconstruction.json (OpenSfM, OpenDroneMap), and returns a `Registration`. Positions stay in the
+world of the model. A further format needs a reader that returns an `ImportedModel`, and a line in
+`_read_model`.
 """
 
 import logging
@@ -18,6 +19,7 @@ from dav_gswt.photos.colmap_model import ColmapModel
 from dav_gswt.photos.importers.checks import ImportedModel, read_untrusted_json
 from dav_gswt.photos.importers.colmap import find_colmap_folder, import_colmap
 from dav_gswt.photos.importers.lens_models import camera_key, undistort_camera
+from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.opensfm import import_opensfm
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder, match_photos_to_images
 from dav_gswt.photos.importers.points import Observations, collect_observations, triangulate_features
@@ -78,15 +80,17 @@ def _read_model(path: Path, photos: PhotoFolder) -> ImportedModel:
         if model := find_colmap_folder(path):
             return import_colmap(model, photos.folder)
         raise InputError(
-            f"{path}: no COLMAP model in this folder (cameras and images, as .bin or .txt); of OpenSfM name the file "
-            "itself, reconstruction.json"
+            f"{path}: no COLMAP model in this folder (cameras and images, as .bin or .txt); of other programs name the "
+            "file itself, transforms.json or reconstruction.json"
         )
     values = read_untrusted_json(path)
+    if isinstance(values, dict) and "frames" in values:
+        return import_nerfstudio(path, values, photos.folder, photos.stored_size)
     if isinstance(values, list) and values and isinstance(values[0], dict) and "shots" in values[0]:
         return import_opensfm(path, values, photos.folder)
     raise InputError(
-        f"{path}: not a reconstruction.json of OpenSfM (a list of objects with `shots`); name such a file, or a folder "
-        "of COLMAP's (nerfstudio keeps one beside its transforms.json)"
+        f"{path}: neither a transforms.json (an object with `frames`) nor a reconstruction.json (a list of objects "
+        "with `shots`); name one of these, or a folder of COLMAP's"
     )
 
 

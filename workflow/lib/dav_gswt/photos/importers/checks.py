@@ -32,11 +32,12 @@ class ImportedImage:
     """One image of a model. A world point p has camera coordinates rotation @ p + translation (x
     right, y down).
 
-    name: relative to the photos' folder, with slashes. lens: at the size that the model gives.
+    name: relative to the photos' folder, with slashes. lens: at the size that the model gives, of the picture as it is
+    stored; None where no size is known because there is no such photo.
     """
 
     name: str
-    lens: pycolmap.Camera
+    lens: pycolmap.Camera | None
     rotation: Float[Array, "3 3"]
     translation: Float[Array, "3"]
 
@@ -108,11 +109,13 @@ def check_number(value, where: str) -> float:
     raise InputError(f"{where} is {str(value)[:40]!r}, which is no finite number; correct it or export the file again")
 
 
-def check_numbers(values, count: int, where: str) -> Array:
-    """A list of finite numbers as an array. Raises: InputError: of another length, or a number that is not finite."""
-    if not isinstance(values, list) or len(values) != count:
-        raise InputError(f"{where} does not hold {count} numbers; export the file again")
-    return np.array([check_number(v, where) for v in values])
+def check_numbers(values, shape: tuple[int, ...], where: str) -> Array:
+    """Nested lists of finite numbers as an array. Raises: InputError: another shape, or a number that is not finite."""
+    if not isinstance(values, list) or len(values) != shape[0]:
+        raise InputError(f"{where} does not hold {' x '.join(map(str, shape))} numbers; export the file again")
+    if len(shape) == 1:
+        return np.array([check_number(v, where) for v in values])
+    return np.array([check_numbers(row, shape[1:], where) for row in values])
 
 
 def check_finite(values: Array, where: str) -> Array:

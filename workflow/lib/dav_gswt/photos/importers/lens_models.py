@@ -9,8 +9,33 @@ from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 
 FOCAL = (0.01, 1000.0)  # in longer sides: beyond, the number is in another unit
+QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # turns the picture clockwise: right becomes down
+TURNS = {1: 0, 6: 1, 3: 2, 8: 3}  # quarter turns clockwise that EXIF's orientation asks for; the others mirror
 STRAY = 2.0  # pixels by which a pinhole's border may look past the photo's
+_SWAPPED = {"fx": "fy", "fy": "fx", "cy": "cx"}
 _MODELS = pycolmap.CameraModelId.__members__
+
+
+def make_perspective_camera(
+    width: int, height: int, pinhole: tuple, k: tuple = (), p: tuple = (), where: str = ""
+) -> pycolmap.Camera:
+    """A lens after Brown. pinhole: fx, fy, cx, cy. k: up to three radial terms; p: OpenCV's two tangential ones.
+
+    With x, y before the camera at depth 1 and r^2 = x^2 + y^2 the picture is at
+    x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and y likewise with p1 and p2 exchanged.
+    """
+    k1, k2, k3 = (*k, 0.0, 0.0, 0.0)[:3]
+    p1, p2 = (*p, 0.0, 0.0)[:2]
+    if k3:
+        return make_camera("FULL_OPENCV", width, height, (*pinhole, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0), where)
+    if k1 or k2 or p1 or p2:
+        return make_camera("OPENCV", width, height, (*pinhole, k1, k2, p1, p2), where)
+    return make_camera("PINHOLE", width, height, pinhole, where)
+
+
+def make_fisheye_camera(width: int, height: int, pinhole: tuple, k: tuple = (), where: str = "") -> pycolmap.Camera:
+    """A fisheye after Kannala and Brandt: a ray at the angle t off the axis lands at t (1 + k1 t^2 + ... + k4 t^8)."""
+    return make_camera("OPENCV_FISHEYE", width, height, (*pinhole, *(*k, 0.0, 0.0, 0.0, 0.0)[:4]), where)
 
 
 def make_camera(model: str, width: int, height: int, params: tuple, where: str) -> pycolmap.Camera:
@@ -34,24 +59,27 @@ def make_camera(model: str, width: int, height: int, params: tuple, where: str) 
 
 def fit_camera_to_photo(
     camera: pycolmap.Camera, stored: tuple[int, int], orientation: int, where: str
-) -> pycolmap.Camera:
-    """The lens at the size of its photo, which may be a scaled copy of what the model was made of.
+) -> tuple[pycolmap.Camera, int]:
+    """The lens at the size of its photo as it is seen upright, and the quarter turns clockwise that this took.
 
-    stored: width and height before EXIF's orientation is applied.
-    Raises: InputError: another shape, or the model was made of a picture that EXIF's orientation turns.
+    The photo may be a scaled copy of what the model was made of. stored: width and height before EXIF's orientation is
+    applied: programs that make models do not apply it, so a lens that fits the stored picture is turned with it.
+    Raises: InputError: another shape, or a mirroring orientation.
     """
     upright = (stored[1], stored[0]) if orientation >= 5 else stored
-    if not _same_shape(camera, upright) and not _same_shape(camera, stored):
-        raise InputError(
-            f"{where}: the photo has {upright[0]} x {upright[1]} pixels, its camera in the model {camera.width} x "
-            f"{camera.height}, another shape; use the pictures that the model was made of (not cut, not undistorted)"
-        )
-    if orientation != 1 and _same_shape(camera, stored):
-        raise InputError(
-            f"{where}: its EXIF orientation turns the photo, but its camera is that of the unturned picture; remove "
-            "the tag (exiftool -Orientation= FILE)"
-        )
-    return _scale_camera(camera, *upright)
+    if _same_shape(camera, stored):
+        if orientation not in TURNS:
+            raise InputError(f"{where}: its EXIF orientation mirrors it; save it upright and without that tag")
+        camera = _scale_camera(camera, *stored)
+        for _ in range(TURNS[orientation]):
+            camera = _turn_camera(camera)
+        return camera, TURNS[orientation]
+    if _same_shape(camera, upright):
+        return _scale_camera(camera, *upright), 0
+    raise InputError(
+        f"{where}: the photo has {upright[0]} x {upright[1]} pixels, its camera in the model {camera.width} x "
+        f"{camera.height}, another shape; use the pictures that the model was made of (not cut, not undistorted)"
+    )
 
 
 def undistort_camera(camera: pycolmap.Camera, side: int, where: str) -> tuple[pycolmap.Camera, pycolmap.Camera]:
@@ -114,3 +142,21 @@ def _scale_camera(camera: pycolmap.Camera, width: int, height: int) -> pycolmap.
     if (camera.width, camera.height) != (width, height):
         camera.rescale(width, height)
     return camera
+
+
+def _turn_camera(camera: pycolmap.Camera) -> pycolmap.Camera:
+    """The lens of the picture turned clockwise by 90 degrees: (x, y) is seen at (height - y, x).
+
+    Radial terms stay; tangential and prism terms are vectors in the picture and turn with it.
+    """
+    names = camera.params_info.split(", ")
+    old = dict(zip(names, camera.params.tolist(), strict=True))
+    new = old | {a: old[b] for a, b in _SWAPPED.items() if a in old} | {"cx": camera.height - old["cy"]}
+    vectors = [("p2", "p1"), ("sx1", "sy1")]  # OpenCV's p2 acts along x
+    if camera.model_name == "RAD_TAN_THIN_PRISM_FISHEYE":
+        vectors = [("p0", "p1"), ("s0", "s2"), ("s1", "s3")]
+    for right, down in vectors:
+        if right in old:
+            new[right], new[down] = -old[down], old[right]
+    params = [new[n] for n in names]
+    return pycolmap.Camera(model=camera.model_name, width=camera.height, height=camera.width, params=params)

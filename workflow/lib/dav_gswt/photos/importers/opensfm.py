@@ -22,7 +22,7 @@ from dav_gswt.photos.importers.checks import (
     check_number,
     check_numbers,
 )
-from dav_gswt.photos.importers.lens_models import make_camera
+from dav_gswt.photos.importers.lens_models import make_fisheye_camera, make_perspective_camera
 
 _log = logging.getLogger(__name__)
 
@@ -97,13 +97,10 @@ def _lens(camera, where: str) -> pycolmap.Camera:
     cx, cy = (0.0, 0.0) if kind in _ONE_FOCAL else (read_value("c_x", 0.0), read_value("c_y", 0.0))
     pinhole = (fx * side, fy * side, cx * side + width / 2, cy * side + height / 2)
     k = tuple(read_value(f"k{i + 1}", 0.0) for i in range((RADIAL | FISHEYE)[kind]))
-    if kind in FISHEYE:  # after Kannala and Brandt: a ray at the angle t lands at t (1 + k1 t^2 + ... + k4 t^8)
-        return make_camera("OPENCV_FISHEYE", width, height, (*pinhole, *(*k, 0.0, 0.0)[:4]), where)
-    k1, k2, k3 = (*k, 0.0, 0.0)[:3]
-    p = (read_value("p1", 0.0), read_value("p2", 0.0)) if kind == "brown" else (0.0, 0.0)
-    if k3:
-        return make_camera("FULL_OPENCV", width, height, (*pinhole, k1, k2, *p, k3, 0.0, 0.0, 0.0), where)
-    return make_camera("OPENCV", width, height, (*pinhole, k1, k2, *p), where)
+    if kind in FISHEYE:
+        return make_fisheye_camera(width, height, pinhole, k, where)
+    p = (read_value("p1", 0.0), read_value("p2", 0.0)) if kind == "brown" else ()
+    return make_perspective_camera(width, height, pinhole, k, p, where)
 
 
 def _read_shot(label: str, shot, cameras: dict[str, pycolmap.Camera], photos: Path, path: Path) -> ImportedImage:
@@ -112,8 +109,8 @@ def _read_shot(label: str, shot, cameras: dict[str, pycolmap.Camera], photos: Pa
     camera = check_entry(shot, "camera", str, where)
     if camera not in cameras:
         raise InputError(f"{where}: there is no camera {camera[:80]!r}; export the file again")
-    axis = check_numbers(check_entry(shot, "rotation", list, where), 3, f"{where}: rotation")
-    shift = check_numbers(check_entry(shot, "translation", list, where), 3, f"{where}: translation")
+    axis = check_numbers(check_entry(shot, "rotation", list, where), (3,), f"{where}: rotation")
+    shift = check_numbers(check_entry(shot, "translation", list, where), (3,), f"{where}: translation")
     if not np.abs(axis).max() < 100:  # a few full turns at most, in radians
         raise InputError(
             f"{where}: rotation {axis.tolist()} is no axis times an angle in radians; export the file again"

@@ -5,12 +5,14 @@ from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+import numpy as np
 import pycolmap
 from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
+from dav_gswt.photos.importers import lens_models
 from dav_gswt.photos.importers.checks import ImportedModel
 from dav_gswt.photos.importers.lens_models import fit_camera_to_photo
 from dav_gswt.photos.photo_files import name_pictures, split_stem
@@ -18,12 +20,17 @@ from dav_gswt.photos.photo_files import name_pictures, split_stem
 
 @dataclass(frozen=True)
 class MatchedPhoto:
-    """A photo and its camera. lens: at the photo's size. index: of the shot in the model."""
+    """A photo and its place. lens: upright, at the photo's size. index: of the shot in the model.
+
+    turns: quarter turns clockwise from the picture that the model speaks of to the upright one; rotation and
+    translation are the upright camera's.
+    """
 
     path: Path
     key: str
     index: int
     lens: pycolmap.Camera
+    turns: int
     rotation: Float[Array, "3 3"]
     translation: Float[Array, "3"]
 
@@ -51,6 +58,11 @@ class PhotoFolder:
             return name
         found = self._stems.get(split_stem(name), [])
         return found[0] if len(found) == 1 else None
+
+    def stored_size(self, name: str) -> tuple[int, int] | None:
+        """Width and height of a photo as stored, without EXIF's orientation; None where there is no such photo."""
+        found = self.find(name)
+        return None if found is None else image_files.read_stored_size(self.photos[found])[:2]
 
 
 def match_photos_to_images(
@@ -80,6 +92,8 @@ def match_photos_to_images(
     for name, key in zip(names, name_pictures(names), strict=True):
         shot, path = given.shots[owners[name]], folder.photos[name]
         width, height, orientation = image_files.read_stored_size(path)
-        lens = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
-        out.append(MatchedPhoto(path, key, owners[name], lens, shot.rotation, shot.translation))
+        assert shot.lens is not None  # its photo is there, so its size is known
+        lens, turns = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
+        turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
+        out.append(MatchedPhoto(path, key, owners[name], lens, turns, turn @ shot.rotation, turn @ shot.translation))
     return sorted(out, key=lambda p: p.key), tuple(left_out)

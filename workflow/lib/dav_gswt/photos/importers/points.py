@@ -16,6 +16,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
+from dav_gswt.photos.importers import lens_models
 from dav_gswt.photos.importers.checks import ImportedModel
 from dav_gswt.photos.importers.lens_models import camera_key, shrink_camera, unproject_pixels
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto
@@ -43,25 +44,29 @@ def collect_observations(given: ImportedModel, placed: Sequence[MatchedPhoto]) -
     views = []
     for place in placed:
         shot, own = given.shots[place.index], given.image_of == place.index
+        assert shot.lens is not None  # its photo is there, so its size is known
         views.append((shot.lens, shot.rotation, shot.translation, given.point_of[own], given.pixels[own]))
-    return _unproject_views(given.points, given.colours, views)
+    turns = [np.linalg.matrix_power(lens_models.QUARTER, place.turns)[:2, :2] for place in placed]
+    return _unproject_views(given.points, given.colours, views, turns)
 
 
 def _unproject_views(
-    points: Float[Array, "n 3"], colours: Float32[Array, "n 3"], views: Sequence[tuple]
+    points: Float[Array, "n 3"], colours: Float32[Array, "n 3"], views: Sequence[tuple], turns: Sequence[Array]
 ) -> Observations:
-    """Observations as rays, without those that the lens cannot have made.
+    """Observations as rays. views: of each photo its lens, rotation, translation, and which points
+    it sees where.
 
-    views: of each photo its lens, rotation, translation, and which points it sees where.
+    turns: rotation of each photo's rays about its axis. Observations that the lens cannot have made
+    are left out.
     """
     errors, rays, point_of = [], [], []
-    for lens, rotation, translation, which, pixels in views:
+    for (lens, rotation, translation, which, pixels), turn in zip(views, turns, strict=True):
         found = unproject_pixels(lens, pixels)
         known = np.isfinite(found).all(1)
         at = points[which[known]] @ rotation.T + translation
         seen = np.asarray(lens.img_from_cam(np.ascontiguousarray(at))).reshape(-1, 2)  # NaN behind the camera
         errors.append(np.linalg.norm(seen - pixels[known], axis=1))
-        rays.append(found[known])
+        rays.append(found[known] @ turn.T)
         point_of.append(which[known])
     image_of = np.repeat(np.arange(len(rays)), [len(own) for own in rays])
     every = np.concatenate(errors)
@@ -120,5 +125,5 @@ def _read_observations(found: pycolmap.Reconstruction, photos: int, middle: Arra
         which = np.searchsorted(ids, own[:, 0].astype(np.int64))
         pose = image.cam_from_world().matrix()
         views.append((found.cameras[image.camera_id], pose[:, :3], pose[:, 3], which, own[:, 1:]))
-    seen = _unproject_views(points, colours, views)
+    seen = _unproject_views(points, colours, views, [np.eye(2)] * photos)
     return replace(seen, points=points + middle)
