@@ -55,23 +55,6 @@ def test_a_policy_that_reads_the_prior_makes_the_same_bytes_on_any_number_of_thr
     assert made[0] == made[1]
 
 
-def test_a_budget_ends_inside_a_round_and_later_rounds_hand_the_field_on(snakemake, tiny, tmp_path):
-    """Five photos to start from, six in all: round 1 takes one instead of two, round 2 none."""
-    folder = shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)
-    branch = folder / "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k2_upto6"
-    first, then = branch / "iter1", branch / "iter2"
-    targets = [str((r / "metrics.json").relative_to(folder)) for r in (first, then)]
-    snakemake(folder, "--cores", "2", *targets, configs=(USUAL, TINY))
-    for name in ("field.ply", "ground.exr"):
-        assert digest_files(first / name) == digest_files(then / name) != digest_files(tiny.coarse / name)
-    assert [len(read_json(r / "poses.json")["poses"]) for r in (first, then)] == [1, 0]
-    assert read_json(then / "capture/capture.json")["shots"] == []
-    before, after = read_json(first / "metrics.json"), read_json(then / "metrics.json")
-    assert before["photos"] == after["photos"] == 6 and before["psnr"] == after["psnr"]
-    assert before["stopped"] is None and after["stopped"] == "after 6 photos: 6 in all may be taken (stop.photos)"
-    assert before["fit"]["earlier_views"]["photos"] == 5 and after["fit"]["new_views"]["photos"] == 0
-
-
 def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, snakemake, tmp_path):
     folder = tmp_path / "completed"
     shutil.copytree(tiny.folder, folder)

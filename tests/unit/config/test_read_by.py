@@ -43,7 +43,7 @@ def test_a_key_that_a_rule_is_not_given_has_no_default(read):
 
 def test_keys_follow_from_the_rule_and_the_agent():
     read = {agent: set(select_keys(PhotoScene, "score_coarse", photo_scene(agent))) for agent in ("replay", "plan")}
-    assert read == {"replay": {"agent"}, "plan": {"agent", "candidates", "min_elevation", "drone"}}
+    assert read == {"replay": {"agent"}, "plan": {"agent", "candidates", "drone"}}
     assert select_keys(PhotoScene, "score_coarse", photo_scene("plan"))["drone"] == {"min_altitude": 2.0}
     assert "clearance" in select_keys(PhotoScene, "request_views", photo_scene("plan"))["drone"]
     assert is_read(PhotoScene, "score_coarse", "rig.limits", "serial")

@@ -40,9 +40,6 @@ class BandPrior:
         planes = [self.light * colour, condition.alpha[..., None], condition.inverse_depth[..., None]]
         return np.repeat(np.concatenate(planes, -1).transpose(0, 3, 1, 2)[:, None], m, 1).astype(np.float32)
 
-    def encode_render(self, condition):
-        return np.concatenate([condition.colour, condition.alpha[..., None]], -1).transpose(0, 3, 1, 2)
-
     def decode(self, latents):
         planes = np.ascontiguousarray(latents.transpose(0, 1, 3, 4, 2))
         if self.spoil is not None:

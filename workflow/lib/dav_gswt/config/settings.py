@@ -9,15 +9,6 @@ from dav_gswt.config.base import Auto, ConfigModel, Name, PhotoSize, Seed, Text,
 Colour = Annotated[str, StringConstraints(pattern="^#[0-9a-fA-F]{6}$")]
 
 
-class Stop(ConfigModel):
-    """When rounds end before the last one; whichever comes first. Empty: never."""
-
-    photos: int | None = key("most photos in all", None, ge=3, le=100_000)
-    marginal_gain: float | None = key(
-        "least expected gain of a further photo", None, unit="dB a photo", ge=0.0001, le=100
-    )
-
-
 class Flat(ConfigModel):
     """A plain."""
 

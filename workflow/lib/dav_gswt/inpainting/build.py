@@ -186,7 +186,8 @@ def place_camera(
     distance = RADIUS * frame.flying_height
     camera = camera_layouts.orbit(ELEVATION, 0.0, distance, target, size, size, FIELD_OF_VIEW)
     centre = camera.centre[None]
-    if (feasibility.find_below_ground(centre, grid) | feasibility.find_inside_objects(centre, field)).any():
+    below = grid.contains(centre) & (centre[:, 2] <= grid.height_at(centre))
+    if below.any() or feasibility.find_inside_objects(centre, field).any():
         return []
     return [(pose_of_camera("virtual", camera, frame), camera)]
 

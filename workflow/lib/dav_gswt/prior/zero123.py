@@ -125,14 +125,6 @@ class Zero123:
         pictures = ((torch.cat(parts) + 1) / 2).clamp(0, 1).numpy().transpose(0, 2, 3, 1)
         return DecodedViews(remove_white(pictures).reshape(*latents.shape[:-3], SIZE, SIZE, 4), None)
 
-    def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
-        """See `Prior`: the render over white, the background of its pictures."""
-        over_white = np.clip(condition.colour + (1 - condition.alpha)[..., None], 0, 1)
-        vae, parts = self.networks.vae, _to_tensor(over_white).to(self.device).split(VAE_BATCH)
-        with torch.inference_mode():
-            modes = [vae.encode(2 * part - 1).latent_dist.mode().cpu() for part in parts]
-        return (torch.cat(modes) * vae.config.scaling_factor).numpy()
-
     def _encode_condition(self, condition: Condition) -> tuple[Tensor, Tensor]:
         """The latents of the photos, and one token each."""
         photo = _to_tensor(condition.photo).to(self.device)

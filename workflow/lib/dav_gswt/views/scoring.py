@@ -45,10 +45,8 @@ class ScoringResult:
     gaussians: Float32[Array, "gaussians"]
 
     def describe(self) -> dict:
-        """Summary for scores.json: number of candidates, available terms, and poses by denoising steps."""
-        steps, count = np.unique(self.scores.steps, return_counts=True)
-        by_steps = {str(s): int(n) for s, n in zip(steps, count, strict=True)}
-        return {"candidates": len(self.scores), "terms": list(self.scores.terms), "poses_by_steps": by_steps}
+        """Summary for scores.json: number of candidates, and available terms."""
+        return {"candidates": len(self.scores), "terms": list(self.scores.terms)}
 
 
 def make_exr_parts(result: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
@@ -80,17 +78,17 @@ def score_poses(
     taken: the photos so far. prior: None for geometric terms only. frozen: of the first round; None in the first round.
     """
     renders = _render_candidates(field, grid, candidates, [scoring_camera(v.camera) for v in taken])
-    terms, steps, w2_sq = compute_terms(renders), np.zeros(len(candidates), int), None
+    terms, w2_sq = compute_terms(renders), None
     poses, names = [pose for pose, _ in candidates], [pose.name for pose, _ in candidates]
     if prior is not None and candidates:
         condition, masks = build_conditions(field, grid, candidates, taken, frame, prior.model.size)
-        sampled, steps = prior_sampling.sample_terms(prior, condition, names, masks)
+        sampled = prior_sampling.sample_terms(prior, condition, names, masks)
         w2_sq = sampled.pop("maps")
         terms |= {name: values.astype(np.float64) for name, values in sampled.items()}
     frozen = frozen or _freeze_scales(terms, w2_sq, names)
     maps = PoseMaps(names, _stack_maps(renders.uncertainty), w2_sq, renders.seen.pixels)
     gaussians = _gaussian_uncertainty(field, candidates, w2_sq, frozen)
-    return ScoringResult(Scores(poses, terms, frozen.scales, steps), maps, frozen, gaussians)
+    return ScoringResult(Scores(poses, terms, frozen.scales), maps, frozen, gaussians)
 
 
 def build_conditions(
