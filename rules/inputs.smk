@@ -326,5 +326,4 @@ def photo_targets(scene):
         + expand([rules.evaluate_round.output.metrics] * (rounds > 1), **(chosen | {"t": range(1, rounds)}))
         + expand([rules.evaluate_round.output.metrics] * bool(rounds), **values)
         + expand(list(scored), **values)
-        + expand([rules.evaluate_inpainted.output.metrics] * config["inpaint"], **values)
     )

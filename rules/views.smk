@@ -1,7 +1,7 @@
 """View selection: score the candidate poses and choose the next k.
 
 In: the field of round t - 1 and its scores. Out: scores.csv and scores.json, maps.npz, uncertainty.exr of a field; of round t
-poses.json and poses.exr. Scores keep their terms apart: the policy, lam and k enter when poses are chosen, so sweeps over
+poses.json. Scores keep their terms apart: the policy, lam and k enter when poses are chosen, so sweeps over
 them share the first scoring.
 """
 
@@ -64,7 +64,7 @@ use rule score_coarse as score_round with:
 
 
 rule select_poses:
-    """Choose the k poses that the policy expects most of, and show what is not known there."""
+    """Choose the k poses that the policy expects most of."""
     input:
         unpack(round_before),
         unpack(fits_before),
@@ -80,7 +80,6 @@ rule select_poses:
             category="View selection",
             labels={"scene": "{scene}", "policy": "{policy}", "k": "{k}", "round": "{t}"},
         ),
-        shown="<results>/<round>/poses.exr",
     log:
         "<logs>/<round>/select_poses.log",
     benchmark:

@@ -3,10 +3,9 @@
 import numpy as np
 
 from dav_gswt.geometry.scene_frame import read_scene_frame
-from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split
-from dav_gswt.views import candidates, policy_inputs, pose_maps, scores, selection
+from dav_gswt.views import candidates, policy_inputs, scores, selection
 from dav_gswt.views.policies import SelectionInput
 
 with logging_to(snakemake.log[0]):
@@ -18,5 +17,3 @@ with logging_to(snakemake.log[0]):
     information = policy_inputs.build_information_gain(policy, scored, remaining, taken, split, paths)
     chosen = selection.select_poses(policy, scored, SelectionInput(places, params.k, rng, params.lam, information))
     selection.write_pose_selection(snakemake.output.poses, selection.PoseSelection(policy, params.k, chosen))
-    shown = pose_maps.read_pose_maps(paths.maps)[0].exr_parts(scored, [pose.name for pose in chosen])
-    image_files.write_exr_parts(snakemake.output.shown, shown or pose_maps.EMPTY_PARTS)

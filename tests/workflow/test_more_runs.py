@@ -10,7 +10,6 @@ from fixtures.runs import TINY, USUAL
 
 from dav_gswt.field import read_field
 from dav_gswt.files import digest_files, read_json
-from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.views import pose_maps, scores
 
@@ -25,13 +24,10 @@ def test_a_round_may_use_the_uncertainty_of_a_prior(snakemake, tiny, tmp_path):
     target = str((way / "levels").relative_to(folder))
     snakemake(folder, "--cores", "2", target, configs=(USUAL, TINY))
     first = scores.read_scores(folder / "results/desert/seed0/draft/coarse/scores_terrain_pdrop0.15/scores.csv")
-    assert (first.term("w2_sq") > 0).all() and "lpips" not in first.terms and (first.steps == 2).all()
+    assert (first.term("w2_sq") > 0).all() and "lpips" not in first.terms
     chosen = [pose["name"] for pose in read_json(way / "poses.json")["poses"]]
     best = np.argsort(-first.term("w2_sq"), kind="stable")[:2]
     assert chosen == [first.names[i] for i in best]
-    shown = image_files.read_exr_parts(way / "poses.exr")
-    assert set(shown) == set(chosen)
-    assert all(set(channels) == {"uncertainty", "w2_sq"} for channels, _ in shown.values())
     later = scores.read_scores(way / "scores.csv")
     assert later.scales == first.scales and not set(later.names) & set(chosen)
     uncertainty, level = pose_maps.read_pose_maps(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
@@ -59,8 +55,8 @@ def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, sn
     folder = tmp_path / "completed"
     shutil.copytree(tiny.folder, folder)
     made = tiny.round.relative_to(tiny.folder) / "inpainted_terrain"
-    snakemake(folder, "--cores", "2", made / "metrics.json", made / "levels", configs=CONFIGS)
-    facts, found = read_json(folder / made / "completion.json"), read_json(folder / made / "metrics.json")
+    snakemake(folder, "--cores", "2", made / "levels", configs=CONFIGS)
+    facts = read_json(folder / made / "completion.json")
     before, after = (read_field(path / "field.ply") for path in (tiny.round, folder / made))
     assert facts["painted"] <= facts["unseen"] < facts["cells"] and facts["changed"] == bool(after.imagined.any())
     assert facts["changed"] or digest_files(tiny.round / "field.ply") == digest_files(folder / made / "field.ply")
@@ -70,7 +66,6 @@ def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, sn
         np.array_equal(before.sh[known], after[: len(before)].sh[known])
         and (after.uncertainty[after.imagined] == 1).all()
     )
-    assert found["gaussians"]["imagined"] == after.imagined.sum() and found["all"]["before"]["psnr"] > 10
     level = read_field(folder / made / "levels/level0.ply")
     assert len(level) and level.imagined.any() <= after.imagined.any()
 

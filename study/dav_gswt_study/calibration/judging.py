@@ -115,7 +115,7 @@ def _select_terms(
     shown = {"opacity": maps.opacity[rows]}
     if "w2_sq" in scores.terms:
         assert maps.w2_sq is not None  # it is written beside the term
-        u = combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
+        u = combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales)
         terms, shown = terms | {"u": u[rows]}, shown | {"w2_sq": maps.w2_sq[rows]}
     return terms, shown
 

@@ -77,7 +77,7 @@ def test_what_renders_photos_reads_only_its_keys(synthetic_scene):
 def test_what_lists_candidates_reads_only_its_keys(synthetic_scene):
     frame = synthetic.make_scene("desert", 0).frame
     given = select_keys(SCENES["synthetic"], "select_poses", synthetic_scene)
-    assert len(candidates.list_rendered(given, frame)) == 250
     camera = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, 64.0, 64.0, 128, 128)
+    assert len(candidates.list_poses(given, frame, camera)) == 250
     given = select_keys(PhotoScene, "score_round", photo_scene("plan"))
     assert given["agent"] == "plan" and len(candidates.list_poses(given, frame, camera)) == 250

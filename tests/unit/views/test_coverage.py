@@ -165,7 +165,7 @@ def test_gains_are_in_the_order_of_the_scores(cells, files):
 def test_ground_that_is_shown_wrong_matters_more_but_in_rejected_photos(cells, files, tmp_path):
     found, east = build("coverage-error", files).importance, cells.middle[:, 0] > 1.6
     assert found[east].mean() > 5 * found[~east].mean() > 0
-    rejected = {"new_views": {"taken": False, "views": [{"view": name} for name in SPLIT.start]}}
+    rejected = {"taken": False, "new_photos": list(SPLIT.start)}
     (tmp_path / "fit.json").write_text(json.dumps(rejected))
     assert (build("coverage-error", files | {"fits": [tmp_path / "fit.json"]}).importance == 1).all()
 

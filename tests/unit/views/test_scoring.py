@@ -37,6 +37,11 @@ class KnownDisagreement:
         return DecodedViews(np.ascontiguousarray(pictures), None)
 
 
+class Blind(KnownDisagreement):
+    def decode(self, latents):
+        return DecodedViews(np.nan * super().decode(latents).rgba, None)
+
+
 def pool(*eyes, width=40, height=40):
     found = []
     for i, eye in enumerate(eyes or ([1.6, 1.6, 5.0], [4.0, 1.6, 4.0], [1.6, 4.5, 4.0])):
@@ -63,6 +68,8 @@ def test_w2_is_the_disagreement_of_the_samples_over_the_frozen_scale():
     np.testing.assert_allclose(dropped.scores.terms["w2_sq"][0], 4 * (2 * 0.2 * 0.4) ** 2, rtol=0.2)
     assert dropped.maps.w2_sq.shape == (3, 32, 32)
     assert "lpips" not in dropped.scores.terms
+    with pytest.raises(ValueError, match="not finite: gradient of pose p0, p1, p2"):
+        scored(PriorConfig(Blind(), 2, 4, 0.2))
     first = FrozenScales(Scales(dict.fromkeys(TERMS, 7.0)), Quantiles(0.0, 1.0))  # of an earlier round
     assert scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2), frozen=first).scores.scales == first.scales
 

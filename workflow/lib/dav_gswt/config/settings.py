@@ -127,7 +127,7 @@ class Flight(ConfigModel):
         return self
 
 
-EVALUATING = ("evaluate_round", "evaluate_inpainted")  # metrics.json records what its field was fitted with
+EVALUATING = ("evaluate_round",)  # metrics.json records what its field was fitted with
 FITTING = ("fit_coarse", "evaluate_coarse", "update_field", "fit_chosen_photos", *EVALUATING)
 
 

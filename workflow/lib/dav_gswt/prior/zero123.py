@@ -88,16 +88,13 @@ class Zero123:
     name, size = "zero123", SIZE
 
     def __init__(self, networks: Zero123Networks, guidance: float = GUIDANCE, device: str = "cpu"):
-        """Raises: ValueError: a guidance below 1 or not finite."""
-        if not 1 <= guidance < float("inf"):
-            raise ValueError(f"guidance is {guidance}; it must be at least 1 (none)")
         self.networks, self.guidance, self.device = networks, guidance, device
         for network in (networks.unet, networks.vae, networks.image_encoder, networks.projection):
             network.to(device)
 
     @classmethod
     def open(cls, folder: Path | str, guidance: float = GUIDANCE, device: str = "cpu") -> "Zero123":
-        """Raises: InputError: see load_networks. ValueError: see __init__."""
+        """Raises: InputError: see load_networks."""
         return cls(load_networks(folder), guidance, device)
 
     def sample(

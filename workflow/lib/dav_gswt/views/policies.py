@@ -184,7 +184,7 @@ def resolve_policy(policy: str, agent: str | None) -> str:
 def uncertainty(scores: Scores, lam: float, term: str = "w2_sq") -> Float64[Array, "n"]:
     """Return u = W2² + lam LPIPS of every candidate, or another term in place of W2²."""
     lpips = scores.terms.get("lpips")
-    return combine_terms(scores.term(term), lpips, lam, scores.scales, scores.names, term)
+    return combine_terms(scores.term(term), lpips, lam, scores.scales, term)
 
 
 def candidate_values(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:

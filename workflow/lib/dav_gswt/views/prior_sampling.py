@@ -107,5 +107,5 @@ def _sample_batch(
 ) -> SampledTerms:
     latents = prior.model.sample(condition, prior.samples, prior.p_drop, prior.steps, prior.seed)
     maps, pictures = w2_sq(latents, names=names)[1], prior.model.decode(latents).rgba[..., :3]
-    drawn = terms.Samples(condition, names, maps, pictures, masks, prior.weights, prior.p_drop == 0)
+    drawn = terms.Samples(condition, maps, pictures, masks, prior.weights, prior.p_drop == 0)
     return terms.compute_terms(drawn) | {"maps": maps}

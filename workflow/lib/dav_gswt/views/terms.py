@@ -1,8 +1,8 @@
 """Score terms: functions that say how much a photo from each candidate pose would tell.
 
-To add one, write its function here and decorate it with `@term(name, ...)`: columns of scores.csv and scales follow from
-the decorator. A term without a prior is computed from `Renders` of all candidates; a term with a prior from `Samples` of
-some of them, and may be None where the prior's settings leave it out.
+To add one, write its function here and decorate it with `@term(name, ...)`: columns of scores.csv and scales follow
+from the decorator. A term without a prior is computed from `Renders` of all candidates; a term with a prior from
+`Samples` of some of them, and may be None where the prior's settings leave it out.
 """
 
 from collections.abc import Callable
@@ -43,7 +43,6 @@ class Samples:
     """
 
     condition: Condition
-    names: list[str]
     maps: Float32[Array, "n h w"]
     pictures: Float32[Array, "n m s s 3"]
     masks: Float32[Array, "n s s"]
@@ -111,7 +110,7 @@ def perceptual_disagreement(given: Samples) -> Float64[Array, "n"] | None:
 @term("gradient")
 def texture(given: Samples) -> Float64[Array, "n"]:
     """Image gradient of the mean picture, a part of the paper's u_img."""
-    return image_gradient(given.pictures, names=given.names)
+    return image_gradient(given.pictures)
 
 
 @term(
