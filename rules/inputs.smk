@@ -215,24 +215,9 @@ def prior_weights(wildcards):
     return files | {"folder": existing(prior["folder"], f"{where}.folder", "; see docs/prior.md")}
 
 
-def earlier_decisions(wildcards):
-    """What rounds 1 to t - 1 reported of their photos, and whether the last of them still asked for any."""
-    t = int(wildcards.t)
-    return fits_before(wildcards) | ({"last": f"{round_folder(t - 1)}/poses.json"} if t > 1 else {})
-
-
 def pictures_that_tell(wildcards):
-    """The photos so far, for the policies that measure the field's error in them; for an oracle what candidates show."""
-    if wildcards.policy in NEEDS_PHOTOS:
-        return {"images": "<results>/<photos>/images"}
-    if wildcards.policy not in ORACLES:
-        return {}
-    agent = config["scenes"][wildcards.scene].get("agent")
-    if agent not in ("render", "replay"):
-        raise WorkflowError(
-            f"policy {wildcards.policy}: what {wildcards.scene} truly shows is not known; it needs agent: render or replay"
-        )
-    return {"truth": "<results>/<photos>/candidates"} if agent == "render" else {"images": "<results>/<photos>/images"}
+    """The photos so far, for the policies that measure the field's error in them."""
+    return {"images": "<results>/<photos>/images"} if wildcards.policy in NEEDS_PHOTOS else {}
 
 
 def inpainter_weights(wildcards):
@@ -341,5 +326,4 @@ def photo_targets(scene):
         + expand([rules.evaluate_round.output.metrics] * (rounds > 1), **(chosen | {"t": range(1, rounds)}))
         + expand([rules.evaluate_round.output.metrics] * bool(rounds), **values)
         + expand(list(scored), **values)
-        + expand([rules.evaluate_inpainted.output.metrics] * config["inpaint"], **values)
     )

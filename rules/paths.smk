@@ -19,7 +19,7 @@ from dav_gswt.materials import mobilesam_package
 from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
 from dav_gswt.sweeps import CELL
 
-from dav_gswt.views.policies import NEEDS_PHOTOS, ORACLES, POLICY_NAMES, PRIOR_POLICIES
+from dav_gswt.views.policies import NEEDS_PHOTOS, POLICY_NAMES, PRIOR_POLICIES
 from dav_gswt.workflow import NamedEntries, lift_job_rate_limit, list_command_line_values
 
 BASE = Path(str(workflow.current_basedir)).parent

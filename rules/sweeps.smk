@@ -9,7 +9,7 @@ SWEPT_POLICY = "w2-lpips"  # the paper's, where the config's policy does not sam
 
 def experiment_branch(scene, changes):
     """The wildcards of a run with settings that replace the config's. No round stops early, and nothing is inpainted."""
-    return branch(scene, changes=changes) | {"stop": "", "inpainted": ""}
+    return branch(scene, changes=changes) | {"inpainted": ""}
 
 
 def sweep_cells(sweep):

@@ -79,7 +79,7 @@ def benchmark_experiment(scene, asked, seed, k, group):
         if key in asked
     }
     preset = {key: group[key] for key in ("preset",) if key in group}
-    values = branch(scene, policy, preset) | own | {"seed": seed, "k": k, "stop": ""}
+    values = branch(scene, policy, preset) | own | {"seed": seed, "k": k}
     chosen, before, after = values_of_choice(values), range(1, rounds), range(1, rounds + 1)
 
     def of(first, later, ts, wildcards=values):
@@ -89,10 +89,11 @@ def benchmark_experiment(scene, asked, seed, k, group):
     of_round = (rules.select_poses, rules.capture_views, rules.update_field)
     jobs += [of([], job.benchmark, after, chosen) for job in of_round]
     jobs += [of([], rules.fit_chosen_photos.benchmark, after)] * (chosen != values)
-    prior = config["priors"].get(values["prior"], {"samples": 0})
+    prior = config["priors"].get(values["prior"], {"samples": 0, "steps": 0})
     return {key: values[key] for key in ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")} | {
         "corrected": entry["kind"] == "photos",
         "samples": prior["samples"],
+        "steps": prior["steps"],
         "metrics": of(rules.evaluate_coarse.output.metrics, rules.evaluate_round.output.metrics, after),
         "facts": of(rules.score_coarse.output.facts, rules.score_round.output.facts, before),
         "times": [list(of_round) for of_round in zip(*jobs, strict=True)],
@@ -299,13 +300,6 @@ def captions():
         f"{name.partition('_')[2]}: {about[name.partition('_')[0]]}" if "_" in name else "quality against photos"
         for name in figure_files()
     ]
-
-
-def true_candidates(wildcards):
-    """What candidates truly show, where it is rendered; a replayed scene has its photos."""
-    if config["scenes"][wildcards.scene].get("agent") != "render":
-        return {}
-    return {"truth": "<results>/<photos>/candidates"}
 
 
 def refining_prior(wildcards):

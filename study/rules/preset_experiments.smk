@@ -10,7 +10,7 @@ def preset_experiments():
 def preset_experiment(scene, preset):
     """One of them."""
     asked, entry = STUDY["preset_costs"], config["scenes"][scene]
-    values = branch(scene, changes={"preset": preset}) | {"seed": asked["seed"], "stop": "", "inpainted": ""}
+    values = branch(scene, changes={"preset": preset}) | {"seed": asked["seed"], "inpainted": ""}
     chosen = values_of_choice(values)
     after, before = {"t": range(1, values["t"] + 1)}, {"t": range(1, values["t"])}
 

@@ -2,8 +2,7 @@
 
 In: the experiments of the config's `study.view_benchmark`, each a scene, a seed, a policy and k. Out:
 study/docs/data/{table}_curves.csv, a row for each round of an experiment; {table}_benchmark.csv, a row for each experiment;
-{table}_comparison.csv, every policy less the baseline; {table}_worth.csv, what rounds gained against what was expected of
-them; figures/{table}_budget.png, PSNR against photos; the page results/{table}-selection.md.
+{table}_comparison.csv, every policy less the baseline; figures/{table}_budget.png, PSNR against photos; the page results/{table}-selection.md.
 `snakemake view_benchmark` makes them.
 """
 
@@ -38,7 +37,6 @@ rule compare_policies:
         results="study/docs/data/{table}_benchmark.csv",
         compared="study/docs/data/{table}_comparison.csv",
         page="study/docs/results/{table}-selection.md",
-        worth="study/docs/data/{table}_worth.csv",
         plot="study/docs/figures/{table}_budget.png",
     log:
         "<logs>/benchmark/compare_{table}.log",

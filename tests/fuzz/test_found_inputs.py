@@ -40,7 +40,7 @@ SHOT = {"name": "a.png", "asked": asdict(POSE) | {"camera": camera_to_json(CAMER
 SHOT |= {"asked_to_got": 0.0, "taken": None}
 LENS = {"model": "PINHOLE", "width": 8, "height": 6, "params": [9, 9, 4, 3], "pinhole": [9, 9, 4, 3, 8, 6]}
 SELECTION = {"policy": "farthest", "k": 1, "poses": [asdict(POSE)]}
-SCORES = f"{','.join(list_columns())}\na,{{}},1,1,{{}},,,,,,,{{}},1,,,,,,\n"
+SCORES = f"{','.join(list_columns())}\na,{{}},1,1,{{}},,,,,,1,,,,,\n"
 
 
 def read_found(path: Path):
@@ -84,7 +84,7 @@ def camera(**changes) -> dict:
         ("lenses.json", json.dumps([LENS | {"model": "BANANA"}]), "BANANA is no camera model"),
         ("lenses.json", json.dumps([LENS | {"params": [9]}]), "a lens lacks numbers"),
         ("scores.json", '{"scales": {"opacity": 1}, "pixels": {"low": 1, "high": 1' + "0" * 400 + "}}", "too large"),
-        ("scores.csv", SCORES.format("nan", 1, 1), "a pose is not finite"),
+        ("scores.csv", SCORES.format("nan", 1), "a pose is not finite"),
         ("scores.csv", "pose\udcff", "not a table of scores"),
         ("scores.csv", '"' + "x" * 200_000, "not a table of scores"),
         ("config.yaml", "seeds: 2001-99-99\n", "not YAML"),

@@ -10,7 +10,6 @@ from fixtures.runs import TINY, USUAL
 
 from dav_gswt.field import read_field
 from dav_gswt.files import digest_files, read_json
-from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.views import pose_maps, scores
 
@@ -25,13 +24,10 @@ def test_a_round_may_use_the_uncertainty_of_a_prior(snakemake, tiny, tmp_path):
     target = str((way / "levels").relative_to(folder))
     snakemake(folder, "--cores", "2", target, configs=(USUAL, TINY))
     first = scores.read_scores(folder / "results/desert/seed0/draft/coarse/scores_terrain_pdrop0.15/scores.csv")
-    assert (first.term("w2_sq") > 0).all() and "lpips" not in first.terms and (first.steps == 2).all()
+    assert (first.term("w2_sq") > 0).all() and "lpips" not in first.terms
     chosen = [pose["name"] for pose in read_json(way / "poses.json")["poses"]]
     best = np.argsort(-first.term("w2_sq"), kind="stable")[:2]
     assert chosen == [first.names[i] for i in best]
-    shown = image_files.read_exr_parts(way / "poses.exr")
-    assert set(shown) == set(chosen)
-    assert all(set(channels) == {"uncertainty", "w2_sq"} for channels, _ in shown.values())
     later = scores.read_scores(way / "scores.csv")
     assert later.scales == first.scales and not set(later.names) & set(chosen)
     uncertainty, level = pose_maps.read_pose_maps(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
@@ -55,29 +51,12 @@ def test_a_policy_that_reads_the_prior_makes_the_same_bytes_on_any_number_of_thr
     assert made[0] == made[1]
 
 
-def test_a_budget_ends_inside_a_round_and_later_rounds_hand_the_field_on(snakemake, tiny, tmp_path):
-    """Five photos to start from, six in all: round 1 takes one instead of two, round 2 none."""
-    folder = shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)
-    branch = folder / "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k2_upto6"
-    first, then = branch / "iter1", branch / "iter2"
-    targets = [str((r / "metrics.json").relative_to(folder)) for r in (first, then)]
-    snakemake(folder, "--cores", "2", *targets, configs=(USUAL, TINY))
-    for name in ("field.ply", "ground.exr"):
-        assert digest_files(first / name) == digest_files(then / name) != digest_files(tiny.coarse / name)
-    assert [len(read_json(r / "poses.json")["poses"]) for r in (first, then)] == [1, 0]
-    assert read_json(then / "capture/capture.json")["shots"] == []
-    before, after = read_json(first / "metrics.json"), read_json(then / "metrics.json")
-    assert before["photos"] == after["photos"] == 6 and before["psnr"] == after["psnr"]
-    assert before["stopped"] is None and after["stopped"] == "after 6 photos: 6 in all may be taken (stop.photos)"
-    assert before["fit"]["earlier_views"]["photos"] == 5 and after["fit"]["new_views"]["photos"] == 0
-
-
 def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, snakemake, tmp_path):
     folder = tmp_path / "completed"
     shutil.copytree(tiny.folder, folder)
     made = tiny.round.relative_to(tiny.folder) / "inpainted_terrain"
-    snakemake(folder, "--cores", "2", made / "metrics.json", made / "levels", configs=CONFIGS)
-    facts, found = read_json(folder / made / "completion.json"), read_json(folder / made / "metrics.json")
+    snakemake(folder, "--cores", "2", made / "levels", configs=CONFIGS)
+    facts = read_json(folder / made / "completion.json")
     before, after = (read_field(path / "field.ply") for path in (tiny.round, folder / made))
     assert facts["painted"] <= facts["unseen"] < facts["cells"] and facts["changed"] == bool(after.imagined.any())
     assert facts["changed"] or digest_files(tiny.round / "field.ply") == digest_files(folder / made / "field.ply")
@@ -87,7 +66,6 @@ def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, sn
         np.array_equal(before.sh[known], after[: len(before)].sh[known])
         and (after.uncertainty[after.imagined] == 1).all()
     )
-    assert found["gaussians"]["imagined"] == after.imagined.sum() and found["all"]["before"]["psnr"] > 10
     level = read_field(folder / made / "levels/level0.ply")
     assert len(level) and level.imagined.any() <= after.imagined.any()
 

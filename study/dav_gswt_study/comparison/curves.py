@@ -9,10 +9,8 @@ from dav_gswt import csv_tables
 from dav_gswt.files import read_json
 from dav_gswt.sweeps import QUALITY as MEASURES
 from dav_gswt.sweeps import describe_origin, read_benchmark, select_metrics, sum_or_none
-from dav_gswt.views import stopping
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")
-EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # predicted before a round: `marginal_gain`
 
 
 def read_cell(cell: dict) -> list[dict]:
@@ -20,20 +18,17 @@ def read_cell(cell: dict) -> list[dict]:
 
     cell: what CELL names; `corrected`: PSNR after the photos' exposure is fitted; files: `metrics` of each round, the
     start's first; `facts`, scores.json of what rounds 1 to T chose by; `times`, for each of these rounds its jobs'
-    benchmarks; `samples` that the prior draws of a pose.
+    benchmarks; `samples` that the prior draws of a pose, in `steps` each (0 without a prior).
     """
-    found, fits = [], []
+    found = []
     for t, path in enumerate(cell["metrics"]):
         metrics = read_json(path)
         row = {key: cell[key] for key in CELL} | {"round": t, "photos": metrics["photos"]}
         row |= select_metrics(metrics, "psnr_colour_corrected" if cell["corrected"] else "psnr")
-        row |= _predict_gain(found, fits, metrics["photos"])
-        if t:
-            fits.append(metrics["fit"])
         row |= {
             "seconds": sum_or_none(run and run[0] for run in map(read_benchmark, cell["times"][t - 1])) if t else 0.0
         }
-        row |= {"evaluations": _count_evaluations(cell["facts"][t - 1], cell["samples"]) if t else 0}
+        row |= {"evaluations": _count_evaluations(cell["facts"][t - 1], cell["samples"], cell["steps"]) if t else 0}
         provenance = metrics["provenance"]
         found.append(row | describe_origin(provenance) | {"field": provenance["inputs"]["field"][:12]})
     return found
@@ -42,20 +37,9 @@ def read_cell(cell: dict) -> list[dict]:
 def read_curves(path: Path | str) -> list[dict]:
     """Read the table of curves."""
     integers = ("seed", "k", "round", "photos", "evaluations")
-    return csv_tables.read_table(path, numbers=(*MEASURES, *EXPECTED, "seconds"), integers=integers)
+    return csv_tables.read_table(path, numbers=(*MEASURES, "seconds"), integers=integers)
 
 
-def _predict_gain(before: list[dict], fits: list[dict], photos: int) -> dict:
-    """Predict a round's gain from the rounds before it. before: their rows; fits: their reports."""
-    if not before:
-        return dict.fromkeys(EXPECTED)
-    history = stopping.build_history(fits, before[0]["photos"])
-    found = stopping.predict_gain(*history, photos - before[-1]["photos"])
-    values = (found.closes, found.gain, found.low, found.high) if found else (None,) * len(EXPECTED)
-    return dict(zip(EXPECTED, values, strict=True))
-
-
-def _count_evaluations(facts: str, samples: int) -> int:
+def _count_evaluations(facts: str, samples: int, steps: int) -> int:
     """Forward passes of the prior's network, for one pose each."""
-    by_steps = read_json(facts)["poses_by_steps"]
-    return samples * sum(int(steps) * poses for steps, poses in by_steps.items())
+    return samples * steps * read_json(facts)["candidates"]

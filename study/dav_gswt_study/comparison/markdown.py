@@ -13,15 +13,14 @@ ALL_SCENES = "all scenes"
 
 
 def describe_comparison(
-    curves: list[dict], results: list[dict], compared: list[dict], grouped: list[dict], worth: list[dict], baseline: str
+    curves: list[dict], results: list[dict], compared: list[dict], grouped: list[dict], baseline: str
 ) -> dict:
     """Values of the page's template.
 
-    curves, results, compared, grouped, worth: rows of `read_curves`, `summarise_cells`, `compare_to_baseline`,
-    `compare_groups` and `check_predictions`.
+    curves, results, compared, grouped: rows of `read_curves`, `summarise_cells`, `compare_to_baseline` and
+    `compare_groups`.
     """
     overall = [row | {"group": ALL_SCENES} for row in compared if row["scene"] == EVERY]
-    every = next((row for row in worth if row["scene"] == EVERY), None)
     return {
         "baseline": baseline,
         "version": curves[0]["version"],
@@ -29,7 +28,6 @@ def describe_comparison(
         "groups": format_groups(grouped + overall),
         "scenes": format_scenes(compared, baseline),
         "ends": format_ends(results),
-        "worth": every,
     }
 
 

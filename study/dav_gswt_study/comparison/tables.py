@@ -1,7 +1,6 @@
 """From curves to results: a row a cell, and every policy less the baseline, paired, with intervals."""
 
 from dataclasses import asdict
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -96,39 +95,6 @@ def _area(photos: Float[Array, "t"], rounds: list[dict], measure: str) -> float 
     """The nAUC of a measure; None where a round lacks it."""
     values = [row[measure] for row in rounds]
     return None if None in values else nauc(photos, np.array(values, float))
-
-
-def check_predictions(curves: list[dict]) -> list[dict]:
-    """Compare gains of rounds with their predictions (`marginal_gain`), over all scenes and for each.
-
-    share: of the gap that closes, what test views gained (geometric mean), off: standard deviation of its logarithm,
-    both over rounds that gained something; covered: share of all rounds whose gain lies in the interval.
-    """
-    checked: dict[str, list[tuple[dict, float]]] = {}
-    for _, policy, rounds in _group_cells(curves):
-        for before, row in pairwise(rounds):
-            if row["expected"] is not None and policy[0] != EVERYTHING:
-                gained = row["psnr"] - before["psnr"]
-                for name in (EVERY, row["scene"]):
-                    checked.setdefault(name, []).append((row, gained))
-    return [
-        {"scene": name} | _summarise_predictions(found)
-        for name, found in sorted(checked.items(), key=lambda i: i[0] != EVERY)
-    ]
-
-
-def _summarise_predictions(found: list[tuple[dict, float]]) -> dict:
-    logs = np.array([np.log(gain / row["closes"]) for row, gain in found if gain > 0 and row["closes"] > 0])
-    inside = [row["expected_low"] <= gain <= row["expected_high"] for row, gain in found]
-    return {
-        "rounds": len(found),
-        "gained": float(np.mean([gain for _, gain in found])),
-        "expected": float(np.mean([row["expected"] for row, _ in found])),
-        "apart": float(np.mean([abs(gain - row["expected"]) for row, gain in found])),
-        "covered": float(np.mean(inside)),
-        "share": float(np.exp(logs.mean())) if len(logs) else None,
-        "off": float(logs.std(ddof=1)) if len(logs) > 1 else None,
-    }
 
 
 def _comparison_row(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tuple, float]) -> dict:

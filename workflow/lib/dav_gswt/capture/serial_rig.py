@@ -104,8 +104,7 @@ def _plan_stops(
     if barred:
         raise InputError(
             f"the rig cannot reach {len(barred)} of {len(requested)} poses, so nothing was moved; change rig.limits or "
-            "rig.no_go if it may go there, or ask for other poses (the scene's min_elevation, k):\n  "
-            + "\n  ".join(barred)
+            "rig.no_go if it may go there, or ask for other poses (the scene's poses, k):\n  " + "\n  ".join(barred)
         )
     return found
 

@@ -15,7 +15,6 @@ from dav_gswt.config.settings import (
     Preset,
     PriorSettings,
     Stills,
-    Stop,
     Surface,
     TerrainPriorSettings,
     Tiling,
@@ -63,7 +62,6 @@ class Config(ConfigModel):
         ge=1,
         le=1000,
     )
-    stop: Stop = key("when rounds end before the last one", Stop())
     inpaint: bool = key("`true`: ground that no photo saw is painted by `prior`, and marked", False)
     levels: Annotated[int, Field(ge=1, le=8)] | Auto = key(
         "levels of detail; `auto`: as many as are ever drawn, at most six", "auto"

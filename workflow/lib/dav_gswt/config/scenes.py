@@ -12,7 +12,6 @@ if TYPE_CHECKING:
 else:
     SyntheticAgent, PhotoAgent = Literal[list_agents("synthetic")], Literal[list_agents("photos")]
 Range = Annotated[tuple[float, float], Field(description="lowest and highest", strict=False)]
-Radius = Annotated[float, Field(ge=0.05, le=20)]
 Coordinate = Annotated[float, Field(ge=-100, le=100)]
 GroundPlace = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
 
@@ -78,13 +77,6 @@ class Drone(ConfigModel):
     clearance: float = key("below it the drone only climbs and sinks", 5, unit="m above ground", ge=1, le=100)
 
 
-class Feasibility(ConfigModel):
-    """Bounds of candidate poses. Poses inside the ground or hidden behind it are never asked for."""
-
-    min_height: float | None = key("above the ground", None, unit="world units", ge=0)
-    max_height: float | None = key("above the ground", None, unit="world units", gt=0)
-
-
 class OrbitPoses(ConfigModel):
     """All at the flying height from the exemplar's middle, and looking there."""
 
@@ -92,21 +84,9 @@ class OrbitPoses(ConfigModel):
 
 
 class FreePoses(ConfigModel):
-    """Any direction, distance and aim point on the exemplar."""
+    """Any direction, distance (0.4 to 1.5 flying heights for `agent: render`, else 0.4 to 1) and aim point."""
 
     kind: Literal["free"]
-    radii: Annotated[tuple[Radius, Radius], Field(strict=False)] | None = key(
-        "least and greatest distance from the aim point; if left out 0.4 to 1.5 for `agent: render`, else 0.4 to 1, "
-        "never higher than the first photos",
-        None,
-        unit="flying heights",
-    )
-
-    @model_validator(mode="after")
-    def _order_radii(self) -> "FreePoses":
-        if self.radii and self.radii[0] > self.radii[1]:
-            raise ValueError(f"radii go from high ({self.radii[0]:g}) to low ({self.radii[1]:g}); give the least first")
-        return self
 
 
 class RoutePoses(ConfigModel):
@@ -136,16 +116,6 @@ class _PhotographedScene(_Scene):
     poses: CandidatePoses | None = key(
         "which poses these are; if left out `{kind: orbit}`", None, read_by=POSE_READERS, agents=POSED
     )
-    min_elevation: float = key(
-        "lowest elevation of candidates and of test views",
-        30,
-        unit="degrees",
-        read_by=(*RENDERED, *POSE_READERS),
-        agents=POSED,
-        ge=5,
-        le=85,
-    )
-    feasibility: Feasibility | None = key("bounds of candidate poses", None, read_by=SCORING, agents=POSED)
 
 
 def _materials(default: str):
@@ -179,6 +149,15 @@ class SyntheticScene(_PhotographedScene):
         "hemisphere above `min_elevation`; `paper`, 36 on a circle at 45 degrees and the others as `cap`",
         "ring",
         read_by=RENDERED,
+    )
+    min_elevation: float = key(
+        "lowest elevation of candidates and of test views",
+        30,
+        unit="degrees",
+        read_by=(*RENDERED, *POSE_READERS),
+        agents=("render",),
+        ge=5,
+        le=85,
     )
     oblique: int = key("further test views around the exemplar at 45 degrees", 0, read_by=RENDERED, ge=0, le=200)
     walkers: int = key(

@@ -9,15 +9,6 @@ from dav_gswt.config.base import Auto, ConfigModel, Name, PhotoSize, Seed, Text,
 Colour = Annotated[str, StringConstraints(pattern="^#[0-9a-fA-F]{6}$")]
 
 
-class Stop(ConfigModel):
-    """When rounds end before the last one; whichever comes first. Empty: never."""
-
-    photos: int | None = key("most photos in all", None, ge=3, le=100_000)
-    marginal_gain: float | None = key(
-        "least expected gain of a further photo", None, unit="dB a photo", ge=0.0001, le=100
-    )
-
-
 class Flat(ConfigModel):
     """A plain."""
 
@@ -136,7 +127,7 @@ class Flight(ConfigModel):
         return self
 
 
-EVALUATING = ("evaluate_round", "evaluate_inpainted")  # metrics.json records what its field was fitted with
+EVALUATING = ("evaluate_round",)  # metrics.json records what its field was fitted with
 FITTING = ("fit_coarse", "evaluate_coarse", "update_field", "fit_chosen_photos", *EVALUATING)
 
 
