@@ -2,7 +2,7 @@
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +11,12 @@ import numpy as np
 from dav_gswt.bundle import chunks, direction_search, gswt, level_distances, manifest, orders
 from dav_gswt.bundle.chunks import ChunkOrders
 from dav_gswt.bundle.content import BundleContent, compute_ground_colour
-from dav_gswt.bundle.encoding import Encoding, EncodingErrors
+from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.bundle.land_cover import ObjectEntry, ObjectOrders
 from dav_gswt.bundle.manifest import (
     Manifest,
     MaterialEntry,
     OrdersReport,
-    RoundingErrors,
     Sky,
     TileEntry,
     TileOrders,
@@ -101,11 +100,8 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
     rings, reached = found.rings, found.decibels
     report = (list(rings.elevations), rings.azimuths, options.tau, options.decibels)
     info = describe_tiles(content, options, rings)
-    pixel = content.spacing / options.floor_pixels
-    encoding = Encoding.fit(list(content.iterate_fields()), content.side, pixel)
-    entries, errors = _write_chunks(content, encoding, info, options, part)
-    known: dict[str, Any] = vars(info) | entries
-    rounding: dict[str, Any] = asdict(errors) | _measure_rounding(content, encoding, pixel)
+    encoding = Encoding.fit(list(content.iterate_fields()), content.side, content.spacing / options.floor_pixels)
+    known: dict[str, Any] = vars(info) | _write_chunks(content, encoding, info, options, part)
     return Manifest(
         **known,
         format=manifest.FORMAT,
@@ -113,7 +109,6 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
         unit=options.unit,
         sky=options.sky,
         encoding=encoding,
-        error=RoundingErrors(**rounding),
         orders=OrdersReport(*report, reached["walker"], reached["oblique"]),
         provenance=provenance,
     )
@@ -174,9 +169,9 @@ def _measure_heights(levels: list[GaussianField]) -> list[float]:
 
 def _write_chunks(
     content: BundleContent, encoding: Encoding, info: TileSetInfo, options: BundleOptions, part: Path
-) -> tuple[dict[str, list], EncodingErrors]:
-    """Write all chunks; returns the entries of tiles and objects in the manifest, and the largest errors."""
-    along, pixel = np.array(info.directions), content.spacing / options.floor_pixels
+) -> dict[str, list]:
+    """Write all chunks; returns the entries of tiles and objects in the manifest."""
+    along = np.array(info.directions)
     tiles = [content.tile_fields(level) for level in range(content.levels)]
     things = [content.object_fields(level) for level in range(content.levels)]
     objects = list(info.objects or [])
@@ -187,17 +182,13 @@ def _write_chunks(
         for kept in each.chunks
     ]
 
-    def write(source: tuple[str, ChunkOrders, GaussianField]) -> tuple[chunks.ChunkEntry, EncodingErrors]:
+    def write(source: tuple[str, ChunkOrders, GaussianField]) -> chunks.ChunkEntry:
         name, kept, field = source
         rows, order = encoding.encode(field), orders.presort(field.means, along[kept.orders])
-        entry = chunks.write_chunk(rows, order, part, f"chunks/lod{kept.level}_{name}.bin", kept)
-        return entry, EncodingErrors.measure(encoding, field, rows, pixel)
+        return chunks.write_chunk(rows, order, part, f"chunks/lod{kept.level}_{name}.bin", kept)
 
-    written, errors = [], EncodingErrors()
     with ThreadPoolExecutor(options.threads) as pool:
-        for _, (entry, more) in zip(progress(sources, "sort tiles"), pool.map(write, sources), strict=True):
-            written.append(entry)
-            errors = errors.combine(more)
+        written = [entry for _, entry in zip(progress(sources, "sort tiles"), pool.map(write, sources), strict=True)]
     groups = iter([written[first : first + content.levels] for first in range(0, len(written), content.levels)])
     entries: dict[str, list] = {
         "tiles": [TileEntry(tile.tile, tile.uncertainty, tile.z, next(groups)) for tile in info.tiles]
@@ -205,23 +196,7 @@ def _write_chunks(
     if objects:
         known: list[dict[str, Any]] = [vars(each) | {"chunks": next(groups)} for each in objects]
         entries["objects"] = [ObjectEntry(**values) for values in known]
-    return entries, errors
-
-
-def _measure_rounding(content: BundleContent, encoding: Encoding, pixel: float) -> dict[str, float | None]:
-    """PSNR of rounded tiles against the tiles, as near as the lowest eye sees them: {elevation}_db."""
-    found, tiles = {}, content.sample_tiles()
-    for name, elevation in direction_search.ELEVATIONS.items():
-        pairs = []
-        for view in direction_search.spread_views(len(tiles), elevation):
-            source = tiles[view.tile]
-            rounded, exact = (
-                direction_search.render_in_order(field, content.side, view.direction, pixel)
-                for field in (encoding.decode(encoding.encode(source)), source)
-            )
-            pairs.append((rounded, exact))
-        found[f"{name}_db"] = direction_search.compute_psnr(pairs)
-    return found
+    return entries
 
 
 def _move_in(part: Path, out: Path) -> None:

@@ -20,7 +20,6 @@ from dav_gswt.bundle.encoding import (
     SCALE_STEPS,
     Colour,
     Encoding,
-    EncodingErrors,
     Entry,
     Length,
     Natural,
@@ -143,16 +142,6 @@ class TileSetInfo(Entry):
 
 
 @dataclass(frozen=True)
-class RoundingErrors(EncodingErrors):
-    """Largest errors of the records, and the PSNR of pictures of rounded tiles, seen by a walker and from 45 degrees;
-    None: no difference.
-    """
-
-    walker_db: float | None = None
-    oblique_db: float | None = None
-
-
-@dataclass(frozen=True)
 class OrdersReport(Entry):
     """Rings of directions: elevations in degrees below the horizon, azimuths of a ring, the tau from which a tile keeps
     all of them, the PSNR that was asked for, and the PSNR of pictures drawn in a neighbour's order (None: no
@@ -176,7 +165,6 @@ class Manifest(TileSetInfo):
         unit: of lengths, for display.
         sky: behind everything.
         encoding: how the records of all chunks are read.
-        error: what rounding to records costs.
         orders: how the directions were found.
         provenance: of the files that the bundle was made from.
         heights: of the surface under the tiles; only in the manifest of a page.
@@ -191,7 +179,6 @@ class Manifest(TileSetInfo):
     unit: Annotated[str, Field(min_length=1)]
     sky: Sky
     encoding: Encoding
-    error: RoundingErrors
     orders: OrdersReport
     provenance: dict[str, Any]
     heights: Surface | None = None
