@@ -9,7 +9,7 @@ from dav_gswt.materials import segmentation
 
 def segment(colour):
     """Classes alone."""
-    return segmentation.segment_ground(colour)[0]
+    return next(segmentation.list_segmentations(colour))[0]
 
 
 def test_two_materials_are_told_apart_and_numbered_by_their_share():
@@ -31,7 +31,9 @@ def test_large_maps_are_averaged_and_their_classes_enlarged(monkeypatch):
 def test_a_picture_of_one_colour_and_even_ground_are_one_class_without_strips_although_light_fades():
     assert segment(np.zeros((64, 64, 3))).max() == 0
     colour = made.maps(mixed=False, shrubs=False).colour
-    labels, crossing = segmentation.segment_ground(colour * np.linspace(1.0, 0.55, len(colour))[None, :, None])
+    labels, crossing = next(
+        segmentation.list_segmentations(colour * np.linspace(1.0, 0.55, len(colour))[None, :, None])
+    )
     assert labels.max() == 0 and crossing == []
 
 
@@ -61,7 +63,7 @@ def test_a_path_is_a_strip_of_its_own():
     path = np.abs(columns - 60 - 12 * np.sin(rows / 20)) < 4
     rng = np.random.default_rng(3)
     colour[path] = np.array([0.52, 0.44, 0.36]) + 0.02 * rng.normal(size=(path.sum(), 1))
-    (strip,) = segmentation.segment_ground(np.clip(colour, 0, 1))[1]
+    (strip,) = next(segmentation.list_segmentations(np.clip(colour, 0, 1)))[1]
     assert (strip & path).sum() > 0.9 * path.sum() and strip.sum() < 1.7 * path.sum()
 
 
@@ -74,7 +76,7 @@ def test_a_strip_that_one_start_of_many_sets_apart_is_found(monkeypatch):
     halves = np.broadcast_to((np.arange(128) > 60).astype(int), (128, 128))
     monkeypatch.setattr(segmentation, "_cluster", lambda _, start: apart if start == 1 else halves)
     monkeypatch.setattr(segmentation, "_explained_variance", lambda _, labels: float(not np.array_equal(labels, apart)))
-    (found,) = segmentation.segment_ground(colour)[1]
+    (found,) = next(segmentation.list_segmentations(colour))[1]
     assert found[:, path].mean() > 0.9 and found.mean() < 1.7 * path.mean()
 
 

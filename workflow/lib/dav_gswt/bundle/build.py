@@ -90,8 +90,8 @@ def write_bundle(
 
 def _write_archives(content: BundleContent, salt: int, part: Path) -> None:
     for material in range(len(content.materials)):
-        fields = gswt.fit_to_renderer(gswt.bake_objects(content, material, salt))
-        gswt.write_gswt(fields, content.side, part / (f"gswt_material{material}.zip" if material else "gswt.zip"))
+        name = f"gswt_material{material}.zip" if material else "gswt.zip"
+        gswt.write_gswt(gswt.bake_objects(content, material, salt), content.side, part / name)
 
 
 def _write_content(content: BundleContent, options: BundleOptions, provenance: dict[str, Any], part: Path) -> Manifest:
