@@ -2,7 +2,7 @@
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,8 @@ from dav_gswt.field import GaussianField, mean_scale
 from dav_gswt.files import write_json
 from dav_gswt.logs import progress
 
+FLOOR_PIXELS = 12.0  # width of a finest disc in the nearest ground that the lowest eye sees
+
 
 @dataclass(frozen=True)
 class BundleOptions:
@@ -38,10 +40,8 @@ class BundleOptions:
         unit: of lengths, for display.
         level_pixels: mean standard deviation of a level, in pixels, where it takes over from its finer neighbour.
         band: half the width of that cross-fade, as a share of the distance.
-        floor_pixels: width in pixels of a finest disc in the nearest ground that the lowest eye sees.
         decibels: PSNR from which drawing in a neighbour's order counts as invisible.
-        threads: that sort tiles; they change no byte. From two on archives are written beside them.
-        sky: behind everything.
+        threads: that sort tiles; they change no byte. From two on the archive is written beside them.
     """
 
     tau: float
@@ -49,10 +49,8 @@ class BundleOptions:
     unit: str = "metre"
     level_pixels: float = 1.0
     band: float = 0.1
-    floor_pixels: float = 12.0
     decibels: float = 40.0
     threads: int = 1
-    sky: Sky = field(default_factory=Sky)
 
 
 def write_bundle(
@@ -61,10 +59,10 @@ def write_bundle(
     """Write davgswt.json, chunks/ and gswt.zip to a folder; returns the manifest.
 
     Everything is made beside the folder and moved in when it is whole, the manifest last, so a manifest
-    never names a file that is missing. Other entries of the folder stay. Each material has an archive
-    (gswt.zip, gswt_material1.zip and so on) with its objects baked into the tiles.
+    never names a file that is missing. Other entries of the folder stay. gswt.zip has the tiles of the
+    first material with its objects baked into them.
 
-    Raises: InputError: mean scales that do not rise, an empty tile, or too many splats.
+    Raises: InputError: mean scales that do not rise, or an empty tile.
     """
     out = Path(out_dir)
     part = out.with_name(f".{out.name}.part")
@@ -72,13 +70,15 @@ def write_bundle(
     (part / "chunks").mkdir(parents=True)
     try:
         with ThreadPoolExecutor(1) as beside:
-            archives = beside.submit(_write_archives, content, options.salt, part)
+            archive = beside.submit(
+                lambda: gswt.write_gswt(gswt.bake_objects(content, options.salt), content.side, part / gswt.NAME)
+            )
             if options.threads == 1:
-                archives.result()
+                archive.result()
             try:
                 made = _write_content(content, options, provenance, part)
             finally:
-                archives.result()  # what it raises says more of the tiles than what else they made fail
+                archive.result()  # what it raises says more of the tiles than what else they made fail
         value = made.to_dict()
         Manifest.from_dict(value)
         write_json(part / manifest.NAME, value)
@@ -88,26 +88,19 @@ def write_bundle(
     return made
 
 
-def _write_archives(content: BundleContent, salt: int, part: Path) -> None:
-    for material in range(len(content.materials)):
-        name = f"gswt_material{material}.zip" if material else "gswt.zip"
-        gswt.write_gswt(gswt.bake_objects(content, material, salt), content.side, part / name)
-
-
 def _write_content(content: BundleContent, options: BundleOptions, provenance: dict[str, Any], part: Path) -> Manifest:
     """Write the chunks; returns the manifest."""
-    found = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
-    rings, reached = found.rings, found.decibels
+    rings, reached = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
     report = (list(rings.elevations), rings.azimuths, options.tau, options.decibels)
     info = describe_tiles(content, options, rings)
-    encoding = Encoding.fit(list(content.iterate_fields()), content.side, content.spacing / options.floor_pixels)
+    encoding = Encoding.fit(list(content.iterate_fields()), content.side, content.spacing / FLOOR_PIXELS)
     known: dict[str, Any] = vars(info) | _write_chunks(content, encoding, info, options, part)
     return Manifest(
         **known,
         format=manifest.FORMAT,
         version=manifest.VERSION,
         unit=options.unit,
-        sky=options.sky,
+        sky=Sky(),
         encoding=encoding,
         orders=OrdersReport(*report, reached["walker"], reached["oblique"]),
         provenance=provenance,
@@ -136,7 +129,7 @@ def describe_tiles(content: BundleContent, options: BundleOptions, rings: orders
     return TileSetInfo(
         tile_side=content.side,
         salt=options.salt,
-        eye_floor=level_distances.compute_eye_floor(content.spacing, options.floor_pixels),
+        eye_floor=level_distances.compute_eye_floor(content.spacing, FLOOR_PIXELS),
         ground_colour=content.ground_colour(),
         directions=rings.directions().tolist(),
         levels=level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band),
@@ -204,7 +197,5 @@ def _move_in(part: Path, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     (out / manifest.NAME).unlink(missing_ok=True)
     shutil.rmtree(out / "chunks", ignore_errors=True)
-    for old in out.glob("gswt_material*.zip"):
-        old.unlink()
-    for name in ("chunks", *sorted(path.name for path in part.glob("*.zip")), manifest.NAME):
+    for name in ("chunks", gswt.NAME, manifest.NAME):
         (part / name).replace(out / name)

@@ -25,6 +25,7 @@ from dav_gswt.tiles.compose import equalise_heights
 
 _log = logging.getLogger(__name__)
 
+NAME = "gswt.zip"
 TILE_WIDTH = 4.0
 MAX_SPLATS = 8_388_608
 TILE_NAME = re.compile(r"lod(\d+)_tile_\d+\.ply")
@@ -117,21 +118,21 @@ class _BakedObject:
     radius: float
 
 
-def bake_objects(content: BundleContent, material: int, salt: int) -> list[list[GaussianField]]:
-    """fields[level][tile] of a material with its objects in them: another draw for each tile, none over an edge.
+def bake_objects(content: BundleContent, salt: int) -> list[list[GaussianField]]:
+    """fields[level][tile] of the first material with its objects: another draw for each tile, none over an edge.
 
     A tile has as many of an object as its area and the density give, rounded by chance. Footprints do not overlap; what
     finds no room is left out. The public renderer shifts each tile by its own mean height, so these are made equal
     again.
     """
-    tiles = content.tiles[material]
-    mine = [each for each in content.objects if each.material == material]
+    tiles = content.tiles[0]
+    mine = [each for each in content.objects if each.material == 0]
     if not mine:
         return tiles.fields
-    fields, ground = [list(level) for level in tiles.fields], content.ground_height(material)
+    fields, ground = [list(level) for level in tiles.fields], content.ground_height(0)
     wanted = placed = 0
     for tile in range(len(tiles.labels)):
-        rng = np.random.default_rng([salt, material, tile])
+        rng = np.random.default_rng([salt, 0, tile])
         counts = [int(each.density * content.side**2 + rng.random()) for each in mine]
         drawn = _draw_objects(mine, counts, content.side, ground, rng)
         wanted, placed = wanted + sum(counts), placed + len(drawn)

@@ -1,9 +1,9 @@
 """davgswt.json: the manifest of a bundle, the only contract between the pipeline and a viewer.
 
-The classes here are the JSON objects of the file, with the same keys in the same order. Their types hold
-the bounds of the values, which `Manifest.from_dict` checks with what belongs together;
-workflow/schemas/davgswt.schema.json is generated from them. All lengths are in the bundle's unit, z is
-up, and x, y of a tile count from its south-western corner.
+The classes here are the JSON objects of the file, with the same keys in the same order; docs/formats.md
+says what each key means. The types hold the bounds of the values. `Manifest.from_dict` checks them and
+what belongs together, and workflow/schemas/davgswt.schema.json is generated from them. All lengths are in
+the bundle's unit, z is up, and x, y of a tile count from its south-western corner.
 """
 
 import json
@@ -62,14 +62,7 @@ class Sky(Entry):
 
 @dataclass(frozen=True)
 class LevelEntry(Entry):
-    """One level of detail.
-
-    Attributes:
-        level: its number; 0 is the finest.
-        mean_scale: mean standard deviation of its Gaussians.
-        distance: from the eye, where it gives way to the next level; None for the last level.
-        band: half the width of the cross-fade about `distance`.
-    """
+    """One level of detail."""
 
     level: Natural
     mean_scale: Length
@@ -111,21 +104,7 @@ class MaterialEntry(Entry):
 
 @dataclass(frozen=True)
 class TileSetInfo(Entry):
-    """How a tile set is placed and drawn: all that a terrain needs beside the Gaussians.
-
-    Attributes:
-        tile_side: width of a tile.
-        salt: which of all endless terrains this is, 32 bits.
-        eye_floor: lowest sensible height of the eye above the ground.
-        ground_colour: mean sRGB colour of the ground, beyond the last tiles.
-        directions: unit vectors of viewing directions that tiles keep orders for.
-        levels: finest first.
-        tiles: by number, those of the first material first.
-        materials: at least one.
-        classes: which material lies where; None with one material.
-        objects: on the tiles; None without.
-        scatter: where objects stand; None without objects.
-    """
+    """How a tile set is placed and drawn: all that a terrain needs beside the Gaussians."""
 
     tile_side: Length
     salt: Salt
@@ -158,17 +137,7 @@ class OrdersReport(Entry):
 
 @dataclass(frozen=True)
 class Manifest(TileSetInfo):
-    """davgswt.json.
-
-    Attributes:
-        format, version: FORMAT and VERSION.
-        unit: of lengths, for display.
-        sky: behind everything.
-        encoding: how the records of all chunks are read.
-        orders: how the directions were found.
-        provenance: of the files that the bundle was made from.
-        heights: of the surface under the tiles; only in the manifest of a page.
-    """
+    """davgswt.json."""
 
     tiles: Annotated[Sequence[TileEntry], Field(min_length=16)]
     objects: Annotated[Sequence[ObjectEntry], Field(min_length=1, max_length=256)] | None = field(

@@ -255,9 +255,6 @@ class PhotoScene(_PhotographedScene):
     masks: Text | None = key(
         "a folder of masks named as the photos: black pixels are not ground", None, read_by=REGISTERED
     )
-    masks: Text | None = key(
-        "a folder of masks named as the photos: black pixels are not ground", None, read_by=REGISTERED
-    )
     agent: PhotoAgent = key(
         "who takes further photos: `replay` takes them from the photos of the folder that are left; `serial` is a "
         "camera rig, `plan` a drone, `handheld` a person",

@@ -16,7 +16,7 @@ from dav_gswt.logs import progress
 from dav_gswt.materials import extraction, outlines, segmentation
 from dav_gswt.materials.borders import measure_bend, measure_fray
 from dav_gswt.materials.classes import GroundClasses, classify_ground
-from dav_gswt.materials.filling import box_sums, fill_cells
+from dav_gswt.materials.filling import fill_cells
 from dav_gswt.materials.maps import GroundMaps, measure_ground, read_masks
 from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.reconstruction.ground import Ground
@@ -239,7 +239,7 @@ def choose_window(own: Bool[Array, "m m"], tile_side: float) -> tuple[int, int, 
     least = min(m, ROOM * tile_side)
     sides = sorted({min(m, -(-int(max(share * m, least)) // unit) * unit) for share in WINDOWS}, reverse=True)
     for side in sides:
-        counts = box_sums(own, side)
+        counts = patches.box_sums(own, side, side)
         if counts.max() >= OWN_SHARE * side * side or side == sides[-1]:
             row, column = np.unravel_index(int(counts.argmax()), counts.shape)
             return int(row), int(column), side
