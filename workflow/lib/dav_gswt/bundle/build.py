@@ -16,7 +16,6 @@ from dav_gswt.bundle.land_cover import ObjectEntry, ObjectOrders
 from dav_gswt.bundle.manifest import (
     Manifest,
     MaterialEntry,
-    OrdersReport,
     Sky,
     TileEntry,
     TileOrders,
@@ -90,8 +89,7 @@ def write_bundle(
 
 def _write_content(content: BundleContent, options: BundleOptions, provenance: dict[str, Any], part: Path) -> Manifest:
     """Write the chunks; returns the manifest."""
-    rings, reached = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
-    report = (list(rings.elevations), rings.azimuths, options.tau, options.decibels)
+    rings, _ = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
     info = describe_tiles(content, options, rings)
     encoding = Encoding.fit(list(content.iterate_fields()), content.side, content.spacing / FLOOR_PIXELS)
     known: dict[str, Any] = vars(info) | _write_chunks(content, encoding, info, options, part)
@@ -102,7 +100,6 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
         unit=options.unit,
         sky=Sky(),
         encoding=encoding,
-        orders=OrdersReport(*report, reached["walker"], reached["oblique"]),
         provenance=provenance,
     )
 

@@ -121,21 +121,6 @@ class TileSetInfo(Entry):
 
 
 @dataclass(frozen=True)
-class OrdersReport(Entry):
-    """Rings of directions: elevations in degrees below the horizon, azimuths of a ring, the tau from which a tile keeps
-    all of them, the PSNR that was asked for, and the PSNR of pictures drawn in a neighbour's order (None: no
-    difference).
-    """
-
-    elevations: Annotated[list[Annotated[float, Field(ge=0, le=90)]], Field(min_length=1)]
-    azimuths: Annotated[int, Field(ge=2)]
-    tau: Share
-    wanted_db: float
-    walker_db: float | None
-    oblique_db: float | None
-
-
-@dataclass(frozen=True)
 class Manifest(TileSetInfo):
     """davgswt.json."""
 
@@ -148,7 +133,6 @@ class Manifest(TileSetInfo):
     unit: Annotated[str, Field(min_length=1)]
     sky: Sky
     encoding: Encoding
-    orders: OrdersReport
     provenance: dict[str, Any]
     heights: Surface | None = None
 
