@@ -28,6 +28,7 @@ else:
     Policy = Literal[POLICY_NAMES]
 Lpips = Literal["installed", "none"] | Text
 
+
 class Sweeps(ConfigModel):
     """`snakemake sweeps`: values of settings, each varied by itself with the other settings as the config has them."""
 
