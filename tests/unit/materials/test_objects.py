@@ -28,6 +28,9 @@ def find(things, standing=(), **options):
     return objects.find_footprints(list(standing), things, around(things, **options))
 
 
+MARKER = np.where(np.indices((10, 10)).sum(0) % 2, 0.95, 0.05).reshape(-1, 1) * np.ones(3)
+
+
 @pytest.mark.parametrize(
     ("cells", "options"),
     [
@@ -37,6 +40,7 @@ def find(things, standing=(), **options):
         ((50, 60, 50, 60), {"pieces": box(50, 60, 50, 60)}),  # of another material
         ((50, 60, 50, 60), {"strips": box(0, M, 61, 66)}),  # beside a strip
         ((50, 60, 50, 60), {"colour": [0.25, 0.27, 0.33]}),  # shade
+        ((50, 60, 50, 60), {"colour": MARKER}),
     ],
 )
 def test_what_is_no_object_is_excluded(cells, options):

@@ -40,6 +40,7 @@ MANY = 0.5  # area of smaller things of a thing's colour over its own, from whic
 COMMON, NEAR = 0.15, 0.6  # share of a material that looks like a thing, from which it is texture; and how near that is,
 # over the thing's difference from what is usual
 ALIKE = 0.85  # cosine of the angle between the differences of two things of one colour
+MARKER, LEAST_CONTRAST = 2.2, 0.12  # contrast of a marker over its material's, and the least that this counts as
 OTHER = 0.5  # of what stands out, that is ground of another material: then it is a piece of that, not a thing
 DENSE = 0.25  # of a material that is covered by things: then they are texture
 SHADE = 0.75  # of a material's light, in every channel, at most: darker and bluer is its shade
@@ -104,7 +105,7 @@ def find_footprints(
 
     Things at the border of the exemplar are cut off, so they are no objects; nor are things that are
     long, frayed, large or taller than wide, lie between two materials, are small pieces of another
-    material, or shade. On rough ground the largest of many specks, and a thing of a colour
+    material, shade, or markers. On rough ground the largest of many specks, and a thing of a colour
     that much of the ground has, is texture.
 
     Args:
@@ -125,7 +126,7 @@ def find_footprints(
         many = rough and not stands and not piece and _is_one_of_many(own, material, small, around)
         if many or (rough and not piece and _is_texture(own, material, around)):
             continue
-        unwanted = not stands and (piece or _is_shaded(own, material, around))
+        unwanted = not stands and (piece or _is_shaded(own, material, around) or _is_marker(own, material, around))
         if not unwanted and _is_single(own, material, around):
             footprints.append(Footprint(own, material))
         else:
@@ -161,6 +162,20 @@ def _is_shaded(own: Bool[Array, "m m"], material: int, around: Surroundings) -> 
     """Whether a thing looks like shade of its material."""
     plain = around.plain(material)
     return bool(plain.any() and is_shade(linear_light(around.colour[own]), linear_light(around.colour[plain])))
+
+
+def _is_marker(own: Bool[Array, "m m"], material: int, around: Surroundings) -> bool:
+    """Whether a thing is far richer in contrast than its material, as a survey's marker in black and white.
+
+    Cells that hardly differ from the ground do not count: the rim of a thing shows ground.
+    """
+    plain, bright = around.plain(material), around.colour.mean(-1)
+    if not plain.any():
+        return False
+    away = np.abs(bright[own] - np.median(bright[plain]))
+    core = bright[own][away >= 0.5 * np.quantile(away, 0.95)]
+    inside, outside = np.ptp(np.quantile(core, [0.05, 0.95])), np.ptp(np.quantile(bright[plain], [0.01, 0.99]))
+    return bool(inside > MARKER * max(float(outside), LEAST_CONTRAST))
 
 
 def split_things(cells: Bool[Array, "m m"]) -> list[Bool[Array, "m m"]]:
