@@ -107,18 +107,6 @@ def lpips_weights(wildcards=None):
     return {} if config["lpips"] == "none" else {"lpips": locate_weights(config["lpips"])}
 
 
-def segmenter_networks(wildcards=None):
-    """The segmenter's networks as inputs of what finds objects; none where the config says so."""
-    asked = config["segmenter"]
-    if asked == mobilesam_package.NONE:
-        return {}
-    mobilesam_package.require_runtime()
-    if asked != mobilesam_package.FETCH:
-        return mobilesam_package.locate_networks(existing(asked, "segmenter"))
-    fetched = rules.fetch_mobilesam.output
-    return {"encoder": fetched.encoder, "decoder": fetched.decoder}
-
-
 def terrain_weights(prior):
     """The file of weights of an entry of `priors` of model terrain."""
     weights = config["priors"][prior].get("weights")
@@ -247,7 +235,7 @@ def masks_of_materials(wildcards):
 
 
 def tiling_inputs(name):
-    """What tells the kinds of ground apart, beside colours: LPIPS's features, a segmenter's checkpoint."""
+    """What tells the kinds of ground apart, beside colours: LPIPS's features, SAM 2's checkpoint."""
     tiling = config["tilings"][name]
     if tiling["energy"] == "colour":
         return {}

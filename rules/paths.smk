@@ -15,7 +15,6 @@ from dav_gswt.config.settings import Preset, TerrainPriorSettings
 from dav_gswt.errors import InputError
 from dav_gswt.files import is_from_future, locate_path
 from dav_gswt.images.lpips_weights import locate_weights
-from dav_gswt.materials import mobilesam_package
 from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
 from dav_gswt.sweeps import CELL
 

@@ -2,7 +2,6 @@
 
 import re
 from collections import Counter
-from importlib.util import find_spec
 
 import pytest
 from fixtures.runs import TINY, USUAL
@@ -22,7 +21,7 @@ def test_the_default_target_makes_every_stage_once(planned, tmp_path):
     once = ["render_photos", "split_views", "fit_coarse", "score_coarse", "make_levels", "cut_tiles", "bundle_tiles"]
     assert all(plan[rule] == 1 for rule in [*once, "make_page", "render_terrain", "evaluate_coarse"])
     assert plan["update_field"] == plan["capture_views"] == plan["evaluate_round"] == 2
-    assert not plan["fetch_mobilesam"] and not plan["render_flight"] and not plan["inpaint_field"]
+    assert not plan["render_flight"] and not plan["inpaint_field"]
 
 
 def test_values_of_a_sweep_share_the_stages_before_them(planned, tmp_path):
@@ -113,19 +112,6 @@ def test_scenes_of_the_real_photos_are_planned(planned, root, tmp_path, scene):
 def test_a_completed_field_lies_between_the_round_and_its_levels(planned, tmp_path):
     without, made = (planned(tmp_path, "--config", f"inpaint={on}", configs=(USUAL, TINY)) for on in (False, True))
     assert made == without + Counter(inpaint_field=1)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not find_spec("onnxruntime"), reason="needs the extra `mobilesam`: pip install onnxruntime")
-def test_a_segmenter_is_fetched_or_read_before_the_materials(planned, snakemake, tmp_path):
-    target = f"{FARTHEST}/materials"
-    assert planned(tmp_path, target, "--config", "segmenter=fetch")["fetch_mobilesam"] == 1
-    (folder := tmp_path / "sam").mkdir()
-    (folder / "encoder.onnx").touch()
-    plan = (target, "--config", f"segmenter={folder}", "--dry-run")
-    assert f"config: segmenter: there is no {folder}/decoder.onnx" in snakemake(tmp_path, *plan, check=False).stdout
-    (folder / "decoder.onnx").touch()
-    assert f"{folder}/encoder.onnx, {folder}/decoder.onnx" in snakemake(tmp_path, *plan).stdout
 
 
 @pytest.mark.slow

@@ -104,7 +104,7 @@ def _ground_cases() -> list[Case]:
 
 
 def _segment_distance(number: Array, colour: Array) -> Array:
-    return semantics.describe_segments(number, colour, None, {}).distance
+    return semantics.describe_segments(number, colour, None).distance
 
 
 def _segment_distance_reference(number: Array, colour: Array) -> Array:

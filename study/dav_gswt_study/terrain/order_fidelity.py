@@ -16,7 +16,7 @@ def measure_orders(tiles: TileSet, wanted: float) -> list[dict]:
     `uncertain`: of the half of the tiles that is more uncertain. `orders`, `bytes` a Gaussian with its record.
     `{view}_db`: PSNR half-way between azimuths against the exact order; None: no difference.
     """
-    elevations = search_directions(tiles.fields[0], tiles.side, wanted).rings.elevations
+    elevations = search_directions(tiles.fields[0], tiles.side, wanted)[0].elevations
     rank, found = np.argsort(np.argsort(-tiles.uncertainty, kind="stable")), []
     for tile, field in enumerate(progress(tiles.fields[0], "measure orders")):
         for azimuths in AZIMUTHS:

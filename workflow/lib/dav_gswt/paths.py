@@ -15,7 +15,6 @@ RESULTS = "results"
 # Directories beside the scenes' own; no scene may have such a name.
 RESERVED = ("logs", "benchmarks", "snapshots", "weights", "sweeps", "tables", "gallery")
 SNAPSHOTS = f"{RESULTS}/snapshots"  # of running fits: outside the outputs, so that a killed fit can go on
-MOBILESAM = f"{RESULTS}/weights/mobilesam"  # a folder
 
 # One directory level a stage, which names only the settings that the stage adds. <name> stands for another entry.
 TREE = {

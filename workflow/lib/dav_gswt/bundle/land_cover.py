@@ -1,6 +1,7 @@
 """Entries of the manifest that say which material lies where, and where objects stand.
 
-`terrain.classes` and `terrain.scatter` compute from them; docs/formats.md has the formulas.
+`terrain.classes` and `terrain.scatter` compute from them; docs/formats.md says what each key means and has the
+formulas.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,14 +24,7 @@ Name = Annotated[str, Field(min_length=1, max_length=80)]
 
 @dataclass(frozen=True)
 class NoiseTerm:
-    """A term of the rule of classes: gradient noise whose classes have the materials' shares.
-
-    Attributes:
-        weight: of the term in the sum.
-        wavelengths: by material, of the widest octave, in tile sides.
-        octaves: by material.
-        biases: by material, added to the noise.
-    """
+    """A term of the rule of classes: gradient noise whose classes have the materials' shares."""
 
     kind: Literal["noise"]
     weight: Size
@@ -41,14 +35,7 @@ class NoiseTerm:
 
 @dataclass(frozen=True)
 class RangeTerm:
-    """A term of the rule of classes: a material is found where the surface's height or slope lies in a range.
-
-    Attributes:
-        weight: of the term in the sum.
-        material: number of the material.
-        low, high: bounds of the range; None: none.
-        soft: by how far beyond a bound the material's score falls by `weight`.
-    """
+    """A term of the rule of classes: a material is found where the surface's height or slope lies in a range."""
 
     kind: Literal["height", "slope"]
     weight: Size
@@ -60,15 +47,7 @@ class RangeTerm:
 
 @dataclass(frozen=True)
 class ImageTerm:
-    """A term of the rule of classes: a picture of materials, one byte a pixel, the northern row first.
-
-    Attributes:
-        weight: of the term in the sum.
-        file, bytes, sha256: of the pixels; a pixel is the number of a material, or that of none.
-        rows, columns: of the picture, whose middle lies at the world's origin.
-        width: of the picture, in world units.
-        beyond: what comes after its edge.
-    """
+    """A term of the rule of classes: a picture of materials, one byte a pixel, the northern row first."""
 
     kind: Literal["image"]
     weight: Size
@@ -94,14 +73,7 @@ class JitterEntry(Entry):
 
 @dataclass(frozen=True)
 class RiseEntry(Entry):
-    """How far what rises above the ground reaches over a border of classes.
-
-    Attributes:
-        slope: score per unit of length away from the ground.
-        most: largest gain of score.
-        ground: by material, mean z of its ground.
-        clearance: by material, the relief of the ground itself, which gains nothing.
-    """
+    """How far what rises above the ground reaches over a border of classes."""
 
     slope: Size
     most: Size
@@ -114,15 +86,7 @@ RuleTerm = Annotated[NoiseTerm | RangeTerm | ImageTerm, Field(discriminator="kin
 
 @dataclass(frozen=True)
 class ClassesEntry(Entry):
-    """Which material lies where: a sum of terms, and the transition between two materials.
-
-    Attributes:
-        salt: of the noises, 32 bits.
-        rule: the terms whose sum is the score of a material.
-        jitter, rise: of the transition.
-        painted: runs [I, J, length, material] of points where what a person painted takes the rule's place; only in
-            the manifest of a page.
-    """
+    """Which material lies where: a sum of terms, and the transition between two materials."""
 
     salt: Salt
     rule: Annotated[list[RuleTerm], Field(min_length=1, max_length=64)]
@@ -162,18 +126,7 @@ def find_run_fault(runs: Sequence[Sequence[int]], materials: int) -> str | None:
 
 @dataclass(frozen=True)
 class ObjectOrders(Entry):
-    """An object on the terrain.
-
-    Attributes:
-        name: for people.
-        radius: of its footprint.
-        z: lowest and highest z of its Gaussians, from its foot.
-        ground: z of the foot in a tile: the mean height of its material's ground.
-        material: number of the material that it stands on.
-        density: wanted number per unit of area of its material.
-        probability: that a candidate on its material is this object.
-        chunks: one a level.
-    """
+    """An object on the terrain."""
 
     name: Name
     radius: Length
@@ -194,14 +147,7 @@ class ObjectEntry(ObjectOrders):
 
 @dataclass(frozen=True)
 class ScatterEntry(Entry):
-    """Where objects stand.
-
-    Attributes:
-        cells: of the scatter grid along a tile's side; each has one candidate.
-        turn: largest turn either way, in degrees.
-        size: largest change of size either way, as a share.
-        salt: of the hashes, 32 bits.
-    """
+    """Where objects stand."""
 
     cells: Annotated[int, Field(ge=1, le=64)]
     turn: Annotated[float, Field(ge=0, le=180)]

