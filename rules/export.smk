@@ -87,7 +87,6 @@ rule export_ground:
         chunks="<results>/<bundle>/chunks",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
-        frame="<results>/<photos>/ground.json",
     output:
         ground=directory("<results>/<bundle>/exports/ground"),
     log:

@@ -110,7 +110,7 @@ def test_a_run_leaves_for_other_programs(tiny, snakemake, tmp_path):
     folder = shutil.copytree(tiny.folder, tmp_path / "exported")
     bundle, side = tiny.bundle.relative_to(tiny.folder), read_json(tiny.bundle / "davgswt.json")["tile_side"]
     model = tiny.round.relative_to(tiny.folder) / "exports/model"
-    export = "export={columns: 3, rows: 2, level: by_distance, formats: [ply, glb, 3dtiles], mesh_error: 0.5}"
+    export = "export={columns: 3, rows: 2, level: by_distance, formats: [ply, glb, 3dtiles]}"
     targets = [str(model), *(str(bundle / f"exports/{name}") for name in ("ply", "terrain", "ground"))]
     snakemake(folder, *targets, "--cores", "2", "--config", export, configs=CONFIGS)
 
@@ -136,9 +136,9 @@ def test_a_run_leaves_for_other_programs(tiny, snakemake, tmp_path):
     there = {path.name for path in (folder / bundle / "exports/ground").iterdir() if not path.name.startswith(".")}
     assert there - {"objects.glb"} == {f"ground.{kind}" for kind in ("glb", "json", "png", "tif", "hfield", "xml")}
 
-    small = ("--cores", "2", "--config", "export={max_gb: 0.0001}")
+    small = ("--cores", "2", "--config", "export={columns: 1000, rows: 1000}")
     refused = snakemake(folder, targets[2], *small, configs=CONFIGS, check=False)
-    assert refused.returncode and "export: glb: 8 x 8 cells have up to" in refused.stdout
+    assert refused.returncode and "export: glb: 1000 x 1000 cells have up to" in refused.stdout
 
 
 def test_another_preset_fits_the_photos_that_the_first_one_chose(tiny, snakemake, tmp_path):
