@@ -7,7 +7,7 @@ exports/terrain, exports/ground.
 
 
 rule export_model:
-    """All photos that a round's field was made of, with their cameras, as COLMAP and nerfstudio read them."""
+    """All photos that a round's field was made of, with their cameras, as COLMAP has them."""
     input:
         captures=captures_until,
         fits=fits_until,

@@ -323,9 +323,9 @@ def class_pictures(wildcards):
 
 
 def terrain_targets(scene):
-    """A scene's terrain: page, stills, a sheet of them and, where the config asks for one, a flight."""
+    """A scene's terrain: page, stills and a sheet of them."""
     made = [rules.make_page.output.page, *rules.render_terrain.output.stills, rules.make_contact_sheet.output.sheet]
-    return expand(made + [rules.render_flight.output.frames] * bool(config["flight"]), **branch(scene))
+    return expand(made, **branch(scene))
 
 
 def photo_targets(scene):

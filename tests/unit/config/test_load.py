@@ -78,7 +78,6 @@ TURNED = {"kind": "free", "radii": [3, 1]}
         pytest.param(["export"], {"formats": ["ply", "ply"]}, "one twice", id="a format twice"),
         pytest.param(["export"], {"centre": [2e9, 0]}, "centre lies beyond", id="too far"),
         pytest.param(["heights"], {"kind": "hills", "height": 1}, "heights.wavelength: is missing", id="no width"),
-        pytest.param(["flight"], {"frames": 8, "length": 1}, "flight: height is missing", id="no height"),
         pytest.param(["priors", "none"], {"model": "terrain", "samples": 2, "steps": 2}, "priors.none", id="name none"),
     ],
 )

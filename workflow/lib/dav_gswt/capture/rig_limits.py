@@ -1,14 +1,12 @@
-"""The axes of a rig: cameras at their positions, limits and no-go zones, and paths around the zones.
+"""The axes of a rig: cameras at their positions, limits and no-go zones.
 
-The axes are pan (azimuth plus `pan_zero`) and tilt (elevation plus `tilt_zero`) in degrees, and radius, the distance to
-the exemplar's centre in millimetres. All axes of a move begin and end together, so a move is a straight line in their
-space, and whether it meets a box is exact. If the straight path is blocked, three moves are tried: one axis moves
-aside, all move, the axis moves back.
+The axes are pan (azimuth) and tilt (elevation) in degrees, and radius, the distance to the exemplar's centre in
+millimetres. All axes of a move begin and end together, so a move is a straight line in their space, and whether it
+meets a box is exact. A pose that no straight move reaches is refused.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,7 +22,6 @@ AXES = ("pan", "tilt", "radius")
 TURN = 360.0
 TOLERANCE = 2.0  # degrees between a pose and how the rig holds its camera
 SLACK = np.array([0.5, 0.5, 2.0])  # degrees, degrees, millimetres: tolerance of the reached position
-BESIDE = 0.01  # distance at which a path passes a zone; zones are widened by SLACK before
 
 Axes = Float[Array, "3"]
 AxisRanges = Mapping[str, Sequence[float | int]]  # of the config: lowest and highest value by axis
@@ -36,8 +33,6 @@ class Mount:
 
     centre: Float[Array, "3"]
     millimetres: float
-    pan_zero: float
-    tilt_zero: float
 
     def axes_of(self, camera: Camera) -> Axes:
         """Axes at which the rig holds this camera; pan from 0 to 360.
@@ -49,15 +44,16 @@ class Mount:
         radius = float(np.linalg.norm(out))
         elevation = np.degrees(np.arcsin(np.clip(out[2] / max(radius, 1e-12), -1, 1)))
         azimuth = np.degrees(np.arctan2(-camera.rotation[0, 0], camera.rotation[0, 1]))
-        axes = [(self.pan_zero + azimuth) % TURN, self.tilt_zero + elevation, self.millimetres * radius]
+        axes = [azimuth % TURN, elevation, self.millimetres * radius]
         return np.round(axes, 3)
 
     def camera_at(self, axes: Axes, like: Camera) -> Camera:
         """Camera at a position of the axes, with the lens of `like`."""
         pan, tilt, radius = axes
-        elevation = np.clip(tilt - self.tilt_zero, -90.0, 90.0)  # a rig straight above reports a little too much
-        turn, distance = pan - self.pan_zero, radius / self.millimetres
-        posed = camera_layouts.orbit(elevation, turn, distance, self.centre, like.width, like.height, 60.0)
+        elevation = np.clip(tilt, -90.0, 90.0)  # a rig straight above reports a little too much
+        posed = camera_layouts.orbit(
+            elevation, pan, radius / self.millimetres, self.centre, like.width, like.height, 60.0
+        )
         return replace(like, rotation=posed.rotation, translation=posed.translation)
 
     def find_violation(self, camera: Camera) -> str | None:
@@ -74,7 +70,7 @@ class Mount:
 
 def build_mount(rig: Mapping[str, Any], frame: SceneFrame) -> Mount:
     """The mount of the config's `rig`."""
-    return Mount(frame.exemplar.centre, *(float(rig[key]) for key in ("millimetres", "pan_zero", "tilt_zero")))
+    return Mount(frame.exemplar.centre, float(rig["millimetres"]))
 
 
 @dataclass(frozen=True)
@@ -136,33 +132,6 @@ def _touched_zones(there: RigLimits, a: Axes, b: Axes) -> Bool[Array, "n"]:
     return np.maximum(first.max(1), 0) <= np.minimum(last.min(1), 1)
 
 
-def find_path(there: RigLimits, a: Axes, b: Axes) -> list[Axes] | None:
-    """Stops of the shortest free path from a to b, b last; None if no tried path is free.
-
-    The straight path is tried, and those that move aside along one axis. No stop if a equals b.
-    """
-    if np.array_equal(a, b):
-        return []
-    if _is_free(there, [a, b]):
-        return [b]
-    aside = []
-    for axis in (2, 1, 0):
-        low, high = there.limits[axis]  # values to pass at: the ends of the range, and just beside each zone
-        edges = np.concatenate([[low, high], there.zones[:, axis, 0] - BESIDE, there.zones[:, axis, 1] + BESIDE])
-        edges = np.round(edges[np.isfinite(edges)], 3)
-        for value in np.unique(edges[(edges >= low) & (edges <= high)]):
-            there_and_back = [a, _replace_axis(a, axis, value), _replace_axis(b, axis, value), b]
-            stops = [p for p, q in pairwise(there_and_back) if not np.array_equal(p, q)] + [b]
-            if _is_free(there, stops):
-                aside.append(stops[1:])
-    span = np.maximum(there.limits[:, 1] - there.limits[:, 0], 1e-9)  # degrees and millimetres can then be added
-
-    def length(stops: list[Axes]) -> float:
-        return float(sum(np.linalg.norm((q - p) / span) for p, q in pairwise([a, *stops])))
-
-    return min(aside, key=length, default=None)
-
-
 def list_turns(there: RigLimits, target: Axes, pan: float) -> list[Axes]:
     """A position with its pan at every whole turn within the limits, the nearest to `pan` first."""
     low, high = there.limits[0] - target[0]
@@ -179,12 +148,10 @@ def plan_route(there: RigLimits, a: Axes, target: Axes) -> list[Axes] | str:
     violations = [find_violation(there, place) for place in places]
     if violations[0] is not None and all(violations):
         return violations[0]
-    paths = (find_path(there, a, place) for place, why in zip(places, violations, strict=True) if not why)
-    return next((stops for stops in paths if stops is not None), "every path there that was tried crosses a no_go")
-
-
-def _is_free(there: RigLimits, stops: list[Axes]) -> bool:
-    return not any(_touched_zones(there, p, q).any() for p, q in pairwise(stops))
+    for place, why in zip(places, violations, strict=True):
+        if not why and not _touched_zones(there, a, place).any():
+            return [] if np.array_equal(a, place) else [place]
+    return "the straight move there crosses a no_go"
 
 
 def _replace_axis(place: Axes, axis: int, value: float) -> Axes:

@@ -28,6 +28,9 @@ from dav_gswt.photos.lenses import undistort_scene_photo
 _log = logging.getLogger(__name__)
 
 POLL = 0.05  # seconds between queries of the position
+BAUD, ANSWER_TIMEOUT, RETRIES = 115_200, 2.0, 3  # seconds for an answer; how often a question is repeated
+MOVE_TIMEOUT, PHOTO_TIMEOUT = 120.0, 30.0  # seconds for a move or homing, and for a photo to be complete in the inbox
+SETTLE = 1.0  # seconds of rest before a photo
 PHOTO_POLL = 0.25  # seconds between looks at the inbox; a photo that did not change in between may be complete
 
 Rig = Mapping[str, Any]  # a scene's `rig`; docs/reference/config.md describes its keys
@@ -43,7 +46,7 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     rig: Rig = site.scene["rig"]
     list_photos(Path(rig["inbox"]))  # raises if the folder does not exist
     mount = build_mount(rig, site.frame)
-    with serial_protocol.open_line(rig["port"], rig["baud"], float(rig["timeout"]), rig["retries"]) as line:
+    with serial_protocol.open_line(rig["port"], BAUD, ANSWER_TIMEOUT, RETRIES) as line:
         reported, home = line.hello()
         limits = rig_limits.combine_limits(rig["limits"], rig["no_go"], reported)
         stops = _plan_stops(limits, home, mount, requested)
@@ -140,31 +143,28 @@ class SerialRig:
         for stop in stops:
             self.line.move(stop)
             self._wait_until_still(stop)
-        time.sleep(self.rig["settle"])
+        time.sleep(SETTLE)
         return self._wait_until_still(stops[-1] if stops else start)
 
     def take_photo(self, name: str, target: Axes) -> tuple[Path, Axes, str]:
         """Take one photo of a pose. Returns its file, the position of the axes, and the time."""
-        folder, patience = Path(self.rig["inbox"]), float(self.rig["photo_timeout"])
+        folder = Path(self.rig["inbox"])
         position = self.move_to(name, target)
         before, taken = list_photos(folder), datetime.now(UTC).isoformat(timespec="seconds")
         self.line.shoot()
-        if photo := wait_for_photo(folder, before, patience):
+        if photo := wait_for_photo(folder, before, PHOTO_TIMEOUT):
             return photo, position, taken
         raise InputError(
-            f"{name}: the camera was released, but no photo came into {folder} within {patience:g} s; check the "
-            "camera and the software that saves its photos there, and rig.photo_timeout"
+            f"{name}: the camera was released, but no photo came into {folder} within {PHOTO_TIMEOUT:g} s; check "
+            "the camera and the software that saves its photos there"
         )
 
     def _wait_until_still(self, goal: Axes) -> Axes:
         """Wait until the rig stands still at the goal. Returns the reported position."""
-        until = time.monotonic() + self.rig["move_timeout"]
+        until = time.monotonic() + MOVE_TIMEOUT
         while (reported := self.line.where())[0]:
             if time.monotonic() > until:
-                raise InputError(
-                    f"the rig still moves after {self.rig['move_timeout']:g} s, to {describe_axes(goal)}; "
-                    "if it is that slow, raise rig.move_timeout"
-                )
+                raise InputError(f"the rig still moves after {MOVE_TIMEOUT:g} s, to {describe_axes(goal)}; check it")
             time.sleep(POLL)
         if (np.abs(reported[1] - goal) > rig_limits.SLACK).any():
             raise InputError(
@@ -235,5 +235,5 @@ def wait_for_photo(folder: Path, before: Listing, patience: float) -> Path | Non
         time.sleep(PHOTO_POLL)
     if now:
         name = next(iter(now))
-        raise InputError(f"{error or folder / name} (waited {patience:g} s for it; rig.photo_timeout is how long)")
+        raise InputError(f"{error or folder / name} (waited {patience:g} s for it)")
     return None

@@ -152,7 +152,7 @@ class Hills(HeightField, kind="hills"):
 
     @classmethod
     def from_config(cls, entry: Mapping[str, Any], side: float) -> "Hills":
-        return cls(entry["height"] * side, entry["wavelength"] * side, salt=entry.get("seed", 0))
+        return cls(entry["height"] * side, entry["wavelength"] * side)
 
 
 @dataclass(frozen=True)
