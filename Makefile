@@ -12,7 +12,7 @@ export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
 .PHONY: setup reference run view gallery test test-all lint lint-code lint-types lint-viewer lint-docs mutants \
-  bench docs sanitize fuzz
+  bench docs compiler sanitize fuzz
 .DELETE_ON_ERROR:
 
 # .venv alone

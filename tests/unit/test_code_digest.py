@@ -45,12 +45,14 @@ def test_what_a_program_does_counts_and_what_it_says_does_not(one, other, same):
 @pytest.fixture
 def library(tmp_path, monkeypatch) -> Path:
     """A library of two modules, of which a script imports one, which imports the other."""
-    (tmp_path / "__init__.py").write_text("")
-    (tmp_path / "near.py").write_text("from dav_gswt.far import f\n")
-    (tmp_path / "far.py").write_text('def f():\n    """Before."""\n    return 1\n')
-    (tmp_path / "script.py").write_text("from dav_gswt.near import f\n")
-    monkeypatch.setattr(code_digest, "LIBRARY", tmp_path)
-    return tmp_path
+    package = tmp_path / "dav_gswt"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "near.py").write_text("from dav_gswt.far import f\n")
+    (package / "far.py").write_text('def f():\n    """Before."""\n    return 1\n')
+    (package / "script.py").write_text("from dav_gswt.near import f\n")
+    monkeypatch.setattr(code_digest, "LIBRARY", package)
+    return package
 
 
 def digest_afresh(script: Path) -> str:

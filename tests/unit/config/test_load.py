@@ -10,16 +10,15 @@ from dav_gswt.config.load import add_scene_files, check_config, parse_command_li
 from dav_gswt.config.reference import make_reference
 from dav_gswt.errors import InputError
 
-FILES = {"usual": [], "smallest": ["config/test/config.yaml"], "paper": ["config/paper.yaml"]}
-FILES |= {
-    "hundred views": ["config/hundred_views.yaml"],
-    "development": ["config/development.yaml"],
+FILES = {
+    "usual": [],
+    "smallest": ["config/test/config.yaml"],
     "without a compiler": ["config/without_compiler.yaml"],
 }
 
 
 def read(root: Path, *more: str) -> dict:
-    files = [root / "config/config.yaml", root / "config/study.yaml", *(root / file for file in more)]
+    files = [root / "config/config.yaml", *(root / file for file in more)]
     return add_scene_files(read_config(files), root / "config/scenes")
 
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from dav_gswt.bundle.build import BundleOptions, describe_tiles
 from dav_gswt.bundle.orders import DirectionRings
 from dav_gswt.lod.merge import compute_covariances
-from dav_gswt.materials import placing
+from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain import endless, placement, stills, visibility
 from dav_gswt.terrain.scatter import concatenate_instances
 
@@ -68,8 +68,8 @@ def test_a_budget_counts_the_tiles_of_all_materials_in_a_cell(bare, seen):
 def test_an_object_is_turned_and_scaled_about_its_foot(cover):
     source = cover.objects[0][0]
     n, foot = len(source), np.array([3.0, 4.0, 0.5])
-    way = placing.turn_rows(np.full(n, 0.3))
-    made = placing.turn_and_scale(source, way, np.full(n, 1.1), np.tile(foot, (n, 1)))
+    way = turn_rows(np.full(n, 0.3))
+    made = turn_and_scale(source, way, np.full(n, 1.1), np.tile(foot, (n, 1)))
     turn = Rotation.from_euler("z", 0.3).as_matrix()
     assert made.means == pytest.approx(1.1 * source.means @ turn.T + foot, abs=1e-5)
     expected = 1.1**2 * turn @ compute_covariances(source) @ turn.T

@@ -16,7 +16,7 @@ from dav_gswt.terrain.page import write_page
 
 SURFACES = {
     "flat": FlatSurface(),
-    "hills": Hills(2.0, 30.0, 3, 5),
+    "hills": Hills(2.0, 30.0, salt=5),
     "image": HeightMap(np.random.default_rng(1).uniform(0, 3, (9, 7)).astype(np.float32), 60.0, "clamp"),
 }
 HILLS = {"kind": "hills", "height": 0.4, "wavelength": 4}
@@ -31,7 +31,7 @@ def test_a_page_is_the_terrain_that_it_was_made_of(root, tmp_path):
     write_cover_bundle(tmp_path / "bundle")
     write_page(tmp_path / "bundle", root / "workflow/viewer", tmp_path / "page", SURFACES["hills"], rule)
     terrain = endless.terrain_from_page(store.read_bundle(tmp_path / "page"))
-    surface = {"kind": "hills", "height": 2 / SIDE, "wavelength": 30 / SIDE, "octaves": 3, "seed": 5}
+    surface = {"kind": "hills", "height": 2 / SIDE, "wavelength": 30 / SIDE, "seed": 5}
     wanted = endless.terrain_from_bundle(store.read_bundle(tmp_path / "bundle"), surface, rule)
     assert terrain.heights == wanted.heights == SURFACES["hills"]
     points = np.random.default_rng(3).integers(-60, 60, (2, 200))

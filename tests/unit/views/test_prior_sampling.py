@@ -131,7 +131,6 @@ def test_without_dropout_the_one_sample_is_compared_with_the_render():
     assert (sampled(alone, 3)[0]["single"] > 0).all()  # grey is not the black that the render shows
     assert not sampled(alone, 3, 0 * ALL)[0]["single"].any()
     assert "single" not in sampled(replace(alone, p_drop=0.1), 3)[0]
-    assert "single" not in sampled(replace(alone, independent_noise=True), 3)[0]
 
 
 def test_terms_do_not_depend_on_the_number_of_threads_which_pytorch_keeps(monkeypatch):

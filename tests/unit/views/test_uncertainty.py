@@ -8,7 +8,7 @@ import pytest
 
 from dav_gswt.views import uncertainty as un
 
-FLOAT32 = 1e-5  # tolerance of a float32 kernel against float64: docs/research/numerics.md
+FLOAT32 = 1e-5  # tolerance of a float32 kernel against float64
 
 
 def w2_by_pairs(means, variances):

@@ -24,7 +24,7 @@ import { findReach } from "./sphere_cells.js";
  * @typedef {Distances & { cells: Cell[], count: number, missing: Set<number> }} Selection
  */
 
-const REACH_EXPONENT = 1 / 5; // the reach shrinks by the factor to this power: docs/research/lab-notes.md
+const REACH_EXPONENT = 1 / 5; // the reach shrinks by the factor to this power, chosen by measurement
 const BISECTIONS = 12; // of the search for the factor
 const NEVER = -1; // switch distance of a level that is not used
 

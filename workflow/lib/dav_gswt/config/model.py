@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
 from dav_gswt.config.exports import Export
@@ -27,7 +27,16 @@ else:
     Policy = Literal[POLICY_NAMES]
 Lpips = Literal["installed", "none"] | Text
 Segmenter = Literal["none", "fetch"] | Text
-Swept = Literal["k", "p_drop", "lam", "tau", "rounds"]
+
+
+class Sweeps(ConfigModel):
+    """`snakemake sweeps`: values of settings, each varied by itself with the other settings as the config has them."""
+
+    k: list[Annotated[int, Field(ge=1, le=1000)]] | None = key("views chosen in a round", None)
+    p_drop: list[Annotated[float, Field(ge=0, lt=1)]] | None = key("dropouts of the prior", None)
+    lam: list[Annotated[float, Field(ge=0, le=1e6)]] | None = key("weights of LPIPS", None)
+    tau: list[Share] | None = key("uncertainties from which a tile keeps all orders", None)
+    rounds: list[Annotated[int, Field(ge=0, le=100)]] | None = key("numbers of rounds", None)
 
 
 class Config(ConfigModel):
@@ -86,7 +95,7 @@ class Config(ConfigModel):
     scenes: dict[Name, Scene] = key("what there is to make a terrain of", {})
     priors: dict[Name, PriorSettings] = key("diffusion priors", {})
     presets: dict[Name, Preset] = key("speed against accuracy", min_length=1)
-    sweeps: dict[Swept, list[int | float]] = key("`snakemake sweeps`: values of settings, each varied by itself", {})
+    sweeps: Sweeps = key("`snakemake sweeps`: values of settings, each varied by itself", Sweeps())
     tilings: dict[Name, Tiling] = key("how tiles are cut", min_length=1)
 
     @model_validator(mode="after")
@@ -100,17 +109,6 @@ class Config(ConfigModel):
             _require_chooser(name, preset, self.presets)
         if "none" in self.priors:
             raise ValueError("priors.none: is the name of no prior; give yours another")
-        return self
-
-    @model_validator(mode="after")
-    def _check_swept_values(self) -> "Config":
-        """Each value of a sweep is one that the setting itself can have."""
-        for name, values in self.sweeps.items():
-            for value in values:
-                try:
-                    self.__pydantic_validator__.validate_assignment(self.model_construct(), name, value)
-                except ValidationError as error:
-                    raise ValueError(f"sweeps.{name}: {value}: {error.errors()[0]['msg'].lower()}") from None
         return self
 
     @model_validator(mode="after")

@@ -21,8 +21,8 @@ without a default may be left out."""
 POLICIES_HEAD = """# Policies
 
 How the next views are chosen: the config's `policy`. `auto`, the default, takes `farthest` where a scene chooses from
-given photos (`agent: replay`), else `coverage-error`; [what each is worth](../active-views.md). Made from the table in
-`workflow/lib/dav_gswt/views/policy_names.py` by `make reference`; the functions are in `policies.py` beside it, and
+given photos (`agent: replay`), else `coverage-error`; [what each is worth](../active-views.md). Made from
+`workflow/lib/dav_gswt/views/policies.py` by `make reference`;
 [architecture](../architecture.md#a-policy) says how to add one.
 
 Every policy knows where the candidates and the photos so far are; the column `reads` says what it reads besides:

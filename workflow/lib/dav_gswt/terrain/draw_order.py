@@ -48,7 +48,7 @@ def finer_share(distance: Floats, switch: float, band: float, smooth: bool = Fal
 
     1 nearer than switch - band, 0 beyond switch + band; band = 0 is a step with 1/2 at the switch; an infinite switch
     is never reached. smooth: s^2 (3 - 2 s) of it, which has a continuous slope.
-    Source: DAV-GSWT, Eq. (lod_blend); see docs/research/deviations.md on its "0 otherwise".
+    Source: DAV-GSWT, Eq. (lod_blend); its "0 otherwise" would make near splats vanish.
     """
     if switch == np.inf:
         return np.ones_like(distance)
