@@ -55,7 +55,7 @@ rule export_terrain:
     """Some cells of the endless terrain, with everything on them, as one file or set a format."""
     input:
         unpack(height_map),
-        unpack(class_pictures),
+        unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
         frame="<results>/<photos>/ground.json",
@@ -82,7 +82,7 @@ rule export_ground:
     """The ground under the same cells: a collision mesh, height maps, a model for MuJoCo, hulls of the objects."""
     input:
         unpack(height_map),
-        unpack(class_pictures),
+        unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
         seams="<results>/<tiles>/seams.json",

@@ -316,10 +316,10 @@ def height_map(wildcards):
     return {"map": found}
 
 
-def class_pictures(wildcards):
-    """The pictures and painted files that the rule of classes reads."""
-    files = [term["file"] for term in config["classes"] if term["kind"] in ("image", "painted")]
-    return {f"picture{number}": existing(file, "classes.file") for number, file in enumerate(files)}
+def painted_files(wildcards):
+    """The painted file that the rule of classes reads."""
+    files = [term["file"] for term in config["classes"] if term["kind"] == "painted"]
+    return {f"painted{number}": existing(file, "classes.file") for number, file in enumerate(files)}
 
 
 def terrain_targets(scene):

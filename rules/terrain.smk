@@ -8,7 +8,7 @@ rule make_page:
     """A page that needs nothing else: viewer, manifest, surface, chunks, a first still and how it was made in one folder."""
     input:
         unpack(height_map),
-        unpack(class_pictures),
+        unpack(painted_files),
         unpack(story_of_field),
         still="<results>/<terrain>/walker.png",
         manifest="<results>/<bundle>/davgswt.json",
@@ -36,7 +36,7 @@ rule render_terrain:
     """Stills of the endless terrain: walking, from a hill, and from above."""
     input:
         unpack(height_map),
-        unpack(class_pictures),
+        unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
     output:

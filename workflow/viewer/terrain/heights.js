@@ -184,7 +184,7 @@ function createHeightMap({ rows, columns, width, beyond }, pixels) {
  *
  * @param {number} index @param {number} n @param {boolean} mirrored
  */
-export function wrapIndex(index, n, mirrored) {
+function wrapIndex(index, n, mirrored) {
   if (!mirrored) return Math.min(Math.max(index, 0), n - 1);
   const k = ((index % (2 * n)) + 2 * n) % (2 * n);
   return k < n ? k : 2 * n - 1 - k;

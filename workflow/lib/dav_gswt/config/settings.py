@@ -2,11 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, StringConstraints
+from pydantic import Field
 
 from dav_gswt.config.base import Auto, ConfigModel, Name, PhotoSize, Text, key
-
-Colour = Annotated[str, StringConstraints(pattern="^#[0-9a-fA-F]{6}$")]
 
 
 class Stop(ConfigModel):
@@ -80,18 +78,6 @@ class RangeClasses(ConfigModel):
     weight: Weight = key("of the range; noise lies between -1 and 1", 1)
 
 
-class PictureClasses(ConfigModel):
-    """Materials by the colours of a picture."""
-
-    kind: Literal["image"]
-    file: Text = key("picture of plain colours, at most 4096 pixels a side")
-    width: float = key(
-        "of the whole picture; its middle lies at the world's origin", unit="world units", ge=0.001, le=1e7
-    )
-    colours: dict[Text, Colour] = key("name of a material: its colour in the picture, as `#rrggbb`", min_length=1)
-    weight: Weight = key("of the picture; noise lies between -1 and 1", 1)
-
-
 class PaintedClasses(ConfigModel):
     """What was painted and set on the page, in the place of the other terms where it is painted."""
 
@@ -99,7 +85,7 @@ class PaintedClasses(ConfigModel):
     file: Text = key("file that the page's “Save” has saved")
 
 
-ClassTerm = Annotated[NoiseClasses | RangeClasses | PictureClasses | PaintedClasses, Field(discriminator="kind")]
+ClassTerm = Annotated[NoiseClasses | RangeClasses | PaintedClasses, Field(discriminator="kind")]
 
 
 class Stills(ConfigModel):

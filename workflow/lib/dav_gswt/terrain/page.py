@@ -19,7 +19,6 @@ from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.images.figures import encode_jpeg
 from dav_gswt.images.image_files import read_photo, shrink_image
 from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_rule
-from dav_gswt.terrain.classes import Picture
 from dav_gswt.terrain.heights import PIXELS, FlatSurface, HeightField, require_plain_cover
 from dav_gswt.terrain.page_story import SHEET, STORY, Story
 
@@ -104,8 +103,8 @@ def write_page(
     All files under `viewer_dir` are copied, and the chunks that the manifest names.
 
     Args:   surface: of the terrain (default: level ground), stored in the page's manifest as `heights`. rule: the
-            config's `classes`, stored as those of the page's manifest, its pictures beside it. front: name of the
-            scene, line about it, first still and story (default: the viewer's own texts, no still, no story).
+            config's `classes`, stored as those of the page's manifest. front: name of the scene, line about it, first
+            still and story (default: the viewer's own texts, no still, no story).
     Raises: InputError: the manifest is missing or of another version, a chunk is missing or lies outside of the bundle;
             the viewer is incomplete; see also `class_rules.apply_rule`, `heights.require_plain_cover`.
     """
@@ -118,10 +117,8 @@ def write_page(
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
     copies += [(bundle / name, name) for name in _list_chunks(bundle, value)]
     heights, pixels = (surface or FlatSurface()).describe()
-    pictures: dict[str, Picture] = {}
     if "classes" in value or any(entry["kind"] == "painted" for entry in rule):
-        made, pictures = apply_rule(Manifest.from_dict(value), rule)
-        changed = made.to_dict()
+        changed = apply_rule(Manifest.from_dict(value), rule).to_dict()
         value |= {key: changed[key] for key in ("classes", "objects") if key in changed}
     else:
         warn_of_rule(rule)
@@ -135,8 +132,6 @@ def write_page(
         (part / INDEX).write_text(fill_front(index, front, modules), encoding="utf-8")
         if pixels:
             (part / PIXELS).write_bytes(pixels)
-        for name, picture in pictures.items():
-            (part / name).write_bytes(picture.tobytes())
         if front:
             (part / STILL).write_bytes(front.still)
             write_json(part / FRONT, {"name": front.name, "line": front.line, "verdict": front.verdict})
