@@ -1,8 +1,8 @@
-"""Export: the photos of a round for other programs that train fields; for viewers, engines and simulators a patch of
-terrain at each level and a finite terrain. Not part of `all`: files are asked for by their paths (docs/exports.md).
+"""Export: the photos of a round for other programs that train fields; for viewers, engines and simulators a finite
+terrain. Not part of `all`: files are asked for by their paths (docs/exports.md).
 
-In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/ply (y down, as viewers take it),
-exports/terrain, exports/ground.
+In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/terrain,
+exports/ground.
 """
 
 
@@ -29,26 +29,6 @@ rule export_model:
         source=code_of("export_model"),
     script:
         "../scripts/export_model.py"
-
-
-rule export_plys:
-    """A patch of terrain at each level as a PLY that any viewer of splats opens, y down."""
-    input:
-        manifest="<results>/<bundle>/davgswt.json",
-        archive="<results>/<bundle>/gswt.zip",
-    output:
-        plys=directory("<results>/<bundle>/exports/ply"),
-    log:
-        "<logs>/<bundle>/export_plys.log",
-    benchmark:
-        "<benchmarks>/<bundle>/export_plys.tsv"
-    resources:
-        mem_mb=per_attempt(2500),
-        runtime=per_attempt("10m"),
-    params:
-        source=code_of("export_plys"),
-    script:
-        "../scripts/export_plys.py"
 
 
 rule export_terrain:

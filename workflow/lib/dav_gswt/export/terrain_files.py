@@ -1,4 +1,4 @@
-"""A finite terrain as files of other programs, placed once, on disk, and a patch of its tiles at each level.
+"""A finite terrain as files of other programs, placed once, on disk.
 
 Which cells it has, and whether its files can be made, is checked before any work starts.
 """
@@ -14,24 +14,20 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.gswt import read_gswt
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.errors import InputError
-from dav_gswt.export.axes import Y_DOWN, turn_field
 from dav_gswt.export.formats import EXPORTERS, Exporter
 from dav_gswt.export.spool import Spool
-from dav_gswt.field import GaussianField, concatenate_fields, write_field
+from dav_gswt.field import GaussianField
 from dav_gswt.files import atomic_folder, write_json
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.logs import progress
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.finite import Area, count_cells, keep_level, list_blocks, place_block
 from dav_gswt.threads import map_ahead
-from dav_gswt.tiles.layout import EDGES, arrange_torus
 
 NAME = "terrain"
 KEPT = ("unit", "origin", "tile_side", "cells")  # of terrain.json, in files that have a place for it
-TILES_PER_ROW = 4  # of a patch
 BY_DISTANCE = "by_distance"
 MAX_BYTES = 2 * 10**9  # of a file; what would be larger is refused before any work
 
@@ -199,23 +195,3 @@ def place_blocks(terrain: EndlessTerrain, wanted: TerrainExport, threads: int = 
     blocks = progress(list_blocks(shown, wanted.area, wanted.eye), "place cells")
     jobs = (place_block(shown, cells, wanted.eye, wanted.origin) for cells in blocks)
     yield from map_ahead(lambda place: place(), jobs, threads)
-
-
-def assemble_patch(fields: list[GaussianField], side: float) -> GaussianField:
-    """One level's tiles side by side, four by four for each variant; the south-western corner is the origin.
-
-    All tiles are visible, no border inside the patch is, and copies of it can be placed side by side without a seam.
-    """
-    parts = []
-    for variant in range(len(fields) // EDGES):
-        for (row, column), tile in np.ndenumerate(arrange_torus(variant)[1:-1, 1:-1]):
-            corner = np.array([(TILES_PER_ROW * variant + column) * side, row * side, 0.0], np.float32)
-            parts.append(replace(fields[tile], means=fields[tile].means + corner))
-    return concatenate_fields(parts)
-
-
-def write_plys(archive: Path | str, side: float, out: Path | str) -> None:
-    """Write level{l}.ply, y down, of every level of a gswt.zip to a folder. Raises: InputError: see `read_gswt`."""
-    with atomic_folder(out) as folder:
-        for level, tiles in enumerate(progress(read_gswt(archive, side), "write patches")):
-            write_field(turn_field(assemble_patch(tiles, side), Y_DOWN), folder / f"level{level}.ply", plain=True)
