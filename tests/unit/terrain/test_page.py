@@ -69,7 +69,6 @@ def test_the_front_of_a_scene_is_beside_its_page(root, tmp_path, viewer, bundle)
     assert (tmp_path / "page/first.jpg").read_bytes() == b"still"
     assert (tmp_path / "page/photos.jpg").read_bytes() == b"sheet"
     assert json.loads((tmp_path / "page/story.json").read_text()) == story.value
-    assert json.loads((tmp_path / "page/front.json").read_text())["name"] == "Desert"
 
 
 @pytest.mark.parametrize(

@@ -22,23 +22,13 @@ from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_rule
 from dav_gswt.terrain.heights import PIXELS, FlatSurface, HeightField, require_plain_cover
 from dav_gswt.terrain.page_story import SHEET, STORY, Story
 
-INDEX, STILL, FRONT = "index.html", "first.jpg", "front.json"
+INDEX, STILL = "index.html", "first.jpg"
 OWN_SCRIPTS = ("early.js", "worker/", "api/", "terrain_api.js")  # that are no modules of the page itself
 STILL_WIDTH = 1280  # pixels, at most
 STILL_BYTES = 90_000  # at most: it is there within a second at 1 Mbit/s
 QUALITIES = (80, 70, 60, 50, 40, 30)  # the best that fits is taken; the last one anyhow
 STORY_BUTTON = '<button id="storyButton" type="button" aria-controls="story" aria-expanded="false"'
 DEFAULT_NAME, DEFAULT_LINE = "Endless terrain", "An endless terrain made from a few photos"
-VERDICTS = {"good": "The photos fit together well.", "doubtful": "It is doubtful that the photos fit together."}
-
-
-@dataclass(frozen=True)
-class FrontTexts:
-    """front.json: what a page says of its scene. verdict: what tests said of the photos and of the field."""
-
-    name: str
-    line: str
-    verdict: str
 
 
 @dataclass(frozen=True)
@@ -51,20 +41,16 @@ class Front:
     name: str
     line: str
     still: bytes
-    verdict: str = ""
     story: Story | None = None
 
 
 def front_of_scene(scene: str, story: Story | None, still: Path | str) -> Front:
     """The front of a scene's page. still: of the place where everybody begins. Raises: as `encode_still`."""
-    line, verdict = "An endless terrain made from a Gaussian field", ""
+    line = "An endless terrain made from a Gaussian field"
     if story:
         count = len(story.value["photos"])
         line = f"An endless terrain made from {count} photo{'s' * (count > 1)}"
-        tested = [one["psnr"] for one in story.value["rounds"] if one["psnr"] is not None]
-        psnr = f"Photos that were not used are predicted to {tested[-1]:.1f} dB." if tested else ""
-        verdict = " ".join(filter(None, (VERDICTS.get(story.value["grade"] or ""), psnr)))
-    return Front(name_of_scene(scene), line, encode_still(still), verdict, story)
+    return Front(name_of_scene(scene), line, encode_still(still), story)
 
 
 def name_of_scene(scene: str) -> str:
@@ -134,7 +120,6 @@ def write_page(
             (part / PIXELS).write_bytes(pixels)
         if front:
             (part / STILL).write_bytes(front.still)
-            write_json(part / FRONT, {"name": front.name, "line": front.line, "verdict": front.verdict})
         if front and front.story:
             write_json(part / STORY, front.story.value)
             (part / SHEET).write_bytes(front.story.sheet)
