@@ -1,6 +1,6 @@
-"""The ground of a finite terrain for simulators and engines: a mesh, height maps, a MuJoCo model, objects' hulls.
+"""The ground of a finite terrain for simulators and engines: a mesh, a height map, a MuJoCo model, objects' hulls.
 
-The frame is that of `exports/terrain`, z up. Height maps have the northern row first. MuJoCo's height field:
+The frame is that of `exports/terrain`, z up. The height map has the northern row first. MuJoCo's height field:
 https://mujoco.readthedocs.io/en/stable/XMLreference.html#asset-hfield.
 """
 
@@ -10,7 +10,6 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-import tifffile
 from jaxtyping import Float
 from numpy import ndarray as Array
 
@@ -48,7 +47,7 @@ def export_ground(
     settings: Mapping[str, Any],
     out: Path | str,
 ) -> None:
-    """Write ground.{glb,png,tif,hfield,xml,json} and objects.glb of the area of the config's `export` to a folder.
+    """Write ground.{glb,png,hfield,xml,json} and objects.glb of the area of the config's `export` to a folder.
 
     sets: the tiles of all materials. Raises: InputError: a planet, or an area whose height field has too many points.
     """
@@ -75,7 +74,7 @@ def export_ground(
         write_meshes([("ground", vertices, triangles, extras)], folder / "ground.glb")
         if hulls:
             write_meshes([(h.name, h.vertices, h.triangles, convex) for h in hulls], folder / "objects.glb")
-        facts["heights"] = _write_images(surface, folder, origin)
+        facts["heights"] = _write_heights(surface, folder, origin)
         _write_mujoco(surface, hulls, origin, folder)
         write_json(folder / "ground.json", facts)
 
@@ -100,25 +99,13 @@ def write_meshes(meshes: Sequence[Mesh], path: Path | str) -> None:
     glb.write(path)
 
 
-def _write_images(surface: GroundSurface, folder: Path, origin: Float[Array, "3"]) -> dict[str, Any]:
-    """Write ground.png, 16 bits from the lowest to the highest point, and ground.tif, floats.
-
-    Returns: what their pixels mean, for ground.json.
-    """
+def _write_heights(surface: GroundSurface, folder: Path, origin: Float[Array, "3"]) -> dict[str, Any]:
+    """Write ground.png, 16 bits from the lowest to the highest point. Returns: what its pixels mean, for ground.json."""
     above = surface.heights[::-1]
     low, high = float(above.min()), float(above.max())
     span = max(high - low, 1e-9)
     levels = np.rint((above.astype(float) - low) * (WHITE / span)).astype(np.uint16)
     image_files.write_grey16(folder / "ground.png", levels)
-    with atomic_file(folder / "ground.tif") as part:
-        tifffile.imwrite(
-            part,
-            np.ascontiguousarray(above, np.float32),
-            photometric="minisblack",
-            rowsperstrip=64,
-            metadata=None,
-            software="DAV-GSWT",
-        )
     rows, columns = above.shape
     north_west = [surface.west - origin[0], surface.south + (rows - 1) * surface.step - origin[1]]
     return {
