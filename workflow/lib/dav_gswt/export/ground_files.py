@@ -100,7 +100,7 @@ def write_meshes(meshes: Sequence[Mesh], path: Path | str) -> None:
 
 
 def _write_heights(surface: GroundSurface, folder: Path, origin: Float[Array, "3"]) -> dict[str, Any]:
-    """Write ground.png, 16 bits from the lowest to the highest point. Returns: what its pixels mean, for ground.json."""
+    """Write ground.png, 16 bits from the lowest to the highest point. Returns: what ground.json says of it."""
     above = surface.heights[::-1]
     low, high = float(above.min()), float(above.max())
     span = max(high - low, 1e-9)
