@@ -135,7 +135,7 @@ def _touched_zones(there: RigLimits, a: Axes, b: Axes) -> Bool[Array, "n"]:
 def list_turns(there: RigLimits, target: Axes, pan: float) -> list[Axes]:
     """A position with its pan at every whole turn within the limits, the nearest to `pan` first."""
     low, high = there.limits[0] - target[0]
-    places = [_replace_axis(target, 0, target[0] + TURN * n) for n in _whole_turns(low, high)]
+    places = [target + [TURN * n, 0.0, 0.0] for n in _whole_turns(low, high)]
     return sorted(places, key=lambda place: abs(place[0] - pan))
 
 
@@ -152,9 +152,3 @@ def plan_route(there: RigLimits, a: Axes, target: Axes) -> list[Axes] | str:
         if not why and not _touched_zones(there, a, place).any():
             return [] if np.array_equal(a, place) else [place]
     return "the straight move there crosses a no_go"
-
-
-def _replace_axis(place: Axes, axis: int, value: float) -> Axes:
-    changed = place.copy()
-    changed[axis] = value
-    return changed
