@@ -16,7 +16,7 @@ from dav_gswt.terrain.page import write_page
 SURFACES = {
     "flat": FlatSurface(),
     "hills": Hills(2.0, 30.0),
-    "image": HeightMap(np.random.default_rng(1).uniform(0, 3, (9, 7)).astype(np.float32), 60.0, "clamp"),
+    "image": HeightMap(np.random.default_rng(1).uniform(0, 3, (9, 7)).astype(np.float32), 60.0),
 }
 HILLS = {"kind": "hills", "height": 0.4, "wavelength": 4}
 RULE = [{"kind": "noise"}, {"kind": "height", "material": "grass", "low": 0.1, "soft": 0.2}]

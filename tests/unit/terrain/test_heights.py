@@ -18,14 +18,13 @@ RUGGED = HeightMap(RNG.normal(size=(7, 9)).astype(np.float32), 13.0)
 SURFACES = [
     pytest.param(Hills(2.0, 7.0, 5, 3), id="hills"),
     pytest.param(RUGGED, id="mirrored image"),
-    pytest.param(HeightMap(RUGGED.pixels, 13.0, "clamp"), id="clamped image"),
 ]
 
 
 def surface_of(entry) -> HeightField:
     if entry["kind"] == "hills":
         return Hills(*(entry[key] for key in ("height", "wavelength", "octaves", "salt")))
-    return HeightMap(np.array(entry["pixels"], np.float32), entry["width"], entry["beyond"])
+    return HeightMap(np.array(entry["pixels"], np.float32), entry["width"])
 
 
 def places(n, reach=60.0):
@@ -73,8 +72,7 @@ def test_surfaces_are_those_of_the_config(tmp_path):
     entry = {"kind": "image", "file": str(tmp_path / "map.exr"), "width": 6.0, "height": 10.0}
     surface = heights.surface_from_config(entry, 2.8)
     np.testing.assert_allclose(surface.pixels, 10 * values, rtol=1e-6)
-    assert surface.width == 6.0 and surface.beyond == "mirror"
-    assert heights.surface_from_config(entry | {"beyond": "clamp"}, 2.8).beyond == "clamp"
+    assert surface.width == 6.0
 
 
 def write_map(folder, values, no_data=None):

@@ -43,7 +43,7 @@ const DEEPEST = 6; // levels of lists and objects within a manifest
 const KEYS = new Set(`format version unit tile_side salt eye_floor ground_colour sky zenith horizon
   sun direction colour encoding origin step log_scale sh_degree directions levels level mean_scale
   distance band tiles tile uncertainty z chunks file bytes count orders sha256 heights kind height
-  wavelength octaves radius cells rows columns width beyond materials name share first_tile classes
+  wavelength octaves radius cells rows columns width materials name share first_tile classes
   rule weight wavelengths biases material low high soft jitter amplitude rise slope most ground
   clearance painted objects density probability scatter turn size`.split(/\s+/));
 
