@@ -129,9 +129,9 @@ def test_a_run_leaves_for_other_programs(tiny, snakemake, tmp_path):
     there = {path.name for path in (folder / bundle / "exports/ground").iterdir() if not path.name.startswith(".")}
     assert there - {"objects.glb"} == {f"ground.{kind}" for kind in ("glb", "json", "png", "hfield", "xml")}
 
-    small = ("--cores", "2", "--config", "export={columns: 1000, rows: 1000}")
+    small = ("--cores", "2", "--config", "export={level: 9}")
     refused = snakemake(folder, targets[1], *small, configs=CONFIGS, check=False)
-    assert refused.returncode and "export: glb: 1000 x 1000 cells have up to" in refused.stdout
+    assert refused.returncode and "export.level: there is no level 9" in refused.stdout
 
 
 def test_another_preset_fits_the_photos_that_the_first_one_chose(tiny, snakemake, tmp_path):
