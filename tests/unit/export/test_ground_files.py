@@ -116,7 +116,7 @@ def _lift(field, by):
 def test_a_planet_and_too_many_points_are_refused(cover_terrain, sets, cover_bundle, settings, tmp_path):
     planet = replace(cover_terrain, heights=make_sphere(8.0, cover_terrain.side))
     with pytest.raises(InputError, match="heights: a rectangle of cells is cut from a plane"):
-        ground_files.check_ground(planet, cover_bundle.manifest, sets, settings)
+        ground_files.check_ground(planet, sets, settings)
     given = settings | {"columns": 1000, "rows": 1000}
     with pytest.raises(
         InputError, match=r"ground: 1000 x 1000 cells have .* points, at most \d+ .* set export\.columns"
