@@ -289,16 +289,16 @@ def height_map(wildcards):
     return {"map": found}
 
 
-def class_pictures(wildcards):
-    """The pictures and painted files that the rule of classes reads."""
-    files = [term["file"] for term in config["classes"] if term["kind"] in ("image", "painted")]
-    return {f"picture{number}": existing(file, "classes.file") for number, file in enumerate(files)}
+def painted_files(wildcards):
+    """The painted file that the rule of classes reads."""
+    files = [term["file"] for term in config["classes"] if term["kind"] == "painted"]
+    return {f"painted{number}": existing(file, "classes.file") for number, file in enumerate(files)}
 
 
 def terrain_targets(scene):
-    """A scene's terrain: page, stills, a sheet of them and, where the config asks for one, a flight."""
+    """A scene's terrain: page, stills and a sheet of them."""
     made = [rules.make_page.output.page, *rules.render_terrain.output.stills, rules.make_contact_sheet.output.sheet]
-    return expand(made + [rules.render_flight.output.frames] * bool(config["flight"]), **branch(scene))
+    return expand(made, **branch(scene))
 
 
 def photo_targets(scene):

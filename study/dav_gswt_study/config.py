@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
 from dav_gswt.config.load import check_config, check_model
 from dav_gswt.config.model import Policy
-from dav_gswt.config.settings import Flight, Heights
+from dav_gswt.config.settings import Heights
 from dav_gswt.errors import InputError
 from dav_gswt_study.config_fits import Comparison, Names, PresetCosts, Seeds
 from dav_gswt_study.seams import replicates
@@ -99,6 +99,14 @@ class Lattice(Levels):
 
 class Transitions(Levels):
     """Seam-LPIPS of borders between materials against photographed ones (`snakemake materials_pages`)."""
+
+
+class Flight(ConfigModel):
+    """A walk straight on, rendered frame by frame."""
+
+    frames: int = key("number of frames", ge=2, le=100_000)
+    length: float = key("of the walk", unit="tile sides", gt=0, le=100_000)
+    height: float = key("of the eye above the surface", unit="eye floors", ge=0.5, le=100)
 
 
 class GalleryPage(ConfigModel):

@@ -1,10 +1,10 @@
 """Pictures of docs/exports.md: what other programs draw of each export of the config's scene.
 
-In: the page and the tiles. Out: docs/figures/exit_{name}.jpg. Needs Chromium, Node.js (`npm ci --prefix examples`), mujoco
-with EGL, usd-core and rasterio. `snakemake --cores 2 docs/figures/exit_spz.jpg`
+In: the page and the tiles. Out: docs/figures/exit_{name}.jpg. Needs Chromium, Node.js (`npm ci --prefix examples`), and mujoco
+with EGL. `snakemake --cores 2 docs/figures/exit_spz.jpg`
 """
 
-EXITS = ["spz", "ply", "sog", "streamed_sog", "glb", "glb_points", "3dtiles", "usd", "ground", "heights", "mujoco"]
+EXITS = ["spz", "ply", "sog", "glb", "glb_points", "3dtiles", "ground", "mujoco"]
 
 
 rule draw_exits:

@@ -27,7 +27,7 @@ rule render_walk:
     """A walk over the terrain, frame by frame."""
     input:
         unpack(height_map),
-        unpack(class_pictures),
+        unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
     output:

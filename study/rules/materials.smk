@@ -52,7 +52,7 @@ rule materials_table:
 rule measure_lattice:
     """The terrain from above, and how visibly it repeats."""
     input:
-        unpack(class_pictures),
+        unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
     output:
@@ -101,7 +101,7 @@ rule measure_transitions:
     """Seam-LPIPS of crops across borders of materials, beside photographed ones."""
     input:
         unpack(lambda wildcards: lpips_weights()),
-        unpack(class_pictures),
+        unpack(painted_files),
         field="<results>/<round>{inpainted}/field.ply",
         ground="<results>/<round>{inpainted}/ground.exr",
         materials="<results>/<materials>",

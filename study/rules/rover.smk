@@ -27,7 +27,7 @@ rule draw_rover:
         mem_mb=per_attempt(3000),
         runtime=per_attempt("20m"),
     params:
-        export=["--radius", "6", "--format", "ply", "--format", "ground"],
+        export=["--columns", "12", "--rows", "12", "--format", "ply", "--format", "ground"],
         seconds=8,
         source=code_of_study("draw_rover"),
     script:

@@ -129,7 +129,7 @@ rule plot_tile_uncertainty:
         "<benchmarks>/<bundle>/plot_tile_uncertainty.tsv"
     params:
         tau=real("tau"),
-        length=lambda wildcards: float(config["flight"].get("length", 16)),
+        length=16.0,
         source=code_of_study("plot_tile_uncertainty"),
     script:
         "../scripts/plot_tile_uncertainty.py"

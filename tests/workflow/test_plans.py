@@ -21,7 +21,6 @@ def test_the_default_target_makes_every_stage_once(planned, tmp_path):
     once = ["render_photos", "split_views", "fit_coarse", "score_coarse", "make_levels", "cut_tiles", "bundle_tiles"]
     assert all(plan[rule] == 1 for rule in [*once, "make_page", "render_terrain", "evaluate_coarse"])
     assert plan["update_field"] == plan["capture_views"] == plan["evaluate_round"] == 2
-    assert not plan["render_flight"] and not plan["inpaint_field"]
 
 
 def test_values_of_a_sweep_share_the_stages_before_them(planned, tmp_path):

@@ -23,12 +23,20 @@ STEP = 0.02  # eye floors from a frame to the next: the page's walking pace, 1.2
 MAX_RATIO = 2.0  # of the largest change, over that of the exactly sorted walk
 
 
+def walk_shots(frames: int, length: float, height: float) -> list[Shot]:
+    """Shots of a straight walk from the walker's place: `length` in tiles, `height` in eye floors above the surface."""
+    walker = stills.SHOTS[0]
+    yaw = np.radians(walker.yaw)
+    way = np.linspace(0, length, frames)[:, None] * [np.cos(yaw), np.sin(yaw)] + walker.at
+    return [replace(walker, name=f"{k:04d}", at=tuple(at), height=float(height)) for k, at in enumerate(way.tolist())]
+
+
 def make_frame_pairs(count: int, length: float, step: float) -> list[tuple[Shot, Shot]]:
     """Pairs of consecutive frames of a walk `length` tiles long, `step` tiles apart.
 
     Every second pair is moved to where the walk next enters another cell: half a step before and half a step after.
     """
-    way = stills.walk_shots(count, length, 1.0)
+    way = walk_shots(count, length, 1.0)
     rows = []
     for k, shot in enumerate(way):
         yaw = np.radians(shot.yaw)

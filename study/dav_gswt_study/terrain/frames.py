@@ -21,6 +21,7 @@ from dav_gswt.terrain import endless, heights, stills, visibility
 from dav_gswt.terrain.page import write_page
 from dav_gswt.terrain.stills import FrameTiming, Shot
 from dav_gswt_study.tables import spread
+from dav_gswt_study.terrain.flicker import walk_shots
 
 PARTS = ("render", "sort", "update")
 LIBRARY, PAGE = "library", "page"
@@ -63,7 +64,7 @@ class FrameSettings:
     budgets: list[int]
 
     def shots(self) -> list[Shot]:
-        return stills.walk_shots(**self.flight)
+        return walk_shots(**self.flight)
 
 
 def time_library(bundle: Bundle, settings: FrameSettings) -> list[dict]:

@@ -59,7 +59,7 @@ def test_a_fit_is_given_all_keys_of_its_settings(rule):
 
 def test_scores_are_given_all_keys_of_a_rig_s_reach():
     given = select_keys(PhotoScene, "score_coarse", photo_scene("serial"))["rig"]
-    assert not {"millimetres", "limits", "no_go"} & given.withheld and "port" in given.withheld
+    assert not {"millimetres", "limits"} & given.withheld and "port" in given.withheld
     assert serial_rig.filter_reachable({"rig": given}, synthetic.make_scene("desert", 0).frame, []) == []
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders, Digest
+from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders
 from dav_gswt.bundle.encoding import Entry, Length, Natural, Pair, Share, Size
 
 MAX_PAINTED = 2**18  # points
@@ -46,21 +46,6 @@ class RangeTerm:
 
 
 @dataclass(frozen=True)
-class ImageTerm:
-    """A term of the rule of classes: a picture of materials, one byte a pixel, the northern row first."""
-
-    kind: Literal["image"]
-    weight: Size
-    file: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+\.bin$")]
-    bytes: Natural
-    sha256: Digest
-    rows: Pixels
-    columns: Pixels
-    width: Length
-    beyond: Literal["mirror", "clamp"]
-
-
-@dataclass(frozen=True)
 class JitterEntry(Entry):
     """Fine noise that frays the borders of classes: its widest octave has `cells` cells along a tile's side, each next
     one twice as many; scores change by `amplitude` at most.
@@ -81,7 +66,7 @@ class RiseEntry(Entry):
     clearance: list[Size]
 
 
-RuleTerm = Annotated[NoiseTerm | RangeTerm | ImageTerm, Field(discriminator="kind")]
+RuleTerm = Annotated[NoiseTerm | RangeTerm, Field(discriminator="kind")]
 
 
 @dataclass(frozen=True)
@@ -102,8 +87,6 @@ class ClassesEntry(Entry):
                 lists += [term.wavelengths, term.octaves, term.biases]
             elif isinstance(term, RangeTerm) and term.material >= materials:
                 yield "a term is of a material that is not there"
-            elif isinstance(term, ImageTerm) and term.bytes != term.rows * term.columns:
-                yield f"{term.file}: bytes do not fit rows and columns"
         if any(len(values) != materials for values in lists):
             yield f"a list does not have one value for each of {materials} materials"
         if fault := find_run_fault(self.painted, materials):

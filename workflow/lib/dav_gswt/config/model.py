@@ -10,7 +10,6 @@ from dav_gswt.config.scenes import FieldScene, Scene
 from dav_gswt.config.settings import (
     ClassTerm,
     Flat,
-    Flight,
     NoiseClasses,
     Preset,
     PriorSettings,
@@ -83,7 +82,6 @@ class Config(ConfigModel):
         max_length=16,
     )
     stills: Stills = key("size of the stills", Stills())
-    flight: Flight = key("a walk that is rendered frame by frame", Flight())
     export: Export = key("a finite terrain for other programs, asked for by its path: docs/exports.md", Export())
     scenes: dict[Name, Scene] = key("what there is to make a terrain of", {})
     priors: dict[Name, PriorSettings] = key("diffusion priors", {})

@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from dav_gswt.capture.agents import list_agents
-from dav_gswt.config.base import ConfigModel, Degrees, Name, PhotoSize, Seed, Text, key
+from dav_gswt.config.base import ConfigModel, Name, PhotoSize, Seed, Text, key
 
 if TYPE_CHECKING:
     SyntheticAgent = PhotoAgent = str
@@ -28,46 +28,24 @@ REGISTERED, RENDERED = ("register_photos",), ("render_photos",)
 class Axes(ConfigModel):
     """Ranges of a rig's axes."""
 
-    pan: Range | None = key("rotation about the vertical", None, unit="degrees")
-    tilt: Range | None = key("rotation about the horizontal", None, unit="degrees")
-    radius: Range | None = key("distance from the exemplar's centre", None, unit="mm")
+    pan: Range = key("rotation about the vertical", unit="degrees")
+    tilt: Range = key("rotation about the horizontal", unit="degrees")
+    radius: Range = key("distance from the exemplar's centre", unit="mm")
 
 
 class SerialRig(ConfigModel):
     """A motorised camera rig on a serial port (docs/rig-protocol.md), for `agent: serial`."""
 
     port: Text = key("the serial port: `/dev/ttyUSB0`, or a URL that pyserial knows (`socket://rig:4000`)")
-    baud: int = key("speed of the port", 115200, unit="bit/s", ge=300, le=4_000_000)
     inbox: Text = key("the folder into which the tethered camera's software saves photos")
     millimetres: float = key(
         "in one unit of the scene's world (`ground.json`)", unit="mm", read_by=SCORING, ge=0.001, le=1e6
     )
-    pan_zero: Degrees = key("pan at the world's azimuth 0 (its +x)", 0, unit="degrees", read_by=SCORING)
-    tilt_zero: Degrees = key("tilt at elevation 0 (the horizon)", 0, unit="degrees", read_by=SCORING)
-    limits: Axes = key("`pan`, `tilt` and `radius`: lowest and highest that the rig may be sent to", read_by=SCORING)
-    no_go: list[Axes] = key(
-        "boxes that it neither enters nor crosses; an axis left out is barred in full",
-        [],
+    limits: Axes = key(
+        "`pan`, `tilt` and `radius`: lowest and highest that the rig may be sent to; no obstacle may lie within",
         read_by=SCORING,
-        max_length=20,
     )
-    move_timeout: float = key("longest time of one move, or of homing", 120, unit="s", ge=0.1, le=3600)
-    photo_timeout: float = key("longest time until a photo is complete in `inbox`", 30, unit="s", ge=0.1, le=3600)
     dry_run: bool = key("`true`: print each move, move nothing, take nothing", True)
-
-    @field_validator("limits")
-    @classmethod
-    def _require_all_limits(cls, limits: Axes) -> Axes:
-        if missing := [axis for axis in ("pan", "tilt", "radius") if getattr(limits, axis) is None]:
-            raise ValueError(f"{missing[0]} is missing")
-        return limits
-
-    @field_validator("no_go")
-    @classmethod
-    def _require_an_axis(cls, no_go: list[Axes]) -> list[Axes]:
-        if Axes() in no_go:
-            raise ValueError("a box without any axis bars every move; give it an axis")
-        return no_go
 
 
 class Drone(ConfigModel):
