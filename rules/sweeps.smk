@@ -1,7 +1,7 @@
 """Sweeps: what one setting changes, and the time of each stage. Not part of `all`: `snakemake sweeps`.
 
 In: the runs of the config's scene for each value of the config's `sweeps`, the other settings as the config has them; what runs
-have in common is made once. Out: results/sweeps/{sweep}.csv.
+have in common is made once. Out: results/sweeps/{sweep}.csv, results/tables/timing.csv.
 """
 
 SWEPT_POLICY = "w2-lpips"  # the paper's, where the config's policy does not sample the prior
@@ -9,7 +9,7 @@ SWEPT_POLICY = "w2-lpips"  # the paper's, where the config's policy does not sam
 
 def experiment_branch(scene, changes):
     """The wildcards of a run with settings that replace the config's. No round stops early, and nothing is inpainted."""
-    return branch(scene, changes=changes) | {"inpainted": ""}
+    return branch(scene, changes=changes) | {"stop": "", "inpainted": ""}
 
 
 def sweep_cells(sweep):
@@ -56,6 +56,13 @@ def describe_run(values, measured):
     return cell | {"corrected": corrected, "files": {key: of(path)[0] for key, path in files.items()}, "times": times}
 
 
+def timed_cells():
+    """The cells of the timing table: the swept scene with the config's settings."""
+    policy = config["policy"] if config["policy"] in PRIOR_POLICIES else SWEPT_POLICY
+    values = experiment_branch(config["scene"], {"policy": policy})
+    return [describe_run(values | {"seed": seed}, ["views", "tiles", "stills"]) for seed in config["seeds"]]
+
+
 rule gather_sweep:
     """Collect what each value of a setting changes, and what it costs."""
     input:
@@ -75,10 +82,28 @@ rule gather_sweep:
         "../scripts/gather_sweep.py"
 
 
+rule tabulate_timing:
+    """The time of each stage of a run."""
+    input:
+        measured=lambda wildcards: [path for cell in timed_cells() for path in cell["files"].values()],
+    output:
+        table=report("results/tables/timing.csv", category="Tables", labels={"table": "timing"}),
+    log:
+        "<logs>/tables/timing.log",
+    benchmark:
+        "<benchmarks>/tables/timing.tsv"
+    params:
+        cells=lambda wildcards: timed_cells(),
+        source=code_of("tabulate_timing"),
+    script:
+        "../scripts/tabulate_timing.py"
+
+
 rule sweeps:
-    """The tables of all sweeps of the config."""
+    """The tables of all sweeps of the config, and the timing table."""
     input:
         expand("results/sweeps/{sweep}.csv", sweep=config["sweeps"]),
+        "results/tables/timing.csv",
 
 
 localrules:

@@ -1,4 +1,4 @@
-"""Tables of sweeps, from files that a run would leave."""
+"""Tables of sweeps and of timing, from files that a run would leave."""
 
 import json
 
@@ -36,6 +36,18 @@ def test_a_row_has_quality_tiles_and_their_origin(tmp_path):
     row = sweeps.tabulate_cell(CELL | {"corrected": True, "files": {"metrics": files["metrics"]}, "times": {}})
     assert (row["psnr"], row["worst_psnr"], row["psnr_is"]) == (21, 16, "colour-corrected")
     assert not [row[key] for key in (*sweeps.TILES, *sweeps.TIMES) if row[key] is not None]
+
+
+def test_the_timing_table_has_means_over_seeds_and_none_for_what_was_not_timed(tmp_path):
+    cells = []
+    for seed, seconds in enumerate((60.0, 120.0)):
+        (path := tmp_path / f"coarse{seed}.tsv").write_text(f"s\tmax_rss\n{seconds}\t100\n")
+        times = {"coarse": [str(path)]}
+        files = {"metrics": metrics(tmp_path), "manifest": manifest(tmp_path)}
+        cells.append(CELL | {"seed": seed, "files": files, "times": times})
+    (row,) = sweeps.tabulate_timing(cells)
+    assert (row["seeds"], row["recon_min"], row["splats_m"], row["peak_mb"]) == (2, 1.5, 17e-6, 100)
+    assert row["cut_s"] is None and row["presort_s"] is None
 
 
 def test_seconds_are_those_of_a_round_and_of_all_that_leads_to_the_field(tmp_path):

@@ -1,4 +1,4 @@
-"""The tables of sweeps, from the files and benchmarks that runs left.
+"""The tables of sweeps and of timing, from the files and benchmarks that runs left.
 
 A cell is one run: a scene, a seed and a combination of settings. The rules list a cell's files and the
 benchmarks of its jobs; the functions here read them.
@@ -108,3 +108,28 @@ def sum_or_none(values: Iterable[float | None]) -> float | None:
     """Sum; None if a value is None."""
     found = list(values)
     return None if None in found else sum(value for value in found if value is not None)
+
+
+def tabulate_timing(cells: list[dict]) -> list[dict]:
+    """Make the timing table: for each scene and preset the means over its seeds.
+
+    Columns: `splats_m`, millions of Gaussians of all tiles and levels; `recon_min`, minutes from registered photos to
+    the last field, except taking photos; seconds of levels and of cutting tiles; `presort_s`, seconds of the bundle
+    with its orders; `peak_mb`. Source: DAV-GSWT, table of timing.
+    """
+    rows = [tabulate_cell(cell) for cell in cells]
+    found = []
+    for scene, preset in dict.fromkeys((row["scene"], row["preset"]) for row in rows):
+        mine = [row for row in rows if (row["scene"], row["preset"]) == (scene, preset)]
+        splats, recon = compute_mean(mine, "splats"), compute_mean(mine, "recon_s")
+        row = {"scene": scene, "preset": preset, "seeds": len(mine), "photos": compute_mean(mine, "photos")}
+        row |= {"splats_m": splats and splats / MEGA, "recon_min": recon and recon / 60}
+        row |= {key: compute_mean(mine, key) for key in ("levels_s", "cut_s")}
+        found.append(row | {"presort_s": compute_mean(mine, "bundle_s"), "peak_mb": compute_mean(mine, "peak_mb")})
+    return found
+
+
+def compute_mean(rows: list[dict], key: str) -> float | None:
+    """Compute the mean of a column over the rows that have a value."""
+    values = [row[key] for row in rows if row[key] is not None]
+    return sum(values) / len(values) if values else None
