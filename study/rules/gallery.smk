@@ -4,6 +4,24 @@ In: photos, stills, metrics, materials and bundles of the scenes of the config's
 docs/figures/gallery_{scene}.jpg, docs/figures/walk.webp, and beside the terrain of the walk its frames.
 """
 
+GALLERY = STUDY.get("gallery", {"scenes": [], "walk": "", "rate": 1})
+
+
+def gallery_cells():
+    """Of each scene of the gallery its files."""
+    return [gallery_cell(scene) for scene in GALLERY["scenes"]]
+
+
+def gallery_cell(scene):
+    """One of them."""
+    values, entry = made_of(scene), config["scenes"][scene]
+    (metrics,), (manifest,) = (
+        expand(path, **values) for path in (rules.evaluate_round.output.metrics, rules.bundle_tiles.output.manifest)
+    )
+    told = entry.get("materials", "one") != "one"
+    materials = expand(rules.find_materials.output.materials, **values)[0] if told else None
+    return {"scene": scene, "kind": entry["kind"], "metrics": metrics, "manifest": manifest, "materials": materials}
+
 
 rule draw_scene:
     """A photo, the terrain from above, and what a walker sees, side by side."""
@@ -77,6 +95,7 @@ rule write_gallery:
         lambda wildcards: [
             cell[key] for cell in gallery_cells() for key in ("metrics", "manifest", "materials") if cell[key]
         ],
+        template=str(HERE / "report/gallery.md"),
     output:
         page="docs/gallery.md",
     log:

@@ -97,52 +97,6 @@ rule lattice_table:
         rules.gather_lattice.output.table,
 
 
-rule measure_transitions:
-    """Seam-LPIPS of crops across borders of materials, beside photographed ones."""
-    input:
-        unpack(lambda wildcards: lpips_weights()),
-        unpack(class_pictures),
-        field="<results>/<round>{inpainted}/field.ply",
-        ground="<results>/<round>{inpainted}/ground.exr",
-        materials="<results>/<materials>",
-        manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
-    output:
-        table="<results>/<bundle>/lattice/transitions.csv",
-    log:
-        "<logs>/<bundle>/measure_transitions.log",
-    benchmark:
-        "<benchmarks>/<bundle>/measure_transitions.tsv"
-    resources:
-        mem_mb=per_attempt(6000),
-    params:
-        classes=lookup(dpath="classes", within=config),
-        seed=integer("seed"),
-        source=code_of_study("measure_transitions"),
-    script:
-        "../scripts/measure_transitions.py"
-
-
-use rule gather_lod as gather_transitions with:
-    input:
-        tables=lambda wildcards: list(measured_of_tiles(rules.measure_transitions, "transitions")),
-    output:
-        table=report(
-            "study/results/tables/transitions.csv",
-            caption="../report/transitions.rst",
-            category="Tables",
-            labels={"table": "borders of materials"},
-        ),
-        kept="study/docs/data/transitions.csv",
-    log:
-        "<logs>/tables/gather_transitions.log",
-    benchmark:
-        "<benchmarks>/tables/gather_transitions.tsv"
-    params:
-        cells=lambda wildcards: list(measured_of_tiles(rules.measure_transitions, "transitions").values()),
-        source=code_of_study("gather_lod"),
-
-
 rule draw_materials_sheet:
     """What was found over the ground, and the terrain from above, obliquely, and as a walker sees it."""
     input:
@@ -188,30 +142,11 @@ rule gather_verdicts:
         "../scripts/gather_verdicts.py"
 
 
-rule draw_cover:
-    """The picture of the README: photos above, the terrain made of them below."""
-    input:
-        images=lambda wildcards: expand(rules.register_photos.output.images, scene=STUDY["cover"]),
-        views=lambda wildcards: expand(rules.split_views.output.views, **made_of(STUDY["cover"])),
-        stills=lambda wildcards: expand(rules.render_terrain.output.stills, **made_of(STUDY["cover"])),
-    output:
-        picture="docs/terrain.jpg",
-    log:
-        "<logs>/figures/draw_cover.log",
-    benchmark:
-        "<benchmarks>/figures/draw_cover.tsv"
-    params:
-        source=code_of_study("draw_cover"),
-    script:
-        "../scripts/draw_cover.py"
-
-
 rule write_materials_page:
     """The page about materials, from its template and its tables."""
     input:
         materials=rules.gather_materials.output.kept,
         lattice=rules.gather_lattice.output.kept,
-        transitions=rules.gather_transitions.output.kept,
         verdicts=rules.gather_verdicts.output.kept,
         template=str(HERE / "report/materials_page.md"),
     output:
@@ -227,8 +162,7 @@ rule write_materials_page:
 
 
 rule materials_pages:
-    """study/docs/results/materials.md with its tables and pictures, and the README's picture."""
+    """study/docs/results/materials.md with its tables and pictures."""
     input:
         rules.write_materials_page.output.page,
-        rules.draw_cover.output.picture,
         expand(rules.draw_materials_sheet.output, shown=STUDY.get("lattice", {}).get("scenes", [])),

@@ -6,6 +6,6 @@ from dav_gswt_study.materials import page
 
 with logging_to(snakemake.log[0]):
     paths = snakemake.input
-    tables = {name: paths[name] for name in ("materials", "lattice", "transitions", "verdicts")}
+    tables = {name: paths[name] for name in ("materials", "lattice", "verdicts")}
     values = page.describe_materials(tables)
     markdown.write_page(snakemake.output.page, markdown.render_template(paths.template, values))
