@@ -71,11 +71,11 @@ class Levels(ConfigModel):
 
 
 class Materials(Levels):
-    """`snakemake materials_table`: materials and objects against true labels (family `oasis`, `materials: auto`)."""
+    """Materials and objects against true labels (family `oasis`, `materials: auto`)."""
 
 
 class Lattice(Levels):
-    """`snakemake lattice_table`: how visibly terrains repeat, from above."""
+    """How visibly terrains repeat, from above (`snakemake materials_pages`)."""
 
 
 class GalleryPage(ConfigModel):
@@ -99,7 +99,6 @@ class Frames(Levels):
     budgets: list[Annotated[int, Field(ge=1000, le=6_000_000)]] = key(
         "Gaussians in view; tables show the first", min_length=1
     )
-    pairs: int = key("consecutive frames of a slow walk whose change is measured", ge=2, le=1000)
 
 
 class Calibration(ConfigModel):

@@ -33,8 +33,6 @@ rule draw_scene:
         picture="docs/figures/gallery_{shown}.jpg",
     log:
         "<logs>/figures/gallery_{shown}.log",
-    benchmark:
-        "<benchmarks>/figures/gallery_{shown}.tsv"
     params:
         source=code_of_study("draw_scene"),
     script:
@@ -52,8 +50,6 @@ rule render_walk:
         frames=directory("<results>/<terrain>/walk"),
     log:
         "<logs>/<terrain>/render_walk.log",
-    benchmark:
-        "<benchmarks>/<terrain>/render_walk.tsv"
     threads: 2
     resources:
         mem_mb=per_attempt(4000),
@@ -76,8 +72,6 @@ rule draw_walk:
         picture="docs/figures/walk.webp",
     log:
         "<logs>/figures/draw_walk.log",
-    benchmark:
-        "<benchmarks>/figures/draw_walk.tsv"
     resources:
         mem_mb=per_attempt(3000),
     params:
@@ -100,8 +94,6 @@ rule write_gallery:
         page="docs/gallery.md",
     log:
         "<logs>/figures/write_gallery.log",
-    benchmark:
-        "<benchmarks>/figures/write_gallery.tsv"
     params:
         cells=lambda wildcards: gallery_cells(),
         walk=GALLERY["walk"],
@@ -115,7 +107,3 @@ rule gallery_page:
     """The gallery of the docs."""
     input:
         rules.write_gallery.output.page,
-
-
-localrules:
-    gallery_page,

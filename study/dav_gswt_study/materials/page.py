@@ -5,10 +5,24 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from dav_gswt.csv_tables import read_table
+from dav_gswt.materials.store import read_report
 from dav_gswt_study.markdown import format_table
 
 ACCURACY = ("iou_sand", "iou_meadow", "iou_boulders", "iou_path")
 REPETITION = ("brightness", "landmarks", "busyness", "mean_tile", "next")
+
+
+def tabulate_verdicts(folders: Mapping[str, Path | str]) -> list[dict]:
+    """The verdict on each scene and on each of its materials. folders: of materials, by scene."""
+    rows = []
+    for scene, folder in folders.items():
+        found = read_report(folder)
+        whole = {"scene": scene, "of": "all", "share": 1 - found.excluded, "objects": len(found.objects)}
+        rows.append(whole | vars(found.verdict))
+        for number, each in enumerate(found.materials):
+            own = sum(thing.material == number for thing in found.objects)
+            rows.append({"scene": scene, "of": each.name, "share": each.share, "objects": own} | vars(each.verdict))
+    return rows
 
 
 def describe_materials(tables: Mapping[str, Path | str]) -> dict[str, str]:
