@@ -40,11 +40,12 @@ def suit_width(terrain: EndlessTerrain, width: int) -> EndlessTerrain:
     return replace(terrain, **dict(zip(("switches", "bands"), scaled, strict=True)))
 
 
-def animate_frames(frames: Sequence[Path | str], rate: int, out: Path | str) -> None:
+def animate_frames(frames: Sequence[Float[Array, "h w 3"]], rate: int, out: Path | str) -> None:
     """Write pictures one after the other as an endless WebP. rate: frames a second."""
     from PIL import Image  # here, not above: Pillow loads its plugins
 
-    first, *others = (Image.open(path).convert("RGB") for path in frames)
+    pixels = (np.rint(np.clip(frame, 0, 1) * 255).astype(np.uint8) for frame in frames)
+    first, *others = map(Image.fromarray, pixels)
     options = {"duration": round(1000 / rate), "loop": 0, "quality": WALK_QUALITY, "method": 4}
     with atomic_file(out) as part:
         first.save(part, format="WEBP", save_all=True, append_images=others, **options)

