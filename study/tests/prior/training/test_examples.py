@@ -46,9 +46,9 @@ def test_a_seed_makes_the_same_examples_of_what_a_prior_takes_and_the_fit_resemb
 
 
 def test_a_camera_inside_a_thing_is_known_and_a_turned_one_stays_where_it_is():
-    field, camera = examples.make_world(0).field, camera_layouts.orbit(90, 0, 7.0, (0, 0, 0), 8, 8, 55)
+    field, camera = examples.make_world(0).field, camera_layouts.orbit(90, 0, 7.0, (0, 0, 0), 8, 8, 55.0)
     assert examples.is_clear(field, camera)
-    assert not examples.is_clear(field, camera_layouts.orbit(90, 0, 0.1, field.means[0], 8, 8, 55))
+    assert not examples.is_clear(field, camera_layouts.orbit(90, 0, 0.1, field.means[0], 8, 8, 55.0))
     turned = examples.aim_camera(camera, np.array([1.0, 2.0, 0.0]))
     np.testing.assert_allclose(turned.centre, camera.centre, atol=1e-9)
     np.testing.assert_allclose(turned.project(np.array([[1.0, 2.0, 0.0]]))[0], [[4, 4]], atol=1e-9)

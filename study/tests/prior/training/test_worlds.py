@@ -19,15 +19,15 @@ def test_a_seed_makes_one_world_which_can_be_drawn_and_fills_a_photo_from_above(
     assert 40_000 < len(made.field) < 250_000
     assert all(np.isfinite(getattr(made.field, f.name)).all() for f in fields(GaussianField))
     assert made.field.base_colours.min() >= -1e-6 and made.field.base_colours.max() <= 1 + 1e-6
-    seen = render(made.field, camera_layouts.orbit(90, 0, worlds.FLYING_HEIGHT, (0, 0, 0), 64, 64, 55))
+    seen = render(made.field, camera_layouts.orbit(90, 0, worlds.FLYING_HEIGHT, (0, 0, 0), 64, 64, 55.0))
     assert seen.alpha.min() > 0.95
     assert 0.05 < seen.colour.mean() < 0.9
 
 
 def test_the_sky_is_the_horizons_colour_level_and_the_zeniths_straight_up():
     sky = worlds.Sky(np.array([0.1, 0.2, 0.3]), np.array([0.7, 0.8, 0.9]))
-    level = sky.render(camera_layouts.orbit(0, 0, 5, (0, 0, 0), 33, 33, 55))
-    up = sky.render(camera_layouts.orbit(-90, 0, 5, (0, 0, 0), 33, 33, 55))
+    level = sky.render(camera_layouts.orbit(0, 0, 5, (0, 0, 0), 33, 33, 55.0))
+    up = sky.render(camera_layouts.orbit(-90, 0, 5, (0, 0, 0), 33, 33, 55.0))
     np.testing.assert_allclose(level[16, 16], [0.7, 0.8, 0.9], atol=1e-4)
     np.testing.assert_allclose(up[16, 16], [0.1, 0.2, 0.3], atol=1e-4)
 
