@@ -26,7 +26,7 @@ VIEWER = sorted(
     str(path) for path in (BASE / "workflow/viewer").rglob("*") if path.suffix in (".js", ".ts", ".html", ".css")
 )
 NEVER = r"(?!)"  # a constraint that nothing meets
-PLAIN_TILING = r"[a-z][a-z0-9_-]*(?<!-refined)(?<!-expansion)"  # an entry of `tilings`
+PLAIN_TILING = r"[a-z][a-z0-9_-]*(?<!-expansion)"  # an entry of `tilings`
 CHOOSING = "|".join(map(paths.policy_pattern, POLICY_NAMES))  # policies, as a constraint
 
 # A workflow that includes this one may have top-level keys of its own. It names them here, each with a function that gets

@@ -62,27 +62,8 @@ class BaseSettings(ConfigModel):
     preset: Name = key("an entry of `presets`")
 
 
-class Refinement(ConfigModel):
-    """Refinement of cuts: pictures of them are repaired by a prior, Gaussians beside them refitted within bounds."""
-
-    prior: Name = key("an entry of `priors` of model `terrain`")
-    strength: float = key("noise added before denoising, as a share of the schedule; 0 changes nothing", ge=0, le=1)
-    steps: int | None = key("of denoising; 4 if left out", None, ge=1, le=100)
-    condition: bool | None = key("whether the prior takes the render beside the cut as known", None)
-    views: int | None = key("pictures of each place of a cut; 4 if left out", None, ge=4, le=64)
-    width: int | None = key("of the ground in a picture; 64 if left out", None, unit="cells", ge=16, le=1024)
-    reach: float | None = key(
-        "distance from a cut to where nothing changes; 8 if left out", None, unit="cells", ge=1, le=1000
-    )
-    rounds: int | None = key("repairs and refits; 1 if left out", None, ge=1, le=10)
-    fit: int | None = key("steps of a refit; 12 if left out", None, ge=1, le=1000)
-    colour: float | None = key("largest change of a colour; 0.08 if left out", None, ge=0, le=1)
-    opacity: float | None = key("largest change of an opacity logit; 0.5 if left out", None, ge=0, le=10)
-    position: float | None = key("largest change of a position; 0.25 if left out", None, unit="cells", ge=0, le=0.5)
-
-
 class Levels(ConfigModel):
-    """`snakemake lod_table orders_table presort_table`: levels, pre-sorted orders and rounding against the finest."""
+    """`snakemake lod_table presort_table`: levels, pre-sorted orders and rounding against the finest."""
 
     scenes: Names = key("whose tiles are measured")
     seeds: Seeds | None = key("of each scene; the config's if left out", None)
@@ -90,15 +71,11 @@ class Levels(ConfigModel):
 
 
 class Materials(Levels):
-    """`snakemake materials_table`: materials and objects against true labels (family `oasis`, `materials: auto`)."""
+    """Materials and objects against true labels (family `oasis`, `materials: auto`)."""
 
 
 class Lattice(Levels):
-    """`snakemake lattice_table`: how visibly terrains repeat, from above."""
-
-
-class Transitions(Levels):
-    """Seam-LPIPS of borders between materials against photographed ones (`snakemake materials_pages`)."""
+    """How visibly terrains repeat, from above (`snakemake materials_pages`)."""
 
 
 class Flight(ConfigModel):
@@ -130,7 +107,6 @@ class Frames(Levels):
     budgets: list[Annotated[int, Field(ge=1000, le=6_000_000)]] = key(
         "Gaussians in view; tables show the first", min_length=1
     )
-    pairs: int = key("consecutive frames of a slow walk whose change is measured", ge=2, le=1000)
 
 
 class Calibration(ConfigModel):
@@ -289,12 +265,9 @@ class Tables(ConfigModel):
 class StudyConfig(ConfigModel):
     """What the study compares."""
 
-    refine: Refinement | None = key("how `<tiling>-refined` is made", None)
     lod: Levels | None = key("levels, orders, rounding", None)
     materials: Materials | None = key("materials and objects against true labels", None)
     lattice: Lattice | None = key("how visibly terrains repeat", None)
-    transitions: Transitions | None = key("borders of materials against photographed ones", None)
-    cover: Name | None = key("the scene of the README's picture", None)
     gallery: GalleryPage | None = key("terrains and a walk, as pictures", None)
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
@@ -316,7 +289,7 @@ def expand_study(config: dict, study: dict) -> dict:
     model = check_model(StudyConfig, study, "study")
     study = model.model_dump(mode="json", exclude_none=True, by_alias=True)
     flat = config | study
-    for table in ("lod", "materials", "lattice", "transitions", "gallery", "frames", "seams", "forced_choice"):
+    for table in ("lod", "materials", "lattice", "gallery", "frames", "seams", "forced_choice"):
         _require_names(f"study.{table}.scenes", study.get(table, {}).get("scenes", []), config["scenes"], "scenes")
     if "gallery" in study:
         _require_names("study.gallery.walk", [study["gallery"]["walk"]], config["scenes"], "scenes")
@@ -325,8 +298,6 @@ def expand_study(config: dict, study: dict) -> dict:
     if "preset_costs" in study:
         _require_names("study.preset_costs.scenes", study["preset_costs"]["scenes"], config["scenes"], "scenes")
         _require_names("study.preset_costs.presets", study["preset_costs"]["presets"], config["presets"], "presets")
-    if "refine" in study:
-        _check_refinement(study["refine"], config["priors"])
     if "view_benchmark" in study:
         _check_view_benchmark(study["view_benchmark"], config)
     if "seams" in study:
@@ -345,16 +316,6 @@ def _require_names(where: str, names: list[str], table: dict, called: str) -> No
     for name in names:
         if name not in table:
             raise InputError(f"config: {where}: there is no {name!r}; {called} has {', '.join(table) or 'nothing'}")
-
-
-def _check_refinement(refine: dict, priors: dict) -> None:
-    """Cuts are refined by a prior that denoises slightly noised pictures."""
-    able = [name for name, prior in priors.items() if prior["model"] == "terrain"]
-    if refine["prior"] not in able:
-        raise InputError(
-            f"config: study.refine.prior: {refine['prior']} is no prior of model terrain "
-            f"({', '.join(able) or 'none is'} in priors)"
-        )
 
 
 def _check_seams(seams: dict, tilings: dict) -> None:

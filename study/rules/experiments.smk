@@ -187,7 +187,9 @@ def describe_experiment(values, measured):
     cell = describe_run(values, [key for key in ("views", "tiles", "stills") if key in measured])
     if "seams" in measured:
         made = rules.measure_seams.output
-        cell["files"] |= {key: expand(path, **values)[0] for key, path in (("crops", made.crops), ("facts", made.facts))}
+        cell["files"] |= {
+            key: expand(path, **values)[0] for key, path in (("crops", made.crops), ("facts", made.facts))
+        }
         jobs = {"levels": rules.make_levels, "cut": rules.cut_tiles}
         cell["times"] |= {key: expand(job.benchmark, **values) for key, job in jobs.items()}
     prior = config["priors"].get(values["prior"], {"samples": 0, "steps": 0})
@@ -302,9 +304,6 @@ def captions():
     ]
 
 
-def refining_prior(wildcards):
-    """The weights of the prior that repairs cuts."""
-    return {"weights": terrain_weights(STUDY["refine"]["prior"])}
 
 
 def deciding_scores(wildcards):

@@ -8,9 +8,7 @@ study/docs/results/presets.md. Seconds differ from machine to machine: one that 
 rule gather_preset_costs:
     """A row for each scene and preset, and the page."""
     input:
-        measured=lambda wildcards: [
-            cell[key] for cell in preset_experiments() for key in ("metrics", "manifest")
-        ],
+        measured=lambda wildcards: [cell[key] for cell in preset_experiments() for key in ("metrics", "manifest")],
     output:
         table="study/docs/data/preset_costs.csv",
         page="study/docs/results/presets.md",

@@ -104,12 +104,11 @@ rule plot_estimators:
         mem_mb=per_attempt(1500),
         runtime=per_attempt("10m"),
     params:
-        named=lambda wildcards: STUDY["tables"]["figures"]["estimators"],
-        rounds=lambda wildcards: STUDY["tables"]["figures"]["rounds"],
+        titles=lambda wildcards: STUDY["tables"]["figures"]["estimators"],
         size=lambda wildcards: config["presets"][config["scenes"][wildcards.scene]["preset"]]["size"],
-        source=code_of_study("plot_estimators"),
+        source=code_of_study("plot_evolution"),
     script:
-        "../scripts/plot_estimators.py"
+        "../scripts/plot_evolution.py"
 
 
 rule plot_tile_uncertainty:

@@ -36,7 +36,6 @@ def pool(scene="desert_pool", photos=20, **more):
         ("view_benchmark", pool(preset="x"), "sets.0.preset: there is no 'x'"),
         ("seams", {"scenes": ["moon"]}, "study.seams.scenes: there is no 'moon'"),
         ("seams", {"baseline": "none", "tilings": ["colour"]}, "none is not among"),
-        ("refine", {"prior": "moon"}, "study.refine.prior: moon"),
         ("forced_choice", {"pairs": [["floor", "colour"]]}, "name it second"),
     ],
 )

@@ -8,7 +8,7 @@ from itertools import product
 
 from dav_gswt.errors import InputError
 
-SUFFIXES = ("-refined", "-expansion")  # of tilings that the study makes of an entry of `tilings`
+SUFFIXES = ("-expansion",)  # of tilings that the study makes of an entry of `tilings`
 
 
 def split_tiling(tiling: str) -> tuple[str, str]:

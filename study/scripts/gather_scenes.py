@@ -1,4 +1,4 @@
-"""Rule gather_lod: the tables of levels of several scenes in one."""
+"""Rule gather_scenes: the tables of several scenes in one."""
 
 from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
@@ -7,5 +7,4 @@ with logging_to(snakemake.log[0]):
     found = []
     for path, cell in zip(snakemake.input.tables, snakemake.params.cells, strict=True):
         found += [cell | row for row in csv_tables.read_table(path)]
-    for target in snakemake.output:  # in results/, and of some tables in docs/, too
-        csv_tables.write_table(target, found)
+    csv_tables.write_table(snakemake.output.table, found)
