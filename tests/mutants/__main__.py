@@ -75,11 +75,11 @@ def draw_mutants(seed: int, count: int) -> list[Mutant]:
 
 
 def list_groups() -> dict[str, list[Path]]:
-    """Source files by group: packages of the library without the study, its own modules, the C++ core, the viewer."""
+    """Source files by group: packages of the library, its own modules, the C++ core, the viewer."""
     groups = {}
     for path in sorted((ROOT / LIBRARY).rglob("*")):
         parts = path.relative_to(ROOT / LIBRARY).parts
-        if path.suffix == ".py" and parts[0] != "study":
+        if path.suffix == ".py":
             groups.setdefault(parts[0] if len(parts) > 1 else "modules", []).append(path.relative_to(ROOT))
         elif path.suffix in (".cpp", ".h"):
             groups.setdefault("core", []).append(path.relative_to(ROOT))

@@ -10,7 +10,7 @@ from dav_gswt.views.policies import POLICY_NAMES, PRIOR_POLICIES, ZERO_SETTINGS
 
 DRAFT = "results/desert/seed0/draft"
 ROUND = DRAFT + "/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
-BUNDLE = ROUND + "/tiles_semantic/bundle_tau{tau}/davgswt.json"
+BUNDLE = ROUND + "/tiles_small/bundle_tau{tau}/davgswt.json"
 DEFAULT = dict(policy="farthest", k=4, t=2, tau=0.6)
 FARTHEST = ROUND.format(policy="farthest", k=4, t=1)
 ASKED = DRAFT + "/active_w2-lpips_terrain_pdrop{p_drop}_lam{lam}_k4/iter1/metrics.json"
@@ -67,7 +67,7 @@ def test_a_finished_field_goes_from_field_to_terrain(planned, tmp_path):
 
 
 def test_a_round_is_tiled_as_it_is_and_completed(planned, tmp_path):
-    tiles = FARTHEST + "{}/tiles_semantic/seams.json"
+    tiles = FARTHEST + "{}/tiles_small/seams.json"
     plan = planned(tmp_path, tiles.format(""), tiles.format("/inpainted_terrain"))
     assert plan["make_levels"] == plan["cut_tiles"] == 2 and plan["inpaint_field"] == plan["update_field"] == 1
 

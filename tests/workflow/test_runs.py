@@ -38,7 +38,7 @@ TABLE = [  # changed keys, and the rules that must run again on a finished run o
     ({"stills": {"width": 320, "height": 180}}, LOOK),
     ({"heights": {"kind": "hills", "height": 2, "wavelength": 20}}, LOOK),
     ({"tau": 0.3}, {"bundle_tiles"} | LOOK),
-    ({"tilings": {"semantic": {"slope": 3}}}, TILES),
+    ({"tilings": {"semantic": {"candidates": 25}}}, TILES),
     ({"levels": 2, "presets": {"draft": {"level_steps": 11}}}, LEVELS),
     ({"k": 3}, LAST_ROUND | LEVELS),
     ({"presets": {"draft": {"steps": 61}}}, FIT | LEVELS),

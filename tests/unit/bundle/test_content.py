@@ -9,7 +9,6 @@ from fixtures.land_covers import TILES, cover_content
 from dav_gswt.bundle import build, manifest, store
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.errors import InputError
-from dav_gswt.images import image_files
 from dav_gswt.terrain import endless, page, stills
 
 
@@ -59,18 +58,14 @@ def test_the_terrain_of_a_bundle_has_its_classes_and_objects(bundle, content):
 
 
 def test_a_page_of_several_materials_has_the_rule_of_the_config(bundle, tmp_path):
-    viewer, picture = tmp_path / "viewer", np.zeros((4, 4, 3))
+    viewer = tmp_path / "viewer"
     viewer.mkdir()
     (viewer / "index.html").write_text("<html><!-- modules --><!-- first -->")
-    picture[:2, :, 1] = 1
-    image_files.write_png(tmp_path / "classes.png", picture)
-    colours = {"grass": "#00ff00", "sand": "#000000"}
-    rule = [{"kind": "image", "file": str(tmp_path / "classes.png"), "width": 40, "colours": colours}]
+    rule = [{"kind": "height", "material": "grass", "low": 0.5, "soft": 0.2}]
     page.write_page(bundle.folder, viewer, tmp_path / "page", rule=rule)
     made = store.read_bundle(tmp_path / "page")
     (term,) = made.manifest.classes.rule
-    pixels = (tmp_path / "page" / term.file).read_bytes()
-    assert list(pixels) == [1] * 8 + [0] * 8
+    assert term.kind == "height" and made.manifest.materials[term.material].name == "grass"
     assert made.object_chunk(0, 0)[0].means.shape == bundle.object_chunk(0, 0)[0].means.shape
 
 

@@ -4,6 +4,7 @@
 below `dav_gswt` have everything else. docs/python.md shows them in one example.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -175,13 +176,13 @@ def open_terrain(folder: Path | str, heights: dict[str, Any] | None = None) -> T
 
 
 def look_at(
-    eye: tuple[float, float, float],
-    target: tuple[float, float, float],
+    eye: Sequence[float | int],
+    target: Sequence[float | int],
     width: int = 960,
     height: int = 540,
-    fov: float = 60.0,
+    fov: float | int = 60,
 ) -> Camera:
-    """Make a camera at `eye` that looks at `target`, with z up. fov: horizontal field of view in degrees."""
+    """Make a camera at the place `eye` that looks at `target`, with z up. fov: horizontal field of view in degrees."""
     return pinhole(eye, target, width, height, fov)
 
 

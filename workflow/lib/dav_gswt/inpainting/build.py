@@ -238,7 +238,7 @@ def inpaint_view(
     """Colours as if opaque, and opacity, of one view: the mean of a prior's samples after `match_colours`.
 
     The samples have no dropout, each starts from its own noise. Their mean is less sharp than one sample, but invents
-    less (docs/research/results/prior.md has figures).
+    less.
 
     Args:    config: of the terrain prior; no other prior takes a mask of valid cells. condition: of one view. unseen:
              pixels that show what no photo saw; cells with such a pixel are not valid. ground: mean colour of the
