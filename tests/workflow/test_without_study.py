@@ -11,11 +11,6 @@ import pytest
 pytestmark = pytest.mark.slow
 TESTS = ["tests/unit/config", "tests/unit/test_docs.py", "tests/unit/test_architecture.py"]
 TESTS += ["tests/workflow/test_plans.py"]
-    "tests/unit/config",
-    "tests/unit/test_docs.py",
-    "tests/unit/test_architecture.py",
-    "tests/workflow/test_plans.py",
-]
 
 
 @pytest.fixture(scope="module")
