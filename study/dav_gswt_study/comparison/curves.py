@@ -19,8 +19,7 @@ def read_cell(cell: dict) -> list[dict]:
     """The rows of a cell, the start first.
 
     cell: what CELL names; `corrected`: PSNR after the photos' exposure is fitted; files: `metrics` of each round, the
-    start's first; `facts`, scores.json of what rounds 1 to T chose by; `times`, for each of these rounds its jobs'
-    benchmarks; `samples` that the prior draws of a pose.
+    start's first; `times`, for each later round its jobs' benchmarks.
     """
     found, fits = [], []
     for t, path in enumerate(cell["metrics"]):
@@ -33,7 +32,6 @@ def read_cell(cell: dict) -> list[dict]:
         row |= {
             "seconds": sum_or_none(run and run[0] for run in map(read_benchmark, cell["times"][t - 1])) if t else 0.0
         }
-        row |= {"evaluations": _count_evaluations(cell["facts"][t - 1], cell["samples"]) if t else 0}
         provenance = metrics["provenance"]
         found.append(row | describe_origin(provenance) | {"field": provenance["inputs"]["field"][:12]})
     return found
@@ -41,7 +39,7 @@ def read_cell(cell: dict) -> list[dict]:
 
 def read_curves(path: Path | str) -> list[dict]:
     """Read the table of curves."""
-    integers = ("seed", "k", "round", "photos", "evaluations")
+    integers = ("seed", "k", "round", "photos")
     return csv_tables.read_table(path, numbers=(*MEASURES, *EXPECTED, "seconds"), integers=integers)
 
 
@@ -53,9 +51,3 @@ def _predict_gain(before: list[dict], fits: list[dict], photos: int) -> dict:
     found = stopping.predict_gain(*history, photos - before[-1]["photos"])
     values = (found.closes, found.gain, found.low, found.high) if found else (None,) * len(EXPECTED)
     return dict(zip(EXPECTED, values, strict=True))
-
-
-def _count_evaluations(facts: str, samples: int) -> int:
-    """Forward passes of the prior's network, for one pose each."""
-    by_steps = read_json(facts)["poses_by_steps"]
-    return samples * sum(int(steps) * poses for steps, poses in by_steps.items())

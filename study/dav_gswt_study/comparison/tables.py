@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.sweeps import sum_or_none
 from dav_gswt_study.comparison.curves import CELL
-from dav_gswt_study.comparison.stats import nauc, photos_to_reach
 from dav_gswt_study.statistics import adjust_holm, bootstrap_paired
 
 EVERYTHING = "all"  # the policy that takes the whole pool: what there is to reach, and no curve
@@ -18,9 +18,9 @@ JUDGED = {"psnr": 1, "worst_psnr": 1, "walker_psnr": 1, "lpips": -1}  # measures
 
 
 def summarise_cells(curves: list[dict]) -> list[dict]:
-    """A row a cell: nAUC, PSNR and the other measures of its last round, photos to reach WAY of all, cost.
+    """A row a cell: nAUC, PSNR and the other measures of its last round, seconds.
 
-    gap: dB under all photos; empty, as `to_reach`, where all were not tried or were not reached.
+    gap: dB under all photos; empty where all were not tried.
     """
     best = {unit[:3]: rounds[-1]["psnr"] for unit, policy, rounds in _group_cells(curves) if policy[0] == EVERYTHING}
     table = []
@@ -29,14 +29,11 @@ def summarise_cells(curves: list[dict]) -> list[dict]:
             continue
         photos, psnr = (np.array([row[key] for row in rounds], float) for key in ("photos", "psnr"))
         goal, last = best.get(unit[:3]), rounds[-1]
-        row = {key: last[key] for key in CELL} | {"photos": last["photos"], "nauc": nauc(photos, psnr)}
+        row = {key: last[key] for key in CELL} | {"photos": last["photos"], "nauc": compute_nauc(photos, psnr)}
         row |= {key: last[key] for key in ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")}
         row |= {f"nauc_{key}": _area(photos, rounds, key) for key in JUDGED if key != "psnr"}
         row |= {"gap": None if goal is None else goal - last["psnr"]}
-        row |= {"to_reach": None if goal is None else photos_to_reach(photos, psnr, goal)}
-        seconds = [r["seconds"] for r in rounds[1:]]
-        row |= {"seconds": None if None in seconds else sum(seconds)}
-        table.append(row | {"evaluations": sum(r["evaluations"] for r in rounds)})
+        table.append(row | {"seconds": sum_or_none(r["seconds"] for r in rounds[1:])})
     return table
 
 
@@ -95,40 +92,38 @@ def _compare_cells(cells: dict[tuple, float], baseline: str) -> list[dict]:
 def _area(photos: Float[Array, "t"], rounds: list[dict], measure: str) -> float | None:
     """The nAUC of a measure; None where a round lacks it."""
     values = [row[measure] for row in rounds]
-    return None if None in values else nauc(photos, np.array(values, float))
+    return None if None in values else compute_nauc(photos, np.array(values, float))
 
 
-def check_predictions(curves: list[dict]) -> list[dict]:
-    """Compare gains of rounds with their predictions (`marginal_gain`), over all scenes and for each.
+def check_predictions(curves: list[dict]) -> dict | None:
+    """Compare gains of rounds, in dB, with their predictions (`marginal_gain`); None where nothing was predicted.
 
-    share: of the gap that closes, what test views gained (geometric mean), off: standard deviation of its logarithm,
-    both over rounds that gained something; covered: share of all rounds whose gain lies in the interval.
+    rounds: how many; gained, expected: their means; covered: share of the rounds whose gain lies in the interval.
     """
-    checked: dict[str, list[tuple[dict, float]]] = {}
+    found = []
     for _, policy, rounds in _group_cells(curves):
         for before, row in pairwise(rounds):
             if row["expected"] is not None and policy[0] != EVERYTHING:
                 gained = row["psnr"] - before["psnr"]
-                for name in (EVERY, row["scene"]):
-                    checked.setdefault(name, []).append((row, gained))
-    return [
-        {"scene": name} | _summarise_predictions(found)
-        for name, found in sorted(checked.items(), key=lambda i: i[0] != EVERY)
-    ]
+                found.append((gained, row["expected"], row["expected_low"] <= gained <= row["expected_high"]))
+    if not found:
+        return None
+    return {"rounds": len(found)} | dict(
+        zip(("gained", "expected", "covered"), np.mean(found, 0).tolist(), strict=True)
+    )
 
 
-def _summarise_predictions(found: list[tuple[dict, float]]) -> dict:
-    logs = np.array([np.log(gain / row["closes"]) for row, gain in found if gain > 0 and row["closes"] > 0])
-    inside = [row["expected_low"] <= gain <= row["expected_high"] for row, gain in found]
-    return {
-        "rounds": len(found),
-        "gained": float(np.mean([gain for _, gain in found])),
-        "expected": float(np.mean([row["expected"] for row, _ in found])),
-        "apart": float(np.mean([abs(gain - row["expected"]) for row, gain in found])),
-        "covered": float(np.mean(inside)),
-        "share": float(np.exp(logs.mean())) if len(logs) else None,
-        "off": float(logs.std(ddof=1)) if len(logs) > 1 else None,
-    }
+def compute_nauc(photos: Float[Array, "t"], psnr: Float[Array, "t"]) -> float:
+    """Normalised area under PSNR against photos: its mean over the budget, by the trapezoidal rule, in dB.
+
+    photos: rising, from the start to the budget. Raises: ValueError: fewer than two rounds, photos that do not rise, a
+    value that is not finite. Source: nAUC = trapezoid(PSNR, n_0..B) / (B - n_0).
+    """
+    if len(photos) < 2:
+        raise ValueError(f"a curve needs at least two rounds, not {len(photos)}")
+    if not (np.diff(photos) > 0).all() or not np.isfinite(psnr).all():
+        raise ValueError("a curve's photos must rise from round to round, and its values be finite")
+    return float(np.trapezoid(psnr, photos) / (photos[-1] - photos[0]))
 
 
 def _comparison_row(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tuple, float]) -> dict:

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 import torch
+from dav_gswt_study.prior.evaluation import Estimate, Setting
 from fixtures import lpips_arrays
 
 from dav_gswt.images import lpips
@@ -8,7 +9,6 @@ from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import LATENT, SIZE, Network
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt_study.prior import evaluation
-from dav_gswt_study.prior.evaluation import Estimate, Setting
 from dav_gswt_study.prior.training.example_files import Examples
 
 OFF = np.float32([0.125, 0.25, 0.375, 0.5])
