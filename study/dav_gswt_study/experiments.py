@@ -14,7 +14,6 @@ from dav_gswt.paths import encode_number
 EVERYTHING = "all"  # the policy that takes the whole pool in one round
 SUFFIXES = ("-refined", "-expansion")  # of tilings that the study makes of an entry of `tilings`
 CALLED = {"presets": "preset", "tilings": "tiling", "priors": "prior"}  # how what is chosen calls an entry of a table
-LEFT_OUT = {"levels": "auto"}  # what a key means where an entry has none
 PRESET = "preset"  # the knob of the named presets
 
 
@@ -160,7 +159,7 @@ def _resolve_knob(config: dict, knob: str, turned: dict) -> tuple[dict, str, str
 def _own_value(config: dict, knob: str, turned: dict) -> int | float | str:
     """The base's own value of a knob."""
     base, called, key = _resolve_knob(config, knob, turned)
-    return config[turned["of"]][base[called]].get(key, LEFT_OUT.get(key, "")) if "of" in turned else base[called]
+    return config[turned["of"]][base[called]].get(key, "") if "of" in turned else base[called]
 
 
 def _encode_value(value: int | float | str) -> str:

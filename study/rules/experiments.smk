@@ -130,7 +130,7 @@ def seam_experiments():
 
 def seam_pictures():
     """What rule draw_grid draws of each scene, in the order of its shots."""
-    drawn = list(rules.render_experiments.output.pictures)
+    drawn = list(rules.render_grid.output.pictures)
     return {scene: expand(drawn, **seam_branch(scene)) for scene in STUDY["seams"]["scenes"]}
 
 
