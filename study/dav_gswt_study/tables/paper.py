@@ -45,7 +45,7 @@ def tabulate_timing(cells: list[dict], value: str, families: dict[str, str]) -> 
     """
     at = value if any(row["varied_0"] == value for row in cells) else cells[0]["varied_0"]
     cells, found = [row for row in cells if row["varied_0"] == at], []
-    for scene in dict.fromkeys(row["scene"] for row in cells):
+    for scene in list[str](dict.fromkeys(row["scene"] for row in cells)):
         mine = [row for row in cells if row["scene"] == scene]
         means: dict[str, float | None] = {}
         for key in ("recon_s", "levels_s", "cut_s", "bundle_s"):

@@ -118,5 +118,5 @@ def test_without_answers_there_is_the_model_observer_alone_whose_ties_count_as_h
     items = {name: item | {"over": [0.1, 0.1]} for name, item in key["items"].items() if not item["check"]}
     assert results._tabulate_model(items)["share"] == 0.5
     items = {name: item | {"over": [None, None]} for name, item in key["items"].items()}
-    with pytest.raises(InputError, match="neither answers .* fetches it"):
+    with pytest.raises(InputError, match="neither answers .* make the kit again"):
         results.tabulate_choices(key | {"items": items}, [])
