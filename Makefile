@@ -11,7 +11,7 @@ PYTHON ?= python3
 export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
-.PHONY: setup reference run view gallery test test-all lint lint-code lint-types lint-viewer lint-docs mutants \
+.PHONY: setup reference run view test test-all lint lint-code lint-types lint-viewer lint-docs mutants \
   bench docs compiler sanitize fuzz
 .DELETE_ON_ERROR:
 
@@ -23,10 +23,6 @@ run: .venv/installed
 
 view: .venv/installed
 	@$(BIN)/python -m dav_gswt.cli.run --view --port $(PORT) $(if $(SCENE),--scene $(SCENE))
-
-# results/gallery: a static page over the newest terrain of every scene, for any web server
-gallery: .venv/installed
-	@$(BIN)/dav-gswt gallery
 
 # A worker takes a whole module, since its tests share what they look at.
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadscope --no-loadscope-reorder --durations 20 $(PYTEST_OPTIONS)

@@ -16,7 +16,6 @@ from fixtures.page_visit import Visit
 from record import report_figures
 
 from dav_gswt.bundle import store
-from dav_gswt.cli.main import find_pages
 from dav_gswt.images.metrics import psnr
 from dav_gswt.paths import RESULTS
 from dav_gswt.terrain import endless, stills
@@ -45,7 +44,7 @@ LIVE = """async () => {
 
 
 def main() -> int:
-    pages = [page for page in find_pages(Path(RESULTS)) if page.relative_to(RESULTS).parts[0] == SCENE]
+    pages = sorted(Path(RESULTS, SCENE).glob("seed*/**/terrain/page"), key=lambda page: page.stat().st_mtime)[-1:]
     if not pages or chromium_path() is None:
         print(f"first view: no chromium, or no page of {SCENE} (make run SCENE={SCENE}); nothing measured")
         return 0

@@ -62,11 +62,9 @@ rule copy_chosen_photos:
     """Take over the photos of a round of the preset that chooses them."""
     input:
         poses=lambda wildcards: f"{chosen_round(wildcards, wildcards.t)}/poses.json",
-        shown=lambda wildcards: f"{chosen_round(wildcards, wildcards.t)}/poses.exr",
         capture=lambda wildcards: f"{chosen_round(wildcards, wildcards.t)}/capture",
     output:
         poses="<results>/<round>/poses.json",
-        shown="<results>/<round>/poses.exr",
         capture=directory("<results>/<round>/capture"),
     log:
         "<logs>/<round>/copy_chosen_photos.log",

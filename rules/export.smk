@@ -1,13 +1,13 @@
-"""Export: the photos of a round for other programs that train fields; for viewers, engines and simulators a patch of
-terrain at each level and a finite terrain. Not part of `all`: files are asked for by their paths (docs/exports.md).
+"""Export: the photos of a round for other programs that train fields; for viewers, engines and simulators a finite
+terrain. Not part of `all`: files are asked for by their paths (docs/exports.md).
 
-In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/ply (y down, as viewers take it),
-exports/terrain, exports/ground.
+In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/terrain,
+exports/ground.
 """
 
 
 rule export_model:
-    """All photos that a round's field was made of, with their cameras, as COLMAP and nerfstudio read them."""
+    """All photos that a round's field was made of, with their cameras, as COLMAP has them."""
     input:
         captures=captures_until,
         fits=fits_until,
@@ -31,31 +31,11 @@ rule export_model:
         "../scripts/export_model.py"
 
 
-rule export_plys:
-    """A patch of terrain at each level as a PLY that any viewer of splats opens, y down."""
-    input:
-        manifest="<results>/<bundle>/davgswt.json",
-        archive="<results>/<bundle>/gswt.zip",
-    output:
-        plys=directory("<results>/<bundle>/exports/ply"),
-    log:
-        "<logs>/<bundle>/export_plys.log",
-    benchmark:
-        "<benchmarks>/<bundle>/export_plys.tsv"
-    resources:
-        mem_mb=per_attempt(2500),
-        runtime=per_attempt("10m"),
-    params:
-        source=code_of("export_plys"),
-    script:
-        "../scripts/export_plys.py"
-
-
 rule export_terrain:
     """Some cells of the endless terrain, with everything on them, as one file or set a format."""
     input:
         unpack(height_map),
-        unpack(class_pictures),
+        unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
         frame="<results>/<photos>/ground.json",
@@ -82,12 +62,11 @@ rule export_ground:
     """The ground under the same cells: a collision mesh, height maps, a model for MuJoCo, hulls of the objects."""
     input:
         unpack(height_map),
-        unpack(class_pictures),
+        unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
-        frame="<results>/<photos>/ground.json",
     output:
         ground=directory("<results>/<bundle>/exports/ground"),
     log:

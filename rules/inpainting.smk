@@ -38,32 +38,3 @@ rule inpaint_field:
         source=code_of("inpaint_field"),
     script:
         "../scripts/inpaint_field.py"
-
-
-rule evaluate_inpainted:
-    """Compare the field before and after with the test photos, everywhere and where it was inpainted."""
-    input:
-        unpack(lpips_weights),
-        before="<results>/<round>/field.ply",
-        after="<results>/<round>/inpainted_{inpainter}/field.ply",
-        ground="<results>/<round>/ground.exr",
-        views="<results>/<start>/views.json",
-        images="<results>/<photos>/images",
-        model="<results>/<photos>/sparse",
-    output:
-        metrics="<results>/<round>/inpainted_{inpainter}/metrics.json",
-    log:
-        "<logs>/<round>/inpainted_{inpainter}/evaluate_inpainted.log",
-    benchmark:
-        "<benchmarks>/<round>/inpainted_{inpainter}/evaluate_inpainted.tsv"
-    wildcard_constraints:
-        policy=CHOOSING,
-    threads: 2
-    resources:
-        mem_mb=per_attempt(1500),
-        runtime=per_attempt("10m"),
-    params:
-        preset=preset_keys("evaluate_inpainted"),
-        source=code_of("evaluate_inpainted"),
-    script:
-        "../scripts/evaluate_inpainted.py"

@@ -107,18 +107,6 @@ def lpips_weights(wildcards=None):
     return {} if config["lpips"] == "none" else {"lpips": locate_weights(config["lpips"])}
 
 
-def segmenter_networks(wildcards=None):
-    """The segmenter's networks as inputs of what finds objects; none where the config says so."""
-    asked = config["segmenter"]
-    if asked == mobilesam_package.NONE:
-        return {}
-    mobilesam_package.require_runtime()
-    if asked != mobilesam_package.FETCH:
-        return mobilesam_package.locate_networks(existing(asked, "segmenter"))
-    fetched = rules.fetch_mobilesam.output
-    return {"encoder": fetched.encoder, "decoder": fetched.decoder}
-
-
 def terrain_weights(prior):
     """The file of weights of an entry of `priors` of model terrain."""
     weights = config["priors"][prior].get("weights")
@@ -215,24 +203,9 @@ def prior_weights(wildcards):
     return files | {"folder": existing(prior["folder"], f"{where}.folder", "; see docs/prior.md")}
 
 
-def earlier_decisions(wildcards):
-    """What rounds 1 to t - 1 reported of their photos, and whether the last of them still asked for any."""
-    t = int(wildcards.t)
-    return fits_before(wildcards) | ({"last": f"{round_folder(t - 1)}/poses.json"} if t > 1 else {})
-
-
 def pictures_that_tell(wildcards):
-    """The photos so far, for the policies that measure the field's error in them; for an oracle what candidates show."""
-    if wildcards.policy in NEEDS_PHOTOS:
-        return {"images": "<results>/<photos>/images"}
-    if wildcards.policy not in ORACLES:
-        return {}
-    agent = config["scenes"][wildcards.scene].get("agent")
-    if agent not in ("render", "replay"):
-        raise WorkflowError(
-            f"policy {wildcards.policy}: what {wildcards.scene} truly shows is not known; it needs agent: render or replay"
-        )
-    return {"truth": "<results>/<photos>/candidates"} if agent == "render" else {"images": "<results>/<photos>/images"}
+    """The photos so far, for the policies that measure the field's error in them."""
+    return {"images": "<results>/<photos>/images"} if wildcards.policy in NEEDS_PHOTOS else {}
 
 
 def inpainter_weights(wildcards):
@@ -262,7 +235,7 @@ def masks_of_materials(wildcards):
 
 
 def tiling_inputs(name):
-    """What tells the kinds of ground apart, beside colours: LPIPS's features, a segmenter's checkpoint."""
+    """What tells the kinds of ground apart, beside colours: LPIPS's features, SAM 2's checkpoint."""
     tiling = config["tilings"][name]
     if tiling["energy"] == "colour":
         return {}
@@ -316,16 +289,16 @@ def height_map(wildcards):
     return {"map": found}
 
 
-def class_pictures(wildcards):
-    """The pictures and painted files that the rule of classes reads."""
-    files = [term["file"] for term in config["classes"] if term["kind"] in ("image", "painted")]
-    return {f"picture{number}": existing(file, "classes.file") for number, file in enumerate(files)}
+def painted_files(wildcards):
+    """The painted file that the rule of classes reads."""
+    files = [term["file"] for term in config["classes"] if term["kind"] == "painted"]
+    return {f"painted{number}": existing(file, "classes.file") for number, file in enumerate(files)}
 
 
 def terrain_targets(scene):
-    """A scene's terrain: page, stills, a sheet of them and, where the config asks for one, a flight."""
+    """A scene's terrain: page, stills and a sheet of them."""
     made = [rules.make_page.output.page, *rules.render_terrain.output.stills, rules.make_contact_sheet.output.sheet]
-    return expand(made + [rules.render_flight.output.frames] * bool(config["flight"]), **branch(scene))
+    return expand(made, **branch(scene))
 
 
 def photo_targets(scene):
@@ -341,5 +314,4 @@ def photo_targets(scene):
         + expand([rules.evaluate_round.output.metrics] * (rounds > 1), **(chosen | {"t": range(1, rounds)}))
         + expand([rules.evaluate_round.output.metrics] * bool(rounds), **values)
         + expand(list(scored), **values)
-        + expand([rules.evaluate_inpainted.output.metrics] * config["inpaint"], **values)
     )

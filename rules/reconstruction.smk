@@ -144,7 +144,6 @@ use rule evaluate_coarse as evaluate_round with:
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         fit="<results>/<round>/fit.json",
-        poses="<results>/<round>/poses.json",
         captures=captures_until,
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",

@@ -1,6 +1,6 @@
-"""Terrain: the tiles placed without end, as a page to walk in, as stills and, where the config asks, as a flight.
+"""Terrain: the tiles placed without end, as a page to walk in and as stills.
 
-In: the bundle. Out: page/ (`make view` serves it), walker.png, oblique.png, above.png, the three small in stills.jpg, flight/.
+In: the bundle. Out: page/ (`make view` serves it), walker.png, oblique.png, above.png, the three small in stills.jpg.
 """
 
 
@@ -8,7 +8,7 @@ rule make_page:
     """A page that needs nothing else: viewer, manifest, surface, chunks, a first still and how it was made in one folder."""
     input:
         unpack(height_map),
-        unpack(class_pictures),
+        unpack(painted_files),
         unpack(story_of_field),
         still="<results>/<terrain>/walker.png",
         manifest="<results>/<bundle>/davgswt.json",
@@ -36,7 +36,7 @@ rule render_terrain:
     """Stills of the endless terrain: walking, from a hill, and from above."""
     input:
         unpack(height_map),
-        unpack(class_pictures),
+        unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
     output:
@@ -77,30 +77,3 @@ rule make_contact_sheet:
         source=code_of("make_contact_sheet"),
     script:
         "../scripts/make_contact_sheet.py"
-
-
-rule render_flight:
-    """A walk over the endless terrain, frame by frame: does anything flicker, tear or jump?"""
-    input:
-        unpack(height_map),
-        unpack(class_pictures),
-        manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
-    output:
-        frames=directory("<results>/<terrain>/flight"),
-    log:
-        "<logs>/<terrain>/render_flight.log",
-    benchmark:
-        "<benchmarks>/<terrain>/render_flight.tsv"
-    threads: 2
-    resources:
-        mem_mb=per_attempt(4000),
-        runtime=per_attempt("4h"),
-    params:
-        size=lookup(dpath="stills", within=config),
-        heights=lookup(dpath="heights", within=config),
-        classes=lookup(dpath="classes", within=config),
-        flight=lookup(dpath="flight", within=config),
-        source=code_of("render_flight"),
-    script:
-        "../scripts/render_flight.py"

@@ -1,36 +1,9 @@
 """View selection: score the candidate poses and choose the next k.
 
 In: the field of round t - 1 and its scores. Out: scores.csv and scores.json, maps.npz, uncertainty.exr of a field; of round t
-poses.json and poses.exr. Scores keep their terms apart: the policy, lam and k enter when poses are chosen, so sweeps over
-them share the first scoring. A round after a stop asks for no pose and hands the field on as it is.
+poses.json. Scores keep their terms apart: the policy, lam and k enter when poses are chosen, so sweeps over
+them share the first scoring.
 """
-
-
-RENDERED_CANDIDATES = 40  # spread over all candidates
-
-
-rule render_candidates:
-    """Render what some candidates truly show, at the size they are scored: for the policy `oracle` alone."""
-    input:
-        frame="<results>/<photos>/ground.json",
-    output:
-        truth=directory("<results>/<photos>/candidates"),
-    log:
-        "<logs>/<photos>/render_candidates.log",
-    benchmark:
-        "<benchmarks>/<photos>/render_candidates.tsv"
-    wildcard_constraints:
-        scene=scenes_by("render"),
-    threads: 2
-    resources:
-        mem_mb=per_attempt(2500),
-        runtime=per_attempt("60m"),
-    params:
-        scene=scene_keys("render_candidates"),
-        poses=RENDERED_CANDIDATES,
-        source=code_of("render_candidates"),
-    script:
-        "../scripts/render_candidates.py"
 
 
 rule score_coarse:
@@ -91,10 +64,10 @@ use rule score_coarse as score_round with:
 
 
 rule select_poses:
-    """Choose the k poses that the policy expects most of, or none after a stop, and show what is not known there."""
+    """Choose the k poses that the policy expects most of."""
     input:
         unpack(round_before),
-        unpack(earlier_decisions),
+        unpack(fits_before),
         unpack(pictures_that_tell),
         captures=captures_before,
         views="<results>/<start>/views.json",
@@ -107,7 +80,6 @@ rule select_poses:
             category="View selection",
             labels={"scene": "{scene}", "policy": "{policy}", "k": "{k}", "round": "{t}"},
         ),
-        shown="<results>/<round>/poses.exr",
     log:
         "<logs>/<round>/select_poses.log",
     benchmark:
@@ -120,7 +92,6 @@ rule select_poses:
         policy=lambda wildcards: wildcards.policy,
         lam=real("lam"),
         k=integer("k"),
-        stop=lambda wildcards: paths.decode_stop(wildcards.stop),
         seed=integer("seed"),
         t=integer("t"),
         source=code_of("select_poses"),

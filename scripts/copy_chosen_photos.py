@@ -3,7 +3,6 @@
 import shutil
 from dataclasses import replace
 
-from dav_gswt.files import copy_file
 from dav_gswt.logs import logging_to
 from dav_gswt.views.selection import read_pose_selection, write_pose_selection
 
@@ -11,5 +10,4 @@ with logging_to(snakemake.log[0]):
     given, made = snakemake.input, snakemake.output
     chosen = replace(read_pose_selection(given.poses), chosen_with=snakemake.params.chooser)
     shutil.copytree(given.capture, made.capture, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".*"))
-    copy_file(given.shown, made.shown)
     write_pose_selection(made.poses, chosen)

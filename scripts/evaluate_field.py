@@ -11,7 +11,6 @@ from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import evaluation, ground
 from dav_gswt.reconstruction.observation import mask_to_ground
-from dav_gswt.views.selection import read_pose_selection
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
@@ -24,7 +23,5 @@ with logging_to(snakemake.log[0]):
     result = evaluation.evaluate_field(fitted, mask_to_ground(tests, grid), groups, perceptual)
     result |= {"round": params.t, "photos": photos, "gaussians": len(fitted)}
     result |= {"fit": read_json(paths.fit)}
-    if paths.get("poses"):
-        result |= read_pose_selection(paths.poses).describe_outcome()
     inputs = {"field": paths.field, "ground": paths.ground, "views": paths.views}
     write_json(snakemake.output.metrics, result | {"provenance": record_provenance(inputs, dict(params.preset))})

@@ -4,7 +4,6 @@ from pathlib import Path
 
 from dav_gswt.bundle.store import read_bundle
 from dav_gswt.export import ground_files
-from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.terrain import endless
 from dav_gswt.tiles import store
@@ -14,5 +13,4 @@ with logging_to(snakemake.log[0]):
     bundle = read_bundle(Path(paths.manifest).parent)
     terrain = endless.terrain_from_bundle(bundle, params.heights, params.classes)
     sets = store.read_material_tiles(paths.tiles, paths.seams)
-    reference = read_scene_frame(paths.frame).georeference
-    ground_files.export_ground(terrain, bundle.manifest, sets, reference, params.export, snakemake.output.ground)
+    ground_files.export_ground(terrain, bundle.manifest, sets, params.export, snakemake.output.ground)

@@ -2,7 +2,7 @@
 
 from dav_gswt.field import read_field
 from dav_gswt.logs import logging_to
-from dav_gswt.materials import build, mobilesam, store
+from dav_gswt.materials import build, store
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import pose_maps
@@ -13,8 +13,6 @@ with logging_to(snakemake.log[0]):
     if paths.get("maps"):  # scored by a prior: tiles use its uncertainty instead of the field's own
         field = pose_maps.apply_uncertainty(field, pose_maps.read_pose_maps(paths.maps)[1])
     masks = {name.removeprefix("mask_"): path for name, path in paths.items() if name.startswith("mask_")}
-    segmenter = mobilesam.load_segmenter(paths.encoder, paths.decoder) if paths.get("encoder") else None
-    found = build.find_materials(field, ground.read_ground(paths.ground), seed, masks, segmenter)
-    inputs = {name: paths[name] for name in ("field", "ground", "encoder", "decoder") if paths.get(name)}
-    provenance = record_provenance(inputs, {"seed": seed})
+    found = build.find_materials(field, ground.read_ground(paths.ground), seed, masks)
+    provenance = record_provenance({"field": paths.field, "ground": paths.ground}, {"seed": seed})
     store.write_materials(found, snakemake.output.materials, provenance)

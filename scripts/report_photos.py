@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dav_gswt.logs import logging_to
-from dav_gswt.photos.report.page import write_report
+from dav_gswt.photos.report import write_report
 
 with logging_to(snakemake.log[0]):
     paths = snakemake.input

@@ -1,30 +1,19 @@
-"""Rule select_poses: which k poses should be captured next, if any?"""
+"""Rule select_poses: which k poses should be captured next?"""
 
 import numpy as np
 
 from dav_gswt.geometry.scene_frame import read_scene_frame
-from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split
-from dav_gswt.views import candidates, policy_inputs, pose_maps, scores, selection, stopping
+from dav_gswt.views import candidates, policy_inputs, scores, selection
 from dav_gswt.views.policies import SelectionInput
 
 with logging_to(snakemake.log[0]):
     paths, params, policy = snakemake.input, snakemake.params, snakemake.params.policy
     frame, split, scored = read_scene_frame(paths.frame), read_view_split(paths.views), scores.read_scores(paths.scores)
     taken = candidates.read_captured_cameras(paths.model, split, paths.captures)
-    state = stopping.read_state(paths, len(split.start), len(taken), len(scored))
-    k, chosen = selection.poses_per_round(policy, params.k, len(scored)), []
-    decided = stopping.decide_poses(params.stop, k, 1, state)
-    if not decided.stopped:
-        remaining = candidates.list_remaining(params.scene, frame, paths.model, split, paths.captures)
-        places, rng = candidates.camera_positions(taken, frame), np.random.default_rng([params.seed, params.t])
-        information = policy_inputs.build_information_gain(
-            policy, scored, remaining, taken, split, paths, params.scene["agent"]
-        )
-        inputs = SelectionInput(places, decided.poses, rng, params.lam, information)
-        chosen = selection.select_poses(policy, scored, inputs)
-    result = selection.PoseSelection(policy, params.k, chosen, decided.stopped, decided.expected_gain())
-    selection.write_pose_selection(snakemake.output.poses, result)
-    shown = pose_maps.read_pose_maps(paths.maps)[0].exr_parts(scored, [pose.name for pose in chosen])
-    image_files.write_exr_parts(snakemake.output.shown, shown or pose_maps.EMPTY_PARTS)
+    remaining = candidates.list_remaining(params.scene, frame, paths.model, split, paths.captures)
+    places, rng = candidates.camera_positions(taken, frame), np.random.default_rng([params.seed, params.t])
+    information = policy_inputs.build_information_gain(policy, scored, remaining, taken, split, paths)
+    chosen = selection.select_poses(policy, scored, SelectionInput(places, params.k, rng, params.lam, information))
+    selection.write_pose_selection(snakemake.output.poses, selection.PoseSelection(policy, params.k, chosen))

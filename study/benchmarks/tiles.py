@@ -2,7 +2,7 @@
 
 The field is synthetic: a textured ground with relief, its underlay, and grass on it. Counted: fitting the levels, and
 cutting, composing and merging the tiles, as the rules make_levels and cut_tiles do; files and Python's start are not.
-Refining cuts by the prior is given beside it. Every figure goes to results/bench.json.
+Every figure goes to results/bench.json.
 """
 
 import resource
@@ -20,14 +20,10 @@ from dav_gswt.reconstruction import discs, top_view, underlay
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import build as tiles
 from dav_gswt.tiles.layout import Exemplar
-from dav_gswt.views import prior_sampling
-from dav_gswt_study.refine import build as refine
-from dav_gswt_study.refine import repair
 
 CELLS, SPACING, ALL = 384, 0.05, 200_000
 STEPS = 60  # of each level's fit: preset `draft`
 LEVELS = 6
-STRENGTH = 0.2
 TARGETS = {"tiles_200k_seconds": 10, "tiles_200k_memory_mb": 2000}
 
 
@@ -68,15 +64,11 @@ def measured() -> dict[str, float]:
     cut = time.perf_counter()
     assert [len(found.fields), len(found.labels)] == [LEVELS, 16]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
-    model = prior_sampling.load_prior({"model": "terrain", "samples": 1, "steps": 20, "lpips": False})
-    by = repair.PriorRepair.from_config(model, {"strength": STRENGTH}, 0)
-    refine.refine_tiles(found, refine.UncutGround(made.fields[0], exemplar), refine.Options(), by, model.size)
     return {
         "tiles_200k_seconds": cut - start,
         "tiles_200k_levels_seconds": fitted - start,
         "tiles_200k_cut_seconds": cut - fitted,
         "tiles_200k_memory_mb": peak,
-        "tiles_200k_refine_seconds": time.perf_counter() - cut,
     }
 
 

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
 from dav_gswt.config.load import check_config, check_model
 from dav_gswt.config.model import Policy
-from dav_gswt.config.settings import Flight, Heights, Preset
+from dav_gswt.config.settings import Heights, Preset
 from dav_gswt_study import experiments
 
 Seeds = Annotated[list[Seed], Field(min_length=1)]
@@ -37,31 +37,20 @@ class FixedSettings(ConfigModel):
 Policies = Annotated[list[Policy | FixedSettings], Field(min_length=1)]
 
 
-class Refinement(ConfigModel):
-    """Refinement of cuts: pictures of them are repaired by a prior, Gaussians beside them refitted within bounds."""
-
-    prior: Name = key("an entry of `priors` of model `terrain`")
-    strength: float = key("noise added before denoising, as a share of the schedule; 0 changes nothing", ge=0, le=1)
-    steps: int | None = key("of denoising; 4 if left out", None, ge=1, le=100)
-    condition: bool | None = key("whether the prior takes the render beside the cut as known", None)
-    views: int | None = key("pictures of each place of a cut; 4 if left out", None, ge=4, le=64)
-    width: int | None = key("of the ground in a picture; 64 if left out", None, unit="cells", ge=16, le=1024)
-    reach: float | None = key(
-        "distance from a cut to where nothing changes; 8 if left out", None, unit="cells", ge=1, le=1000
-    )
-    rounds: int | None = key("repairs and refits; 1 if left out", None, ge=1, le=10)
-    fit: int | None = key("steps of a refit; 12 if left out", None, ge=1, le=1000)
-    colour: float | None = key("largest change of a colour; 0.08 if left out", None, ge=0, le=1)
-    opacity: float | None = key("largest change of an opacity logit; 0.5 if left out", None, ge=0, le=10)
-    position: float | None = key("largest change of a position; 0.25 if left out", None, unit="cells", ge=0, le=0.5)
-
-
 class Levels(ConfigModel):
     """The scenes of a table, and the settings that they are made with."""
 
     scenes: Names = key("whose tiles are measured")
     seeds: Seeds | None = key("of each scene; the config's if left out", None)
     fixed: FixedSettings | None = key("settings that replace the config's", None)
+
+
+class Flight(ConfigModel):
+    """A walk straight on, rendered frame by frame."""
+
+    frames: int = key("number of frames", ge=2, le=100_000)
+    length: float = key("of the walk", unit="tile sides", gt=0, le=100_000)
+    height: float = key("of the eye above the surface", unit="eye floors", ge=0.5, le=100)
 
 
 class GalleryPage(ConfigModel):
@@ -85,7 +74,6 @@ class Frames(Levels):
     budgets: list[Annotated[int, Field(ge=1000, le=6_000_000)]] = key(
         "Gaussians in view; tables show the first", min_length=1
     )
-    pairs: int = key("consecutive frames of a slow walk whose change is measured", ge=2, le=1000)
 
 
 class Calibration(ConfigModel):
@@ -233,12 +221,9 @@ class Tables(ConfigModel):
 class StudyConfig(ConfigModel):
     """What the study compares."""
 
-    refine: Refinement | None = key("how `<tiling>-refined` is made", None)
     lod: Levels | None = key("levels, orders, rounding", None)
     materials: Levels | None = key("materials and objects against true labels", None)
     lattice: Levels | None = key("how visibly terrains repeat", None)
-    transitions: Levels | None = key("borders of materials against photographed ones", None)
-    cover: Name | None = key("the scene of the README's picture", None)
     gallery: GalleryPage | None = key("terrains and a walk, as pictures", None)
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)

@@ -50,8 +50,7 @@ def make_relabel(records: list[dict[str, Any]]) -> Relabel:
 
 def add_records(tiles: TileSet, records: list[dict[str, Any]]) -> TileSet:
     """The tile set with the records under `expansion` in its report."""
-    priced = tiles.report["energy"] | {"kind": "expansion"}
-    return replace(tiles, report=tiles.report | {"energy": priced, "expansion": records})
+    return replace(tiles, report=tiles.report | {"energy": "expansion", "expansion": records})
 
 
 @dataclass(frozen=True)

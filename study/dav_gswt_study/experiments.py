@@ -12,7 +12,7 @@ from itertools import product
 from dav_gswt.paths import encode_number
 
 EVERYTHING = "all"  # the policy that takes the whole pool in one round
-SUFFIXES = ("-refined", "-expansion")  # of tilings that the study makes of an entry of `tilings`
+SUFFIXES = ("-expansion",)  # of tilings that the study makes of an entry of `tilings`
 CALLED = {"presets": "preset", "tilings": "tiling", "priors": "prior"}  # how what is chosen calls an entry of a table
 PRESET = "preset"  # the knob of the named presets
 

@@ -16,13 +16,11 @@ from dav_gswt.materials.store import read_report
 from dav_gswt.sweeps import MEGA, select_metrics
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.page import name_of_scene
-from dav_gswt_study.cover import crop_and_shrink
 from dav_gswt_study.markdown import format_number, format_table
 
 HEIGHT, GAP = 300, 4  # pixels: of a row of pictures, and between two of them
 ASPECTS = (4 / 3, 1.0, 16 / 9)  # of a photo, the terrain from above, what a walker sees
 QUALITY, WALK_QUALITY = 82, 55
-WALK, PICTURE = "docs/figures/walk.webp", "docs/figures/gallery_{scene}.jpg"
 
 
 def draw_scene(photo: Path | str, above: Path | str, walker: Path | str, out: Path | str) -> None:
@@ -42,16 +40,12 @@ def suit_width(terrain: EndlessTerrain, width: int) -> EndlessTerrain:
     return replace(terrain, **dict(zip(("switches", "bands"), scaled, strict=True)))
 
 
-def animate_frames(frames: Sequence[Path | str], rate: int, out: Path | str) -> None:
-    """Write pictures one after the other as an endless WebP. rate: frames a second.
-
-    Raises: ValueError: no frame.
-    """
+def animate_frames(frames: Sequence[Float[Array, "h w 3"]], rate: int, out: Path | str) -> None:
+    """Write pictures one after the other as an endless WebP. rate: frames a second."""
     from PIL import Image  # here, not above: Pillow loads its plugins
 
-    if not frames:
-        raise ValueError("an animation needs a frame")
-    first, *others = (Image.open(path).convert("RGB") for path in frames)
+    pixels = (np.rint(np.clip(frame, 0, 1) * 255).astype(np.uint8) for frame in frames)
+    first, *others = map(Image.fromarray, pixels)
     options = {"duration": round(1000 / rate), "loop": 0, "quality": WALK_QUALITY, "method": 4}
     with atomic_file(out) as part:
         first.save(part, format="WEBP", save_all=True, append_images=others, **options)
@@ -74,30 +68,14 @@ def tabulate_scene(cell: dict) -> dict:
     return row | {"grade": verdict and verdict.grade, "reason": verdict and verdict.reason}
 
 
-def format_gallery(rows: list[dict], walk: str, seconds: float) -> str:
-    """The page. rows: of `tabulate_scene`; walk: the scene that is walked over, seconds: for so long."""
+def describe_gallery(rows: list[dict], walk: str, seconds: float) -> dict:
+    """The values of the page's template. rows: of `tabulate_scene`; walk: the scene that is walked over, seconds: for
+    so long."""
     head = ["scene", "photos", "PSNR (dB)", "SSIM", "LPIPS", "Gaussians", "bundle (MB)"]
-    parts = [
-        "# Gallery",
-        f"Made by `snakemake gallery_page` with version {rows[0]['version']}; do not edit. Every scene as the config "
-        "has it: start photos, two rounds of further ones, materials, tiles. Left: a photo. Middle: the terrain from "
-        "above. Right: as a walker sees it.",
-        f"![A walk of {seconds:.0f} seconds over the terrain of {walk}]({_link(WALK)})",
-        f"*{seconds:.0f} seconds over {name_of_scene(walk)}, rendered by the library.*",
-    ]
     for row in rows:
-        name = name_of_scene(row["scene"])
-        made = f"{row['photos']} {'photos' if row['real'] else 'rendered photos of synthetic ground'}"
-        verdict = f" Verdict on its ground: *{row['grade']}*: {row['reason']}." if row["grade"] else ""
-        picture = f"![{name}: a photo, from above, as a walker]({_link(PICTURE.format(scene=row['scene']))})"
-        parts += [f"## {name}", picture, f"Made from {made}.{verdict}"]
-    parts += [
-        "## In numbers",
-        "Test photos, which no fit saw, at the size that the preset fits; PSNR of real ones after their exposure is "
-        "fitted. What presets cost is in [a table of its own](research/results/presets.md).",
-        format_table(head, [_format_row(row) for row in rows]),
-    ]
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+        row["name"] = name_of_scene(row["scene"])
+    numbers = format_table(head, map(_format_row, rows))
+    return {"rows": rows, "walk": walk, "name": name_of_scene(walk), "seconds": f"{seconds:.0f}", "numbers": numbers}
 
 
 def _format_row(row: dict) -> list[str]:
@@ -105,5 +83,13 @@ def _format_row(row: dict) -> list[str]:
     return [row["scene"], str(row["photos"]), *numbers, str(row["gaussians"]), f"{row['bundle_mb']:.1f}"]
 
 
-def _link(path: str) -> str:
-    return path.removeprefix("docs/")
+def crop_and_shrink(photo: Float[Array, "_ _ 3"], width: int, height: int) -> Float[Array, "h w 3"]:
+    """The middle of a photo at the shape of width x height pixels."""
+    rows, columns = photo.shape[:2]
+    wide = min(columns, max(width, int(rows * width / height)))
+    tall = min(rows, max(height, int(columns * height / width)))
+    top, left = (rows - tall) // 2, (columns - wide) // 2
+    middle = photo[top : top + tall, left : left + wide]
+    times = max(1, -(-width // middle.shape[1]), -(-height // middle.shape[0]))  # small photos: pixels become blocks
+    large = np.ascontiguousarray(middle.repeat(times, 0).repeat(times, 1), np.float32)
+    return image_files.shrink_image(large, width, height)

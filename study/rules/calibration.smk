@@ -10,7 +10,6 @@ rule calibrate_coarse:
     """Compare the scores of some candidates with the true error of the field there."""
     input:
         unpack(prior_weights),
-        unpack(true_candidates),
         field="<results>/<coarse>/field.ply",
         ground="<results>/<coarse>/ground.exr",
         scores="<results>/<scored>/scores.csv",
@@ -35,7 +34,7 @@ rule calibrate_coarse:
         p_drop=real("p_drop"),
         lam=lookup(dpath="lam", within=config),
         seed=integer("seed"),
-        poses=RENDERED_CANDIDATES,
+        poses=40,  # spread over all candidates
         source=code_of_study("calibrate_scores"),
     script:
         "../scripts/calibrate_scores.py"
@@ -44,7 +43,6 @@ rule calibrate_coarse:
 use rule calibrate_coarse as calibrate_round with:
     input:
         unpack(prior_weights),
-        unpack(true_candidates),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         scores="<results>/<round>/scores.csv",

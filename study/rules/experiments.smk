@@ -82,7 +82,7 @@ def benchmark_experiment(scene, asked, seed, k, group):
         if key in asked
     }
     preset = {key: group[key] for key in ("preset",) if key in group}
-    values = branch(scene, policy, preset) | own | {"seed": seed, "k": k, "stop": ""}
+    values = branch(scene, policy, preset) | own | {"seed": seed, "k": k}
     chosen, before, after = values_of_choice(values), range(1, rounds), range(1, rounds + 1)
 
     def of(first, later, ts, wildcards=values):
@@ -307,18 +307,6 @@ def captions():
     return [f"{scene}: {SHOWN[name]}" for name, _, scene in (n.partition("_") for n in figure_files()) if scene] + [
         "quality against photos"
     ]
-
-
-def true_candidates(wildcards):
-    """What candidates truly show, where it is rendered; a replayed scene has its photos."""
-    if config["scenes"][wildcards.scene].get("agent") != "render":
-        return {}
-    return {"truth": "<results>/<photos>/candidates"}
-
-
-def refining_prior(wildcards):
-    """The weights of the prior that repairs cuts."""
-    return {"weights": terrain_weights(STUDY["refine"]["prior"])}
 
 
 def deciding_scores(wildcards):

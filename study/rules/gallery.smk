@@ -1,8 +1,26 @@
 """What terrains look like: docs/gallery.md, a picture of each scene, and a walk. `snakemake gallery_page`.
 
 In: photos, stills, metrics, materials and bundles of the scenes of the config's `study.gallery`. Out: docs/gallery.md,
-docs/figures/gallery_{scene}.jpg, docs/figures/walk.webp, and beside the terrain of the walk its frames.
+docs/figures/gallery_{scene}.jpg, docs/figures/walk.webp.
 """
+
+GALLERY = STUDY.get("gallery", {"scenes": [], "walk": "", "rate": 1})
+
+
+def gallery_cells():
+    """Of each scene of the gallery its files."""
+    return [gallery_cell(scene) for scene in GALLERY["scenes"]]
+
+
+def gallery_cell(scene):
+    """One of them."""
+    values, entry = made_of(scene), config["scenes"][scene]
+    (metrics,), (manifest,) = (
+        expand(path, **values) for path in (rules.evaluate_round.output.metrics, rules.bundle_tiles.output.manifest)
+    )
+    told = entry.get("materials", "one") != "one"
+    materials = expand(rules.find_materials.output.materials, **values)[0] if told else None
+    return {"scene": scene, "kind": entry["kind"], "metrics": metrics, "manifest": manifest, "materials": materials}
 
 
 rule draw_scene:
@@ -15,27 +33,23 @@ rule draw_scene:
         picture="docs/figures/gallery_{shown}.jpg",
     log:
         "<logs>/figures/gallery_{shown}.log",
-    benchmark:
-        "<benchmarks>/figures/gallery_{shown}.tsv"
     params:
         source=code_of_study("draw_scene"),
     script:
         "../scripts/draw_scene.py"
 
 
-rule render_walk:
-    """A walk over the terrain, frame by frame."""
+rule draw_walk:
+    """A walk over the terrain, as one moving picture."""
     input:
         unpack(height_map),
-        unpack(class_pictures),
-        manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
+        unpack(painted_files),
+        manifest=lambda wildcards: expand(rules.bundle_tiles.output.manifest, **made_of(GALLERY["walk"])),
+        chunks=lambda wildcards: expand(rules.bundle_tiles.output.chunks, **made_of(GALLERY["walk"])),
     output:
-        frames=directory("<results>/<terrain>/walk"),
+        picture="docs/figures/walk.webp",
     log:
-        "<logs>/<terrain>/render_walk.log",
-    benchmark:
-        "<benchmarks>/<terrain>/render_walk.tsv"
+        "<logs>/figures/draw_walk.log",
     threads: 2
     resources:
         mem_mb=per_attempt(4000),
@@ -45,24 +59,6 @@ rule render_walk:
         heights=lookup(dpath="heights", within=config),
         classes=lookup(dpath="classes", within=config),
         flight=GALLERY.get("flight"),
-        source=code_of_study("render_walk"),
-    script:
-        "../scripts/render_walk.py"
-
-
-rule draw_walk:
-    """The walk as one moving picture."""
-    input:
-        frames=lambda wildcards: expand(rules.render_walk.output.frames, **made_of(GALLERY["walk"])),
-    output:
-        picture="docs/figures/walk.webp",
-    log:
-        "<logs>/figures/draw_walk.log",
-    benchmark:
-        "<benchmarks>/figures/draw_walk.tsv"
-    resources:
-        mem_mb=per_attempt(3000),
-    params:
         rate=GALLERY["rate"],
         source=code_of_study("draw_walk"),
     script:
@@ -77,12 +73,11 @@ rule write_gallery:
         lambda wildcards: [
             cell[key] for cell in gallery_cells() for key in ("metrics", "manifest", "materials") if cell[key]
         ],
+        template=str(HERE / "report/gallery.md"),
     output:
         page="docs/gallery.md",
     log:
         "<logs>/figures/write_gallery.log",
-    benchmark:
-        "<benchmarks>/figures/write_gallery.tsv"
     params:
         cells=lambda wildcards: gallery_cells(),
         walk=GALLERY["walk"],
@@ -96,7 +91,3 @@ rule gallery_page:
     """The gallery of the docs."""
     input:
         rules.write_gallery.output.page,
-
-
-localrules:
-    gallery_page,

@@ -1,6 +1,8 @@
-"""Levels and pre-sorted orders against the finest level and exact sorting: `snakemake lod_table orders_table`.
+"""Levels against the finest one (`snakemake lod_table`), and what the page's shortcuts do to a picture: pre-sorted orders, levels
+and rounding (`snakemake presort_table`).
 
-In: tiles. Out: lod.csv and orders.csv beside them; of the scenes of the config's `study.lod` study/results/tables/lod.csv, orders.csv.
+In: bundles and tiles. Out: lod.csv beside the tiles, presort.csv beside each bundle; of the scenes of the config's `study.lod`
+study/results/tables/lod.csv, presort.csv and a figure.
 """
 
 
@@ -13,8 +15,6 @@ rule measure_levels:
         table="<results>/<tiles>/lod.csv",
     log:
         "<logs>/<tiles>/measure_levels.log",
-    benchmark:
-        "<benchmarks>/<tiles>/measure_levels.tsv"
     threads: 2
     resources:
         mem_mb=per_attempt(4000),
@@ -25,75 +25,85 @@ rule measure_levels:
         "../scripts/measure_levels.py"
 
 
-rule gather_lod:
-    """One table of the levels of all scenes that are named."""
+rule measure_presort:
+    """What pre-sorted orders, levels and rounding do to a picture, against all Gaussians sorted exactly."""
     input:
-        tables=lambda wildcards: list(measured_of_tiles(rules.measure_levels)),
-    output:
-        table=report(
-            "study/results/tables/lod.csv",
-            caption="../report/lod.rst",
-            category="Tables",
-            labels={"table": "levels of detail"},
-        ),
-    log:
-        "<logs>/tables/gather_lod.log",
-    benchmark:
-        "<benchmarks>/tables/gather_lod.tsv"
-    params:
-        cells=lambda wildcards: list(measured_of_tiles(rules.measure_levels).values()),
-        source=code_of_study("gather_lod"),
-    script:
-        "../scripts/gather_lod.py"
-
-
-rule measure_orders:
-    """How much a tile's picture errs when it is drawn in a neighbour's order, for ever more directions."""
-    input:
+        unpack(materials_of),
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
     output:
-        table="<results>/<tiles>/orders.csv",
+        table="<results>/<bundle>/presort.csv",
     log:
-        "<logs>/<tiles>/measure_orders.log",
-    benchmark:
-        "<benchmarks>/<tiles>/measure_orders.tsv"
+        "<logs>/<bundle>/measure_presort.log",
     threads: 2
     resources:
-        mem_mb=per_attempt(2000),
+        mem_mb=per_attempt(4000),
         runtime=per_attempt("20m"),
     params:
-        source=code_of_study("measure_orders"),
+        seed=integer("seed"),
+        source=code_of_study("measure_presort"),
     script:
-        "../scripts/measure_orders.py"
+        "../scripts/measure_presort.py"
 
 
-use rule gather_lod as gather_orders with:
+def gathered_cells(wildcards):
+    """The tables of a table of several scenes: the path of each one's, and what tells it from the others."""
+    made, entry = {
+        "lod": (rules.measure_levels, "lod"),
+        "presort": (rules.measure_presort, "lod"),
+        "materials": (rules.measure_materials, "materials"),
+        "lattice": (rules.measure_lattice, "lattice"),
+    }[wildcards.gathered]
+    return measured_of_tiles(made, entry)
+
+
+rule gather_scenes:
+    """A measurement of several scenes as one table."""
     input:
-        tables=lambda wildcards: list(measured_of_tiles(rules.measure_orders)),
+        tables=lambda wildcards: list(gathered_cells(wildcards)),
     output:
-        table="study/results/tables/orders.csv",
+        table=report(
+            "study/results/tables/{gathered}.csv",
+            caption="../report/gathered.rst",
+            category="Tables",
+            labels={"table": "{gathered}"},
+        ),
     log:
-        "<logs>/tables/gather_orders.log",
-    benchmark:
-        "<benchmarks>/tables/gather_orders.tsv"
+        "<logs>/tables/gather_{gathered}.log",
+    wildcard_constraints:
+        gathered="lod|presort|materials|lattice",
     params:
-        cells=lambda wildcards: list(measured_of_tiles(rules.measure_orders).values()),
-        source=code_of_study("gather_lod"),
+        cells=lambda wildcards: list(gathered_cells(wildcards).values()),
+        source=code_of_study("gather_scenes"),
+    script:
+        "../scripts/gather_scenes.py"
+
+
+rule plot_presort:
+    """The same as a figure; both are kept in docs, too."""
+    input:
+        table="study/results/tables/presort.csv",
+    output:
+        plot="study/results/figures/presort.png",
+        kept="study/docs/figures/presort.png",
+        data="study/docs/data/presort.csv",
+    log:
+        "<logs>/figures/plot_presort.log",
+    params:
+        source=code_of_study("plot_presort"),
+    script:
+        "../scripts/plot_presort.py"
 
 
 rule lod_table:
     """The table of levels."""
     input:
-        rules.gather_lod.output.table,
+        "study/results/tables/lod.csv",
 
 
-rule orders_table:
-    """The table of orders."""
+rule presort_table:
+    """What the page's shortcuts cost: table and figure."""
     input:
-        rules.gather_orders.output.table,
-
-
-localrules:
-    lod_table,
-    orders_table,
+        rules.plot_presort.output,

@@ -23,8 +23,6 @@ rule compare_fitters:
         page="study/docs/results/fitters.md",
     log:
         "<logs>/figures/compare_fitters.log",
-    benchmark:
-        "<benchmarks>/figures/compare_fitters.tsv"
     threads: 2
     resources:
         mem_mb=per_attempt(8000),
@@ -40,7 +38,3 @@ rule compare:
     """Our fit beside other programs'."""
     input:
         rules.compare_fitters.output,
-
-
-localrules:
-    compare,

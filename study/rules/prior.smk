@@ -16,8 +16,6 @@ rule make_examples:
         examples="study/results/prior/examples/part{part}.npz",
     log:
         "<logs>/prior/examples/part{part}.log",
-    benchmark:
-        "<benchmarks>/prior/examples/part{part}.tsv"
     wildcard_constraints:
         part=NATURAL,
     resources:
@@ -40,8 +38,6 @@ rule train_prior:
         losses="study/results/prior/terrain_losses.csv",
     log:
         "<logs>/prior/train_prior.log",
-    benchmark:
-        "<benchmarks>/prior/train_prior.tsv"
     threads: 2
     resources:
         mem_mb=per_attempt(4000),

@@ -1,8 +1,8 @@
 """Numerical stability at the extremes: every formula in float32 against float64, and the workflow at the ends of its range.
 
-In: the library; the config of the tests, overridden by each extreme. Out: study/results/tables/stability.csv, a row a formula;
-study/results/stability/{extreme}/; study/results/tables/stability_runs.csv, a row a run; both also in study/docs/data; the page
-study/docs/results/stability.md. `snakemake stability`.
+In: the library; the config of the tests, overridden by each extreme. Out: study/docs/data/stability.csv, a row a formula;
+study/results/stability/{extreme}/; study/docs/data/stability_runs.csv, a row a run; the page study/docs/results/stability.md.
+`snakemake stability`.
 """
 
 from dav_gswt_study.stability.extremes import EXTREMES
@@ -11,13 +11,10 @@ from dav_gswt_study.stability.extremes import EXTREMES
 rule measure_formulas:
     """Compare every formula with its float64 reference over its whole range."""
     output:
-        table="study/results/tables/stability.csv",
-        kept="study/docs/data/stability.csv",
+        table="study/docs/data/stability.csv",
         facts="study/docs/data/stability.json",
     log:
         "<logs>/stability/measure_formulas.log",
-    benchmark:
-        "<benchmarks>/stability/measure_formulas.tsv"
     resources:
         mem_mb=per_attempt(2000),
         runtime=per_attempt("10m"),
@@ -35,8 +32,6 @@ rule run_extreme:
         folder=directory("study/results/stability/{extreme}"),
     log:
         "<logs>/stability/run_{extreme}.log",
-    benchmark:
-        "<benchmarks>/stability/run_{extreme}.tsv"
     wildcard_constraints:
         extreme="|".join(map(re.escape, EXTREMES)),
     threads: 2
@@ -51,37 +46,19 @@ rule run_extreme:
         "../scripts/run_extreme.py"
 
 
-rule gather_extremes:
-    """What came of every run, in one table."""
-    input:
-        runs=expand(rules.run_extreme.output.folder, extreme=list(EXTREMES)),
-    output:
-        table="study/results/tables/stability_runs.csv",
-        kept="study/docs/data/stability_runs.csv",
-    log:
-        "<logs>/stability/gather_extremes.log",
-    benchmark:
-        "<benchmarks>/stability/gather_extremes.tsv"
-    params:
-        source=code_of_study("gather_extremes"),
-    script:
-        "../scripts/gather_extremes.py"
-
-
 rule write_stability:
-    """The page about it, and its figure."""
+    """What came of every run, in one table; the page about it and about formulas, and its figure."""
     input:
-        formulas=rules.measure_formulas.output.kept,
+        formulas=rules.measure_formulas.output.table,
         facts=rules.measure_formulas.output.facts,
-        runs=rules.gather_extremes.output.kept,
-        template=str(Path(HERE, "report/stability.md")),
+        runs=expand(rules.run_extreme.output.folder, extreme=EXTREMES),
+        template=str(HERE / "report/stability.md"),
     output:
         page="study/docs/results/stability.md",
+        runs="study/docs/data/stability_runs.csv",
         plot="study/docs/figures/stability.png",
     log:
         "<logs>/stability/write_stability.log",
-    benchmark:
-        "<benchmarks>/stability/write_stability.tsv"
     params:
         source=code_of_study("write_stability"),
     script:
@@ -92,9 +69,3 @@ rule stability:
     """How numbers behave at the extremes: a page, a figure, two tables."""
     input:
         rules.write_stability.output,
-        rules.measure_formulas.output,
-        rules.gather_extremes.output,
-
-
-localrules:
-    stability,

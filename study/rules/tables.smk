@@ -46,8 +46,7 @@ rule plot_estimators:
         mem_mb=per_attempt(1500),
         runtime=per_attempt("10m"),
     params:
-        named=lambda wildcards: STUDY["tables"]["figures"]["estimators"],
-        rounds=lambda wildcards: [STUDY["tables"]["figures"]["rounds"]] * len(STUDY["tables"]["figures"]["estimators"]),
+        titles=lambda wildcards: STUDY["tables"]["figures"]["estimators"],
         size=lambda wildcards: config["presets"][config["scenes"][wildcards.scene]["preset"]]["size"],
         source=code_of_study("plot_evolution"),
     script:
@@ -64,7 +63,7 @@ rule plot_tile_uncertainty:
         "<logs>/<bundle>/plot_tile_uncertainty.log",
     params:
         tau=real("tau"),
-        length=lambda wildcards: float(config["flight"].get("length", 16)),
+        length=16.0,
         source=code_of_study("plot_tile_uncertainty"),
     script:
         "../scripts/plot_tile_uncertainty.py"

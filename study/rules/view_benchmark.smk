@@ -86,7 +86,7 @@ rule plot_evolution:
         runtime=per_attempt("10m"),
     params:
         size=lambda wildcards: config["presets"][wildcards.preset]["size"],
-        rounds=figure_rounds,
+        titles=lambda wildcards: [f"round {t}" for t in figure_rounds(wildcards)],
         source=code_of_study("plot_evolution"),
     script:
         "../scripts/plot_evolution.py"

@@ -12,11 +12,11 @@ with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
     captures = list(paths.get("captures", []))
     split = read_view_split(paths.views)
-    judged = judging.read_target(paths, params.scene, split, captures, params.size)
+    judged = judging.read_target(paths, split, captures, params.size)
     remaining = candidates.list_remaining(params.scene, judged.frame, paths.model, split, captures)
     prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, paths.get("lpips"))
     scored = scores.read_scores(paths.scores), pose_maps.read_pose_maps(paths.maps)[0]
-    some = judging.choose_candidates(judged, remaining, scored[0], paths, params.poses)
+    some = judging.choose_candidates(remaining, scored[0], paths.images, params.poses)
     found, rows = judging.calibrate_scores(judged, *some, scored, params.lam, params.seed, prior)
     csv_tables.write_table(snakemake.output.poses, rows)
     inputs = {name: paths[name] for name in ("field", "ground", "scores", "maps", "views")}

@@ -1,6 +1,7 @@
 """Rule gather_frames: frame times of all scenes."""
 
 from dav_gswt import csv_tables
+from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
 from dav_gswt_study.terrain import frames
 
@@ -10,3 +11,4 @@ with logging_to(snakemake.log[0]):
     for path in (made.table, made.kept):
         csv_tables.write_table(path, rows)
     csv_tables.write_table(made.viewer, frames.select_viewer_rows(rows))
+    figures.save_figure(frames.plot_frames(csv_tables.read_table(made.table)), made.plot)

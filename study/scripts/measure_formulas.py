@@ -8,6 +8,5 @@ from dav_gswt_study.stability import registry
 
 with logging_to(snakemake.log[0]):
     rows = [registry.measure_formula(about) for about in registry.read_descriptions()]
-    for path in (snakemake.output.table, snakemake.output.kept):
-        csv_tables.write_table(path, rows)
+    csv_tables.write_table(snakemake.output.table, rows)
     write_json(snakemake.output.facts, record_provenance({}, {}) | {"source": snakemake.params.source})

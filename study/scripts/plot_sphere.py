@@ -1,6 +1,7 @@
 """Rule plot_sphere: what was each candidate worth to each round, and which did it choose?"""
 
 from dav_gswt.geometry.scene_frame import read_scene_frame
+from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.views import candidates, scores
@@ -16,4 +17,5 @@ with logging_to(snakemake.log[0]):
     for t, (table, poses) in enumerate(zip(tables, paths.poses, strict=True), 1):
         taken = candidates.read_captured_cameras(paths.model, split, captures[: t - 1])
         rounds.append(sphere.build_round(t, table, read_pose_selection(poses).poses, taken, frame, lam))
-    sphere.write_figure(snakemake.output.plot, rounds, candidate_values(tables[-1], lam)[0])
+    figure = sphere.draw_figure(rounds, candidate_values(tables[-1], lam)[0])
+    figures.save_figure(figure, snakemake.output.plot)

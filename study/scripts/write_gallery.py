@@ -6,4 +6,5 @@ from dav_gswt_study import gallery, markdown
 with logging_to(snakemake.log[0]):
     params = snakemake.params
     rows = [gallery.tabulate_scene(cell) for cell in params.cells]
-    markdown.write_page(snakemake.output.page, gallery.format_gallery(rows, params.walk, params.seconds))
+    values = gallery.describe_gallery(rows, params.walk, params.seconds)
+    markdown.write_page(snakemake.output.page, markdown.render_template(snakemake.input.template, values))

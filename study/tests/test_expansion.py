@@ -18,7 +18,7 @@ def exemplar(seed, side=14):
     rng = np.random.default_rng(seed)
     colour = rng.random((side, side, 3))
     segments = rng.integers(0, 9, (side, side))
-    both = energy.make_colour_layer(colour), semantics.describe_segments(segments, colour, None, {})
+    both = energy.make_colour_layer(colour), semantics.describe_segments(segments, colour, None)
     return energy.SeamEnergy("semantic", 2.0, *both).terms(0.6)
 
 

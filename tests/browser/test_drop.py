@@ -128,7 +128,6 @@ def test_a_manifest_is_read_or_what_contradicts_itself_is_named(modules, other, 
     assert message is None if words is None else words in message
 
 
-PICTURE = dict(kind="image", weight=1.0, file="classes0.bin", rows=2, columns=3, width=9.0, beyond="clamp", bytes=6)
 RANGE = dict(kind="slope", weight=1.0, material=1, low=None, high=0.3, soft=0.1)
 
 
@@ -151,10 +150,6 @@ RANGE = dict(kind="slope", weight=1.0, material=1, low=None, high=0.3, soft=0.1)
         ("classes rule", [RANGE | {"material": 2}], "“classes”"),
         ("classes rule", [RANGE | {"soft": 0}], "“classes”"),
         ("classes rule", [RANGE | {"low": "x"}], "“classes”"),
-        ("classes rule", [PICTURE], "classes0.bin is not among the dropped files"),
-        ("classes rule", [PICTURE | {"bytes": 7}], "“classes”"),
-        ("classes rule", [PICTURE | {"rows": 8192, "bytes": 24576}], "“classes”"),
-        ("classes rule", [PICTURE, PICTURE], "“classes”"),
         ("classes painted", [[0, 0, 2**60, 0]], "“classes”"),
         ("classes jitter cells", 2**31, "“classes”"),
         ("classes jitter octaves", 60, "“classes”"),

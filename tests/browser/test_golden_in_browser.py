@@ -147,10 +147,8 @@ def test_classes_have_the_scores_and_keep_the_gaussians_shared_with_the_library(
         """async terrains => {
           const { createClasses } = await import("./terrain/classes.js");
           const { createHeights } = await import("./terrain/heights.js");
-          return terrains.map(({ side, materials, classes, heights, pixels, cells }) => {
-            const files = classes.rule.filter(({ kind }) => kind === "image").map(({ file }) => file);
-            const pictures = new Map(files.map(file => [file, new Uint8Array(pixels.flat())]));
-            const made = createClasses(classes, materials, side, createHeights(heights), pictures);
+          return terrains.map(({ side, materials, classes, heights, cells }) => {
+            const made = createClasses(classes, materials, side, createHeights(heights));
             return cells.map(({ i, j, places }) => {
               const corner = new Float64Array(materials);
               made.latticeScores(8 * i, 8 * j, corner, 0);

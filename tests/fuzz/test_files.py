@@ -23,7 +23,6 @@ from fixtures.fuzzing import (
     fuzz,
     mutate_bytes,
     mutate_json,
-    mutate_zip,
     randoms,
     read_guarded,
     write_bytes,
@@ -33,7 +32,6 @@ from hypothesis import given
 from plyfile import PlyData, PlyElement
 from torch import nn
 
-from dav_gswt.bundle import gswt
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle, read_bundle
 from dav_gswt.config.load import add_scene_files, check_config, read_config
@@ -214,20 +212,6 @@ def test_a_changed_file_is_read_or_refused(valid, tmp_path, reader, random):
         assert is_finite(read) and reader.is_right(read)
 
     read_guarded(reader.name, lambda: reader.read(path), check, path.stat().st_size, name)
-
-
-@fuzz
-@given(random=randoms)
-def test_sets_of_the_public_renderer(set_of_tiles, tmp_path, random):
-    folder = empty_folder(tmp_path)
-    path = write_bytes(folder / "gswt.zip", mutate_zip(random, set_of_tiles))
-
-    def check(read):
-        assert all(is_sound(field) for level in read for field in level) and len(read[0]) % 16 == 0
-        gswt.write_gswt(read, 3.0, folder / "again.zip")
-
-    size = path.stat().st_size
-    read_guarded("gswt.zip", lambda: gswt.read_gswt(path, 3.0), check, size, "gswt.zip")
 
 
 @pytest.fixture(scope="module")

@@ -4,10 +4,8 @@ import pytest
 
 from dav_gswt.paths import (
     decode_path,
-    decode_stop,
     encode_branch,
     encode_number,
-    encode_stop,
     related_folder,
     stage_folder,
 )
@@ -15,15 +13,6 @@ from dav_gswt.paths import (
 
 def test_a_number_has_one_spelling():
     assert [encode_number(value) for value in ("0.10", 0, -0.0, 100.0, 1e-4)] == ["0.1", "0", "0", "100", "0.0001"]
-
-
-def test_a_stop_has_one_spelling():
-    stops = {"": {}, "_gain0.05": {"marginal_gain": 0.05}, "_upto100_gain1": {"marginal_gain": 1.0, "photos": 100}}
-    assert {text: decode_stop(text) for text in stops} == stops
-    assert [encode_stop(stop) for stop in stops.values()] == list(stops)
-    for text in ("_upto020", "_upto5.0", "_gain0.50", "_gain1_upto5", "_x"):
-        with pytest.raises(ValueError, match="does not say when rounds end|invalid literal"):
-            decode_stop(text)
 
 
 CONFIG = {
@@ -34,7 +23,6 @@ CONFIG = {
     "lam": 0.1,
     "k": 4,
     "rounds": 2,
-    "stop": {"photos": 20},
     "inpaint": True,
     "tau": 0.6,
     "scenes": {
@@ -55,7 +43,7 @@ def test_a_stage_of_a_branch_is_decoded_again(scene, stage):
 def test_the_path_of_a_branch_spells_every_setting():
     folder = stage_folder("bundle", encode_branch(CONFIG, "sand") | {"seed": 0})
     assert folder.as_posix() == (
-        "results/sand/seed0/draft/active_w2-lpips_terrain_pdrop0.15_lam0.1_k4_upto20/iter2/inpainted_terrain"
+        "results/sand/seed0/draft/active_w2-lpips_terrain_pdrop0.15_lam0.1_k4/iter2/inpainted_terrain"
         "/tiles_auto/bundle_tau0.6"
     )
     branch = encode_branch(CONFIG, "sand", changes={"k": 8, "tiling": "colour"})

@@ -10,7 +10,6 @@ from fixtures.runs import TINY, USUAL
 
 from dav_gswt.field import read_field
 from dav_gswt.files import digest_files, read_json
-from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.views import pose_maps, scores
 
@@ -25,13 +24,10 @@ def test_a_round_may_use_the_uncertainty_of_a_prior(snakemake, tiny, tmp_path):
     target = str((way / "levels").relative_to(folder))
     snakemake(folder, "--cores", "2", target, configs=(USUAL, TINY))
     first = scores.read_scores(folder / "results/desert/seed0/draft/coarse/scores_terrain_pdrop0.15/scores.csv")
-    assert (first.term("w2_sq") > 0).all() and "lpips" not in first.terms and (first.steps == 2).all()
+    assert (first.term("w2_sq") > 0).all() and "lpips" not in first.terms
     chosen = [pose["name"] for pose in read_json(way / "poses.json")["poses"]]
     best = np.argsort(-first.term("w2_sq"), kind="stable")[:2]
     assert chosen == [first.names[i] for i in best]
-    shown = image_files.read_exr_parts(way / "poses.exr")
-    assert set(shown) == set(chosen)
-    assert all(set(channels) == {"uncertainty", "w2_sq"} for channels, _ in shown.values())
     later = scores.read_scores(way / "scores.csv")
     assert later.scales == first.scales and not set(later.names) & set(chosen)
     uncertainty, level = pose_maps.read_pose_maps(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
@@ -55,29 +51,12 @@ def test_a_policy_that_reads_the_prior_makes_the_same_bytes_on_any_number_of_thr
     assert made[0] == made[1]
 
 
-def test_a_budget_ends_inside_a_round_and_later_rounds_hand_the_field_on(snakemake, tiny, tmp_path):
-    """Five photos to start from, six in all: round 1 takes one instead of two, round 2 none."""
-    folder = shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)
-    branch = folder / "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k2_upto6"
-    first, then = branch / "iter1", branch / "iter2"
-    targets = [str((r / "metrics.json").relative_to(folder)) for r in (first, then)]
-    snakemake(folder, "--cores", "2", *targets, configs=(USUAL, TINY))
-    for name in ("field.ply", "ground.exr"):
-        assert digest_files(first / name) == digest_files(then / name) != digest_files(tiny.coarse / name)
-    assert [len(read_json(r / "poses.json")["poses"]) for r in (first, then)] == [1, 0]
-    assert read_json(then / "capture/capture.json")["shots"] == []
-    before, after = read_json(first / "metrics.json"), read_json(then / "metrics.json")
-    assert before["photos"] == after["photos"] == 6 and before["psnr"] == after["psnr"]
-    assert before["stopped"] is None and after["stopped"] == "after 6 photos: 6 in all may be taken (stop.photos)"
-    assert before["fit"]["earlier_views"]["photos"] == 5 and after["fit"]["new_views"]["photos"] == 0
-
-
 def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, snakemake, tmp_path):
     folder = tmp_path / "completed"
     shutil.copytree(tiny.folder, folder)
     made = tiny.round.relative_to(tiny.folder) / "inpainted_terrain"
-    snakemake(folder, "--cores", "2", made / "metrics.json", made / "levels", configs=CONFIGS)
-    facts, found = read_json(folder / made / "completion.json"), read_json(folder / made / "metrics.json")
+    snakemake(folder, "--cores", "2", made / "levels", configs=CONFIGS)
+    facts = read_json(folder / made / "completion.json")
     before, after = (read_field(path / "field.ply") for path in (tiny.round, folder / made))
     assert facts["painted"] <= facts["unseen"] < facts["cells"] and facts["changed"] == bool(after.imagined.any())
     assert facts["changed"] or digest_files(tiny.round / "field.ply") == digest_files(folder / made / "field.ply")
@@ -87,7 +66,6 @@ def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, sn
         np.array_equal(before.sh[known], after[: len(before)].sh[known])
         and (after.uncertainty[after.imagined] == 1).all()
     )
-    assert found["gaussians"]["imagined"] == after.imagined.sum() and found["all"]["before"]["psnr"] > 10
     level = read_field(folder / made / "levels/level0.ply")
     assert len(level) and level.imagined.any() <= after.imagined.any()
 
@@ -106,25 +84,18 @@ def test_a_replayed_round_takes_photos_of_the_pool(beach):
 
 
 def test_a_run_leaves_for_other_programs(tiny, snakemake, tmp_path):
-    """A model of the photos, the levels as patches, a finite terrain, and the ground as mesh, images and model."""
+    """A model of the photos, a finite terrain, and the ground as mesh, images and model."""
     folder = shutil.copytree(tiny.folder, tmp_path / "exported")
     bundle, side = tiny.bundle.relative_to(tiny.folder), read_json(tiny.bundle / "davgswt.json")["tile_side"]
     model = tiny.round.relative_to(tiny.folder) / "exports/model"
-    export = "export={columns: 3, rows: 2, level: by_distance, formats: [ply, glb, 3dtiles], mesh_error: 0.5}"
-    targets = [str(model), *(str(bundle / f"exports/{name}") for name in ("ply", "terrain", "ground"))]
+    export = "export={columns: 3, rows: 2, level: by_distance, formats: [ply, glb, 3dtiles]}"
+    targets = [str(model), *(str(bundle / f"exports/{name}") for name in ("terrain", "ground"))]
     snakemake(folder, *targets, "--cores", "2", "--config", export, configs=CONFIGS)
 
     views, shots = read_json(tiny.start / "views.json"), read_json(tiny.round / "capture/capture.json")["shots"]
     known = read_colmap_model(folder / model / "sparse/0")
     assert set(known.names) == {*views["start"], *(shot["name"] for shot in shots)} and len(known.points)
     assert read_colmap_model(folder / model / "test/sparse/0").names == tuple(sorted(views["test"]))
-
-    tiles = read_json(tiny.bundle / "davgswt.json")["tiles"]
-    for level in range(2):
-        patch = read_field(folder / bundle / f"exports/ply/level{level}.ply")
-        assert len(patch) == sum(tile["chunks"][level]["count"] for tile in tiles)
-        east, down, north = np.ptp(patch.means, axis=0)
-        assert (east, north) == pytest.approx((4 * side,) * 2, rel=0.2) and down < 0.5 * north
 
     facts = read_json(folder / bundle / "exports/terrain/terrain.json")
     assert facts["cells"] == {"west": -1, "south": -1, "columns": 3, "rows": 2}
@@ -134,11 +105,11 @@ def test_a_run_leaves_for_other_programs(tiny, snakemake, tmp_path):
     facts = read_json(folder / bundle / "exports/ground/ground.json")
     assert facts["heights"]["step"] * (facts["heights"]["columns"] - 1) == pytest.approx(3 * side)
     there = {path.name for path in (folder / bundle / "exports/ground").iterdir() if not path.name.startswith(".")}
-    assert there - {"objects.glb"} == {f"ground.{kind}" for kind in ("glb", "json", "png", "tif", "hfield", "xml")}
+    assert there - {"objects.glb"} == {f"ground.{kind}" for kind in ("glb", "json", "png", "hfield", "xml")}
 
-    small = ("--cores", "2", "--config", "export={max_gb: 0.0001}")
-    refused = snakemake(folder, targets[2], *small, configs=CONFIGS, check=False)
-    assert refused.returncode and "export: glb: 8 x 8 cells have up to" in refused.stdout
+    small = ("--cores", "2", "--config", "export={level: 9}")
+    refused = snakemake(folder, targets[1], *small, configs=CONFIGS, check=False)
+    assert refused.returncode and "export.level: there is no level 9" in refused.stdout
 
 
 def test_another_preset_fits_the_photos_that_the_first_one_chose(tiny, snakemake, tmp_path):

@@ -2,12 +2,11 @@
 
 import re
 from collections import Counter
-from importlib.util import find_spec
 
 import pytest
 from fixtures.runs import TINY, USUAL
 
-from dav_gswt.views.policies import ORACLES, POLICY_NAMES, PRIOR_POLICIES, ZERO_SETTINGS
+from dav_gswt.views.policies import POLICY_NAMES, PRIOR_POLICIES, ZERO_SETTINGS
 
 DRAFT = "results/desert/seed0/draft"
 ROUND = DRAFT + "/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
@@ -22,7 +21,6 @@ def test_the_default_target_makes_every_stage_once(planned, tmp_path):
     once = ["render_photos", "split_views", "fit_coarse", "score_coarse", "make_levels", "cut_tiles", "bundle_tiles"]
     assert all(plan[rule] == 1 for rule in [*once, "make_page", "render_terrain", "evaluate_coarse"])
     assert plan["update_field"] == plan["capture_views"] == plan["evaluate_round"] == 2
-    assert not plan["fetch_mobilesam"] and not plan["render_flight"] and not plan["inpaint_field"]
 
 
 def test_values_of_a_sweep_share_the_stages_before_them(planned, tmp_path):
@@ -51,13 +49,6 @@ def test_every_policy_has_a_path(planned, tmp_path):
         targets.append(f"{DRAFT}/active_{branch}_k4/iter1/field.ply")
     plan = planned(tmp_path, *targets)
     assert plan["update_field"] == plan["select_poses"] == len(POLICY_NAMES)
-    assert plan["render_candidates"] == bool(ORACLES)
-
-
-def test_every_stop_has_a_branch_of_its_own(planned, tmp_path):
-    stops = ["", "_upto20", "_gain0.05", "_upto20_gain0.05"]
-    plan = planned(tmp_path, *(FARTHEST.replace("k4", "k4" + stop) + "/metrics.json" for stop in stops))
-    assert plan["fit_coarse"] == 1 and plan["select_poses"] == plan["update_field"] == len(stops)
 
 
 def test_presets_share_the_rounds_of_the_preset_that_chooses_for_them(planned, tmp_path):
@@ -117,33 +108,9 @@ def test_scenes_of_the_real_photos_are_planned(planned, root, tmp_path, scene):
 
 
 @pytest.mark.slow
-def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, photo_sets, tmp_path):
-    path = "results/copr_dunes/seed0/standard/active_oracle_none_pdrop0_lam0_k4/iter1/poses.json"
-    config = tmp_path / "there.yaml"
-    for agent, known in (("replay", True), ("plan", False)):
-        config.write_text(f"scenes: {{copr_dunes: {{folder: {photo_sets}/copr_dunes/images, agent: {agent}}}}}")
-        done = snakemake(tmp_path, path, "--dry-run", configs=(USUAL, config), check=False)
-        assert (done.returncode == 0) == known
-        assert known or "policy oracle: what copr_dunes truly shows is not known" in done.stdout
-
-
-@pytest.mark.slow
 def test_a_completed_field_lies_between_the_round_and_its_levels(planned, tmp_path):
     without, made = (planned(tmp_path, "--config", f"inpaint={on}", configs=(USUAL, TINY)) for on in (False, True))
-    assert made == without + Counter(inpaint_field=1, evaluate_inpainted=1)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not find_spec("onnxruntime"), reason="needs the extra `mobilesam`: pip install onnxruntime")
-def test_a_segmenter_is_fetched_or_read_before_the_materials(planned, snakemake, tmp_path):
-    target = f"{FARTHEST}/materials"
-    assert planned(tmp_path, target, "--config", "segmenter=fetch")["fetch_mobilesam"] == 1
-    (folder := tmp_path / "sam").mkdir()
-    (folder / "encoder.onnx").touch()
-    plan = (target, "--config", f"segmenter={folder}", "--dry-run")
-    assert f"config: segmenter: there is no {folder}/decoder.onnx" in snakemake(tmp_path, *plan, check=False).stdout
-    (folder / "decoder.onnx").touch()
-    assert f"{folder}/encoder.onnx, {folder}/decoder.onnx" in snakemake(tmp_path, *plan).stdout
+    assert made == without + Counter(inpaint_field=1)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from fixtures.runs import TINY, USUAL
 from dav_gswt.cli import run as make_run
 
 PROFILES = "workflow/profiles"
-ROUND = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k2{stop}/iter{t}"
+ROUND = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k2/iter{t}"
 
 
 @pytest.fixture
@@ -89,7 +89,7 @@ def test_a_gpu_is_asked_for_by_rules_that_are_there(asked, root):
 @pytest.mark.slow
 def test_a_round_is_one_submission(snakemake, root, tmp_path):
     """Of its own: two rounds in one job would wait for the scoring between them, which waits for the first."""
-    target = ROUND.format(stop="", t=2) + "/field.ply"
+    target = ROUND.format(t=2) + "/field.ply"
     arguments = [f"--profile={root / PROFILES}/slurm", "--dry-run", target]
     out = snakemake(tmp_path, *arguments, configs=(USUAL, TINY)).stdout
     groups = re.findall(r"Group job (\S+) .+?:\n(.+?)(?=^\S)", out, re.M | re.S)
@@ -101,7 +101,7 @@ def test_a_round_is_one_submission(snakemake, root, tmp_path):
 @pytest.mark.slow
 def test_who_asks_people_or_devices_stays_here_and_asks_once(checkout, tmp_path):
     """On a cluster, too. All that the rule reads is empty, so it fails; the profile would have it tried twice more."""
-    photos, capture = "results/mine/photos", ROUND.format(stop="", t=1).replace("desert", "mine") + "/capture"
+    photos, capture = "results/mine/photos", ROUND.format(t=1).replace("desert", "mine") + "/capture"
     folder = checkout(tmp_path / "clone")
     scene = "kind: photos, folder: mine, size: 64, start: 3, agent: handheld, preset: draft, tiling: semantic"
     (folder / "mine.yaml").write_text(f"scenes: {{mine: {{{scene}}}}}")

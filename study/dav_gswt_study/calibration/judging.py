@@ -1,6 +1,7 @@
 """Collects scores of candidates and the true error there, and compares them with `agreement`."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32, Float64
@@ -8,21 +9,20 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField, read_field
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset
+from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset, select_farthest_poses
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import image_files, metrics
-from dav_gswt.photos.training_views import TrainingView, read_training_views
+from dav_gswt.photos.training_views import WHOLE, TrainingView, read_training_views
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground, read_ground
-from dav_gswt.views import policy_inputs, true_pictures
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.pose_maps import PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.scoring import PHOTO_WIDTH, build_conditions, ground_mask
+from dav_gswt.views.scoring import PHOTO_WIDTH, build_conditions, ground_mask, scoring_camera
 from dav_gswt.views.terms import weighted_mean
 from dav_gswt.views.uncertainty import combine_terms, w2_sq
 from dav_gswt_study.calibration import agreement
@@ -32,7 +32,6 @@ from dav_gswt_study.calibration import agreement
 class CalibrationTarget:
     """The field whose scores are compared. taken: the photos so far. size: longer side of the photos of its fit."""
 
-    scene: dict
     field: GaussianField
     grid: Ground
     frame: SceneFrame
@@ -40,11 +39,11 @@ class CalibrationTarget:
     size: int
 
 
-def read_target(given, scene: dict, split: ViewSplit, captures: list[str], size: int) -> CalibrationTarget:
+def read_target(given, split: ViewSplit, captures: list[str], size: int) -> CalibrationTarget:
     """Read the target. given: files `field`, `ground`, `frame`, `images`, `model`. captures: of earlier rounds."""
     taken = read_training_views(given.images, given.model, split.start, captures, PHOTO_WIDTH)
     field, grid = read_field(given.field), read_ground(given.ground)
-    return CalibrationTarget(scene, field, grid, read_scene_frame(given.frame), taken, size)
+    return CalibrationTarget(field, grid, read_scene_frame(given.frame), taken, size)
 
 
 def calibrate_scores(
@@ -71,7 +70,6 @@ def calibrate_scores(
         condition, masks = build_conditions(*given, prior.model.size)
         others = control_maps(prior, condition)
         shown |= others
-        # `residual` takes the place of the scores' term: that of samples from other noises, whatever was asked for them
         terms |= {name: weighted_mean(m, masks) for name, m in others.items()}
     corrected = judged.frame.kind == "photos"  # photos differ in exposure
     error, error_maps = measure_errors(judged.field, judged.grid, views, judged.size, corrected)
@@ -83,18 +81,25 @@ def calibrate_scores(
 
 
 def choose_candidates(
-    judged: CalibrationTarget, candidates: Candidates, scored: Scores, given: dict, count: int
+    candidates: Candidates, scored: Scores, images: Path | str, count: int
 ) -> tuple[Candidates, list[TrainingView]]:
-    """Choose candidates, spread over the scored ones. Returns them and their true pictures.
+    """Choose `count` candidates of a replayed scene, or all, spread over the scored ones.
 
-    given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `true_pictures.write_truth`).
+    images: the folder of the photos. Returns: the candidates, and their photos at the scoring size.
     """
     names = set(scored.names)
     known = [(pose, camera) for pose, camera in candidates if pose.name in names]
-    if given.get("truth"):
-        return policy_inputs.read_truth(known, given["truth"])
-    some = true_pictures.spread_candidates(known, count)
-    return some, list(true_pictures.render_truth(judged.scene, some, given["images"]))
+    some = [known[i] for i in select_farthest_poses([pose for pose, _ in known], count)]
+    return some, [_read_photo(pose, camera, images) for pose, camera in some]
+
+
+def _read_photo(pose: Pose, camera: Camera, images: Path | str) -> TrainingView:
+    """The photo of a candidate at the scoring size; weight 0 where it is masked."""
+    image, cover = image_files.read_photo_and_alpha(Path(images) / pose.name)
+    camera = scoring_camera(camera)
+    size = camera.width, camera.height
+    weight = image_files.shrink_image(cover[..., None], *size)[..., 0] > WHOLE
+    return TrainingView(pose.name, camera, image_files.shrink_image(image, *size), weight.astype(np.float32))
 
 
 def geometric_baselines(some: list[Pose], taken: list[Pose]) -> dict[str, Float64[Array, "n"]]:
@@ -112,7 +117,7 @@ def _select_terms(
     shown = {"opacity": maps.opacity[rows]}
     if "w2_sq" in scores.terms:
         assert maps.w2_sq is not None  # it is written beside the term
-        u = combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
+        u = combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales)
         terms, shown = terms | {"u": u[rows]}, shown | {"w2_sq": maps.w2_sq[rows]}
     return terms, shown
 

@@ -9,10 +9,8 @@ from dav_gswt import csv_tables
 from dav_gswt.files import read_json
 from dav_gswt.sweeps import QUALITY as MEASURES
 from dav_gswt.sweeps import describe_origin, read_benchmark, select_metrics, sum_or_none
-from dav_gswt.views import stopping
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")
-EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # predicted before a round: `marginal_gain`
 
 
 def read_cell(cell: dict) -> list[dict]:
@@ -21,14 +19,11 @@ def read_cell(cell: dict) -> list[dict]:
     cell: what CELL names; `corrected`: PSNR after the photos' exposure is fitted; files: `metrics` of each round, the
     start's first; `times`, for each later round its jobs' benchmarks.
     """
-    found, fits = [], []
+    found = []
     for t, path in enumerate(cell["metrics"]):
         metrics = read_json(path)
         row = {key: cell[key] for key in CELL} | {"round": t, "photos": metrics["photos"]}
         row |= select_metrics(metrics, "psnr_colour_corrected" if cell["corrected"] else "psnr")
-        row |= _predict_gain(found, fits, metrics["photos"])
-        if t:
-            fits.append(metrics["fit"])
         row |= {
             "seconds": sum_or_none(run and run[0] for run in map(read_benchmark, cell["times"][t - 1])) if t else 0.0
         }
@@ -40,14 +35,4 @@ def read_cell(cell: dict) -> list[dict]:
 def read_curves(path: Path | str) -> list[dict]:
     """Read the table of curves."""
     integers = ("seed", "k", "round", "photos")
-    return csv_tables.read_table(path, numbers=(*MEASURES, *EXPECTED, "seconds"), integers=integers)
-
-
-def _predict_gain(before: list[dict], fits: list[dict], photos: int) -> dict:
-    """Predict a round's gain from the rounds before it. before: their rows; fits: their reports."""
-    if not before:
-        return dict.fromkeys(EXPECTED)
-    history = stopping.build_history(fits, before[0]["photos"])
-    found = stopping.predict_gain(*history, photos - before[-1]["photos"])
-    values = (found.closes, found.gain, found.low, found.high) if found else (None,) * len(EXPECTED)
-    return dict(zip(EXPECTED, values, strict=True))
+    return csv_tables.read_table(path, numbers=(*MEASURES, "seconds"), integers=integers)

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.images import figures
-from dav_gswt.views.policies import ORACLES
-from dav_gswt_study.comparison.tables import EVERY, EVERYTHING, check_predictions
+from dav_gswt_study.comparison.tables import EVERY, EVERYTHING
 from dav_gswt_study.markdown import format_number, format_table
 
 NAMED = {  # measures, and decimals
@@ -21,8 +20,8 @@ NAMED = {  # measures, and decimals
 ALL_SCENES = "all scenes"
 PANEL = 3.3, 3.4  # inches
 FOREST = 0.34  # inches a policy
-SHOWN = 6  # curves that a panel holds legibly: the baseline, an oracle and the best
-BASE, TRUTH = {"color": "black", "linewidth": 2.4}, {"color": "0.55", "linestyle": "--"}
+SHOWN = 6  # curves that a panel holds legibly: the baseline and the best
+BASE = {"color": "black", "linewidth": 2.4}
 
 
 def describe_comparison(
@@ -41,7 +40,6 @@ def describe_comparison(
         "groups": format_groups(grouped + overall),
         "scenes": format_scenes(compared, baseline),
         "ends": format_ends(results),
-        "worth": check_predictions(curves),
     }
 
 
@@ -103,12 +101,10 @@ def write_figure(path: Path | str, curves: list[dict], compared: list[dict], bas
     compared = [row for row in compared if row["measure"] == "psnr"]
     panels = sorted({(row["scene"], row["k"]) for row in curves if row["policy"] == baseline})
     policies = [row["policy"] for row in _rank_policies(compared)]
-    best = [p for p in policies if p not in ORACLES][: SHOWN - 2]
-    looks = (
-        {baseline: BASE}
-        | {p: TRUTH for p in [p for p in policies if p in ORACLES][:1]}
-        | {policy: {"color": colour, "linewidth": 1.6} for policy, colour in zip(best, figures.OKABE_ITO, strict=False)}
-    )
+    best = policies[: SHOWN - 1]
+    looks = {baseline: BASE} | {
+        policy: {"color": colour, "linewidth": 1.6} for policy, colour in zip(best, figures.OKABE_ITO, strict=False)
+    }
     columns = min(3, len(panels))
     above = -(-len(panels) // columns)
     heights = [PANEL[1] * above, FOREST * len(policies) + 1.3]

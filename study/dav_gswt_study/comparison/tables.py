@@ -1,7 +1,6 @@
 """From curves to results: a row a cell, and every policy less the baseline, paired, with intervals."""
 
 from dataclasses import asdict
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -93,24 +92,6 @@ def _area(photos: Float[Array, "t"], rounds: list[dict], measure: str) -> float 
     """The nAUC of a measure; None where a round lacks it."""
     values = [row[measure] for row in rounds]
     return None if None in values else compute_nauc(photos, np.array(values, float))
-
-
-def check_predictions(curves: list[dict]) -> dict | None:
-    """Compare gains of rounds, in dB, with their predictions (`marginal_gain`); None where nothing was predicted.
-
-    rounds: how many; gained, expected: their means; covered: share of the rounds whose gain lies in the interval.
-    """
-    found = []
-    for _, policy, rounds in _group_cells(curves):
-        for before, row in pairwise(rounds):
-            if row["expected"] is not None and policy[0] != EVERYTHING:
-                gained = row["psnr"] - before["psnr"]
-                found.append((gained, row["expected"], row["expected_low"] <= gained <= row["expected_high"]))
-    if not found:
-        return None
-    return {"rounds": len(found)} | dict(
-        zip(("gained", "expected", "covered"), np.mean(found, 0).tolist(), strict=True)
-    )
 
 
 def compute_nauc(photos: Float[Array, "t"], psnr: Float[Array, "t"]) -> float:

@@ -5,25 +5,37 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from dav_gswt.csv_tables import read_table
+from dav_gswt.materials.store import read_report
 from dav_gswt_study.markdown import format_table
 
 ACCURACY = ("iou_sand", "iou_meadow", "iou_boulders", "iou_path")
 REPETITION = ("brightness", "landmarks", "busyness", "mean_tile", "next")
 
 
+def tabulate_verdicts(folders: Mapping[str, Path | str]) -> list[dict]:
+    """The verdict on each scene and on each of its materials. folders: of materials, by scene."""
+    rows = []
+    for scene, folder in folders.items():
+        found = read_report(folder)
+        whole = {"scene": scene, "of": "all", "share": 1 - found.excluded, "objects": len(found.objects)}
+        rows.append(whole | vars(found.verdict))
+        for number, each in enumerate(found.materials):
+            own = sum(thing.material == number for thing in found.objects)
+            rows.append({"scene": scene, "of": each.name, "share": each.share, "objects": own} | vars(each.verdict))
+    return rows
+
+
 def describe_materials(tables: Mapping[str, Path | str]) -> dict[str, str]:
     """What the page's template is filled with: Markdown by the name of each table.
 
-    tables: the files `materials`, `lattice`, `transitions` and `verdicts`.
+    tables: the files `materials`, `lattice` and `verdicts`.
     """
-    made = {"materials": _describe_accuracy, "lattice": _describe_repetition, "transitions": _describe_borders}
-    made |= {"verdicts": _describe_verdict}
+    made = {"materials": _describe_accuracy, "lattice": _describe_repetition, "verdicts": _describe_verdict}
     heads = {
         "materials": ["scene", "sand", "meadow", "boulders", "path", "**mean IoU**", "true objects", "found", "wrong"]
         + ["precision", "recall", "**F1**"],
         "lattice": ["scene", "materials", "objects", "excess of brightness", "of landmarks", "busyness", "mean tile"]
         + ["next"],
-        "transitions": ["scene", "terrain", "photographed", "difference", "interval", "inside", "crops"],
         "verdicts": ["scene", "of", "share", "objects", "verdict"],
     }
     return {name: format_table(heads[name], map(describe, read_table(tables[name]))) for name, describe in made.items()}
@@ -37,15 +49,6 @@ def _describe_accuracy(row: dict[str, str]) -> Sequence[str]:
 def _describe_repetition(row: dict[str, str]) -> Sequence[str]:
     alone = "" if row["of"] == "all" else f", {row['of']} alone"
     return [row["scene"] + alone, row["materials"], row["objects"], *_round(row, REPETITION)]
-
-
-def _describe_borders(row: dict[str, str]) -> Sequence[str]:
-    if not row["difference"]:  # one material: no border
-        return [row["scene"], *["no border"] * 3, "", "", "0, 0"]
-    low, high = _round(row, ("low", "high"))
-    crops = f"{row['terrain_crops']}, {row['photographed_crops']}"
-    found = _round(row, ("terrain", "photographed", "difference"))
-    return [row["scene"], *found, f"({low}, {high})", *_round(row, ["inside"]), crops]
 
 
 def _describe_verdict(row: dict[str, str]) -> Sequence[str]:

@@ -107,7 +107,7 @@ def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau:
     patches of the exemplar that they are compared with are not either.
     """
     options = BundleOptions(tau=tau, salt=salt)
-    rings = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels).rings
+    rings, _ = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels)
     manifest = describe_tiles(BundleContent.of_one_material(tiles), options, rings)
     terrain = replace(endless.terrain_from_fields(tiles.fields, manifest, {"kind": "flat"}), reach=REACH)
     plan = tiles.layout

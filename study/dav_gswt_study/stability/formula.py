@@ -1,7 +1,7 @@
 """Compare a formula with its float64 reference over its whole range."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64
@@ -58,15 +58,8 @@ def measure_error(check: Check, function: Callable) -> WorstError:
     """Error of a function against the check's reference. A value that is not finite is infinitely far off."""
     parts = [_measure_case(case, check, function) for case in check.cases()]
     worst = max(parts, key=lambda part: part.share)
-    return WorstError(
-        max(part.absolute for part in parts),
-        max(part.relative for part in parts),
-        worst.share,
-        worst.label,
-        worst.computed,
-        worst.expected,
-        all(part.finite for part in parts),
-    )
+    absolute, relative = (max(getattr(part, name) for part in parts) for name in ("absolute", "relative"))
+    return replace(worst, absolute=absolute, relative=relative, finite=all(part.finite for part in parts))
 
 
 def _measure_case(case: Case, check: Check, function: Callable) -> WorstError:
@@ -81,15 +74,8 @@ def _measure_case(case: Case, check: Check, function: Callable) -> WorstError:
         share = _divide(error, check.absolute + check.relative * np.abs(expected), np.inf)
     i = int(np.argmax(share))
     label = case.label if case.along is None else f"{case.label}{float(np.ravel(case.along)[i]):.4g}"
-    return WorstError(
-        float(error.max()),
-        float(relative.max()),
-        float(share[i]),
-        label,
-        computed[i].item(),
-        expected[i].item(),
-        bool(np.isfinite(computed).all()),
-    )
+    worst = float(error.max()), float(relative.max()), float(share[i])
+    return WorstError(*worst, label, computed[i].item(), expected[i].item(), bool(np.isfinite(computed).all()))
 
 
 def _divide(error: Float64[Array, "n"], size: Float64[Array, "n"], over_zero: float = 0.0) -> Float64[Array, "n"]:

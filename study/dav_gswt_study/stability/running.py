@@ -1,5 +1,6 @@
-"""Run the workflow at one extreme in a folder of its own, and describe the outcome."""
+"""Run the workflow at one extreme in a folder of its own, and tell whether the outcome was expected."""
 
+import re
 import resource
 import shutil
 import subprocess
@@ -17,11 +18,14 @@ from dav_gswt.bundle.chunks import ChunkEntry
 from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.cli.run import PROFILE_NOTE, short_log
 from dav_gswt.files import atomic_folder, read_json, write_json
-from dav_gswt_study.stability.extremes import Extreme
+from dav_gswt.images import image_files, metrics
+from dav_gswt_study.stability.extremes import EXTREMES, Extreme
 
 DEFAULT_CONFIG, TEST_CONFIG = "config/config.yaml", "config/test/config.yaml"
 NUMERIC_FILES = ("*.ply", "*.csv", "*.json", "lod*.bin")  # files whose numbers must all be finite
 TRACEBACK = "Traceback (most recent call last)"
+NEAR_STILLS = ("walker", "oblique")  # stills that show single splats; from far above, sand has one colour
+MIN_PSNR = 40.0  # dB between stills of worlds that differ in size alone: single roundings to 8 bits
 
 
 def run_extreme(extreme: Extreme, root: Path, out: Path | str, cores: int, lpips: str = "installed") -> dict:
@@ -86,9 +90,10 @@ def extract_message(output: str) -> str:
 
 
 def read_warnings(log: Path) -> list[str]:
-    """The warnings in the log of a job."""
+    """The warnings in the log of a job, without those about photos, of which the smallest experiment has too few."""
     lines = log.read_text(encoding="utf-8").splitlines()
-    return [line.split(" WARNING ", 1)[1] for line in lines if " WARNING " in line]
+    told = [line.split(" WARNING ", 1)[1] for line in lines if " WARNING " in line]
+    return [line for line in told if not line.startswith("start view")]
 
 
 def is_finite(path: Path) -> bool:
@@ -117,3 +122,55 @@ def count_gaussians(folder: Path) -> int | None:
     """Gaussians of the last field, from which tiles are cut; None without a field."""
     fields = list(folder.glob("results/*/seed*/*/active_*/iter*/field.ply"))
     return max((PlyData.read(str(path))["vertex"].count for path in fields), default=None)
+
+
+def tabulate_runs(root: Path | str) -> list[dict]:
+    """A row for each extreme. root: the folder that holds the runs' folders."""
+    return [tabulate_run(extreme, Path(root)) for extreme in EXTREMES.values()]
+
+
+def tabulate_run(extreme: Extreme, root: Path) -> dict:
+    """The outcome of a run, and whether it was expected."""
+    outcome = read_json(root / extreme.name / "outcome.json")
+    finished = outcome["exit_code"] == 0
+    blank = [name for name in NEAR_STILLS if finished and is_blank(root / extreme.name / f"{name}.png")]
+    psnr = compare_stills(root / extreme.name, root / extreme.same_as) if extreme.same_as else None
+    row = {key: outcome[key] for key in ("exit_code", "message", "traceback")}
+    row |= {"files_checked": outcome["checked"], "not_finite": len(outcome["not_finite"]), "blank_stills": len(blank)}
+    row |= {"like": extreme.same_as, "stills_psnr": psnr}
+    row |= {"warnings": " / ".join(outcome["warnings"])}
+    cost = {"gaussians": outcome["gaussians"], "seconds": round(outcome["seconds"], 1)}
+    expected = "message" if extreme.error_pattern else "ends"
+    as_expected = (has_failed_as_expected if extreme.error_pattern else has_finished)(extreme, row)
+    about = {"run": extreme.name, "about": extreme.about, "expected": expected, "as_expected": as_expected}
+    return about | row | cost | {"peak_mb": round(outcome["peak_mb"])}
+
+
+def has_failed_as_expected(extreme: Extreme, row: dict) -> bool:
+    """Whether the run stopped with the expected message, without a traceback."""
+    message = row["message"] or ""
+    return (
+        row["exit_code"] != 0 and not row["traceback"] and re.search(extreme.error_pattern or "", message) is not None
+    )
+
+
+def has_finished(extreme: Extreme, row: dict) -> bool:
+    """Whether the run finished, all numbers are finite, and the stills show something, and what they should equal."""
+    faults = row["exit_code"] or row["traceback"] or row["not_finite"] or row["blank_stills"]
+    return not faults and (row["stills_psnr"] is None or row["stills_psnr"] >= MIN_PSNR)
+
+
+def is_blank(path: Path) -> bool:
+    """Whether the lower half of a picture has one colour."""
+    picture = image_files.read_photo(path)
+    return float(picture[len(picture) // 2 :].std((0, 1)).max()) < 1 / 255
+
+
+def compare_stills(folder: Path, other: Path) -> float | None:
+    """PSNR over all stills of two runs, at most 100; None where one of them has no still."""
+    pairs = [(path, other / path.name) for path in sorted(folder.glob("*.png"))]
+    if not pairs or not all(second.is_file() for _, second in pairs):
+        return None
+    a, b = (np.concatenate([image_files.read_photo(pair[i]) for pair in pairs]) for i in (0, 1))
+    psnr = metrics.psnr(a, b, np.ones(a.shape[:2], np.float32))
+    return 100.0 if psnr is None else min(100.0, float(psnr))

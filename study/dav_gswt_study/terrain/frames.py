@@ -21,6 +21,7 @@ from dav_gswt.terrain import endless, heights, stills, visibility
 from dav_gswt.terrain.page import write_page
 from dav_gswt.terrain.stills import FrameTiming, Shot
 from dav_gswt_study.tables import spread
+from dav_gswt_study.terrain.walk import walk_shots
 
 PARTS = ("render", "sort", "update")
 LIBRARY, PAGE = "library", "page"
@@ -63,7 +64,7 @@ class FrameSettings:
     budgets: list[int]
 
     def shots(self) -> list[Shot]:
-        return stills.walk_shots(**self.flight)
+        return walk_shots(**self.flight)
 
 
 def time_library(bundle: Bundle, settings: FrameSettings) -> list[dict]:
@@ -157,7 +158,7 @@ def select_viewer_rows(rows: list[dict]) -> list[dict]:
     return [{key: row[key] for key in (*spread.CELL, *spread.VIEWER)} for row in first.values()]
 
 
-def write_frame_plot(path: Path | str, rows: list[dict]) -> None:
+def plot_frames(rows: list[dict]):
     """Milliseconds of a frame's parts over Gaussians in view, a panel for each renderer; rows hold text."""
     from matplotlib.ticker import LogLocator  # here, not above: see `figures.make_figure`
 
@@ -185,7 +186,7 @@ def write_frame_plot(path: Path | str, rows: list[dict]) -> None:
     panels[0].set_ylabel("milliseconds a frame (mean, sd)")
     named = next((axes for axes in panels if axes.get_legend_handles_labels()[0]), panels[0])
     figure.legend(*named.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
-    figures.save_figure(figure, path)
+    return figure
 
 
 def _format_title(renderer: str, rows: list[dict]) -> str:

@@ -1,11 +1,10 @@
-"""The paper's evolution figure: two test views over the rounds, with error maps.
+"""The paper's evolution figure: two test views, each in several fits, with error maps.
 
 Errors are relative to the photo, not to the last field as in the paper.
 Source: DAV-GSWT, figure on iterative reconstruction evolution.
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32
@@ -30,24 +29,19 @@ MAP = "magma"
 
 
 @dataclass(frozen=True)
-class Round:
-    """What a round ended with. metrics: its metrics.json. title: what stands over it; note: and under its measures."""
+class Column:
+    """A fit, and what stands over it and under its measures. metrics: its metrics.json."""
 
-    number: int
+    title: str
     field: GaussianField
     grid: Ground
     metrics: dict
-    title: str = ""
     note: str = ""
-
-    @property
-    def named(self) -> str:
-        return self.title or f"round {self.number}"
 
 
 @dataclass(frozen=True)
 class Look:
-    """A test view after a round. error: mean of |picture - photo| over the channels, NaN where the pixel does not
+    """A test view in a column. error: mean of |picture - photo| over the channels, NaN where the pixel does not
     count. row: the view's measures, of metrics.json."""
 
     picture: Float32[Array, "h w 3"]
@@ -57,7 +51,7 @@ class Look:
 
 @dataclass(frozen=True)
 class Strip:
-    """A test view and how it looks after each round. why: it is shown."""
+    """A test view and how it looks in each column. why: it is shown."""
 
     name: str
     why: str
@@ -70,40 +64,39 @@ def psnr_key(frame: SceneFrame) -> str:
     return "psnr_colour_corrected" if frame.kind == "photos" else "psnr"
 
 
-def choose_test_views(first: dict, key: str, named: str = "round 0") -> dict[str, str]:
-    """The test views to show, by name, and why: the worst and the median one by PSNR. first: metrics.json of `named`.
+def choose_test_views(first: Column, key: str) -> dict[str, str]:
+    """The test views to show, by name, and why: the worst and the median one of a column by PSNR.
 
     Of an even number the better one of the middle two; one test view is shown alone.
     Raises: InputError: there is no test view.
     """
-    rows = sorted(first["test_views"], key=lambda row: np.inf if row[key] is None else row[key])
+    rows = sorted(first.metrics["test_views"], key=lambda row: np.inf if row[key] is None else row[key])
     if not rows:
-        raise InputError("metrics.json of round 0: has no test view, so there is none to show; give the scene some")
+        raise InputError(
+            f"metrics.json of {first.title}: has no test view, so there is none to show; give the scene some"
+        )
     if len(rows) == 1:
         return {rows[0]["view"]: "the only test view"}
-    whys = {0: f"the worst of {len(rows)}\ntest views at {named}", len(rows) // 2: f"the median one\nat {named}"}
+    whys = {
+        0: f"the worst of {len(rows)}\ntest views at {first.title}",
+        len(rows) // 2: f"the median one\nat {first.title}",
+    }
     return {rows[i]["view"]: why for i, why in whys.items()}
 
 
-def build_strips(rounds: list[Round], tests: list[TrainingView], key: str) -> list[Strip]:
-    """Return the chosen test views after each round; the first round is round 0. key: see `psnr_key`.
-
-    Raises: InputError: a round's metrics lack the view.
-    """
+def build_strips(columns: list[Column], tests: list[TrainingView], key: str) -> list[Strip]:
+    """The test views that the first column chooses, in every column. key: see `psnr_key`."""
     views = {view.name: view for view in tests}
     found = []
-    for name, why in choose_test_views(rounds[0].metrics, key, rounds[0].named).items():
-        looks = [render_view(one, views[name], key) for one in rounds]
-        counts = np.isfinite(looks[0].error)
-        found.append(Strip(name, why, fade_masked(views[name].image, counts), looks))
+    for name, why in choose_test_views(columns[0], key).items():
+        looks = [render_view(one, views[name], key) for one in columns]
+        found.append(Strip(name, why, fade_masked(views[name].image, np.isfinite(looks[0].error)), looks))
     return found
 
 
-def render_view(one: Round, view: TrainingView, key: str) -> Look:
-    """The view after a round, its colours corrected where its PSNR is that of corrected ones."""
-    row = next((row for row in one.metrics["test_views"] if row["view"] == view.name), None)
-    if row is None:
-        raise InputError(f"metrics.json of round {one.number}: lacks the test view {view.name}; make it again")
+def render_view(one: Column, view: TrainingView, key: str) -> Look:
+    """The view in a column, its colours corrected where its PSNR is that of corrected ones."""
+    row = next(row for row in one.metrics["test_views"] if row["view"] == view.name)
     (view,) = mask_to_ground([view], one.grid)
     picture = np.clip(render(one.field, view.camera).colour, 0, 1)
     if key == "psnr_colour_corrected":
@@ -125,35 +118,30 @@ def error_limit(found: list[Strip]) -> float:
     return float(np.quantile(errors, HIGHEST)) or 1.0
 
 
-def write_figure(path: Path | str, found: list[Strip], rounds: list[Round], key: str) -> None:
-    """The figure of strips, as a PNG."""
-    figures.save_figure(draw_figure(found, rounds, key), path)
-
-
-def draw_figure(found: list[Strip], rounds: list[Round], key: str):
-    """Of each view the photo and a render a round, under these maps of the error on one scale, under these the view's
-    measures; under each column the photos that the round had and its measures over all test views."""
+def draw_figure(found: list[Strip], columns: list[Column], key: str):
+    """Of each view the photo and a render a column, under these maps of the error on one scale, under these the view's
+    measures; under each column the photos that its fit had and its measures over all test views."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    columns = 1 + len(rounds)
-    side = WIDE / columns
+    count = 1 + len(columns)
+    side = WIDE / count
     tall = [side * strip.photo.shape[0] / strip.photo.shape[1] for strip in found for _ in range(2)]
-    foot = FOOT + NOTE * any(one.note for one in rounds)
+    foot = FOOT + NOTE * any(one.note for one in columns)
     figure = figures.make_figure(
         WIDE, sum(tall) + HEAD + LABEL * len(found) + foot + KEY, w_pad=0.02, h_pad=0.02, hspace=0.0, wspace=0.0
     )
-    grid = figure.subplots(len(tall) + 2, columns, squeeze=False, height_ratios=[HEAD, *tall, foot])
+    grid = figure.subplots(len(tall) + 2, count, squeeze=False, height_ratios=[HEAD, *tall, foot])
     colours = {"norm": Normalize(0, error_limit(found)), "cmap": colormaps[MAP].with_extremes(bad=str(GREY))}
     for axes in grid.flat:
         axes.set(xticks=[], yticks=[])
         axes.spines[:].set_visible(False)
-    for axes, title in zip(grid[0], ["photo", *(one.named for one in rounds)], strict=True):
+    for axes, title in zip(grid[0], ["photo", *(one.title for one in columns)], strict=True):
         _write_text(axes, title, size=12)
     for strip, pictures, maps in zip(found, grid[1:-1:2], grid[2:-1:2], strict=True):
         _draw_strip(strip, pictures, maps, colours, key)
-    _draw_footer(grid[-1], rounds, key)
+    _draw_footer(grid[-1], columns, key)
     bar = figure.colorbar(
         ScalarMappable(**colours), ax=grid, location="bottom", extend="max", shrink=0.7, aspect=45, pad=0.01
     )
@@ -171,11 +159,11 @@ def _draw_strip(strip: Strip, pictures, maps, colours: dict, key: str) -> None:
         below.set_xlabel(_format_metrics(one.row, key), fontsize=11)
 
 
-def _draw_footer(row, rounds: list[Round], key: str) -> None:
-    count = len(rounds[0].metrics["test_views"])
+def _draw_footer(row, columns: list[Column], key: str) -> None:
+    count = len(columns[0].metrics["test_views"])
     corrected = ",\nPSNR colour-corrected" if key == "psnr_colour_corrected" else ""
     _write_text(row[0], (f"mean of {count} test views" if count > 1 else "the one test view") + corrected)
-    for axes, one in zip(row[1:], rounds, strict=True):
+    for axes, one in zip(row[1:], columns, strict=True):
         _write_text(
             axes, f"{one.metrics['photos']} photos\n{_format_metrics(one.metrics, key)}{one.note}", weight="bold"
         )

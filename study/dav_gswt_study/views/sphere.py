@@ -6,7 +6,6 @@ candidates spread evenly over it lie evenly in the figure. Source: DAV-GSWT, fig
 
 from dataclasses import dataclass
 from math import ceil
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,7 @@ RING = 15  # degrees of elevation between rings
 NUMBERED = 24  # poses of a round, above which stars have no numbers
 CROWDED = 4000.0  # square points that all dots cover together, where they are many
 LARGEST = 42.0  # square points: a dot, where they are few
-APART = 0.075  # from a star to its number, in radii of the disc
+NUMBER = {"fontsize": 11, "weight": "bold"}
 PHOTO = {"marker": "s", "facecolors": "none", "edgecolors": "black", "linewidths": 1.6}
 STAR = {"marker": "*", "edgecolors": "black", "linewidths": 1.2}
 
@@ -80,11 +79,6 @@ def build_round(
     )
 
 
-def write_figure(path: Path | str, rounds: list[Round], label: str) -> None:
-    """The figure of rounds, as a PNG. label: what the colours are."""
-    figures.save_figure(draw_figure(rounds, label), path)
-
-
 def draw_figure(rounds: list[Round], label: str):
     """A panel a round: each candidate a dot, its colour on one scale for all rounds; photos taken before the round are
     hollow squares, the poses it chose are stars, numbered as they were chosen."""
@@ -122,6 +116,8 @@ def _colour_scale(rounds: list[Round]):
 
 
 def _draw_panel(axes, one: Round, rim: int, colours: dict) -> None:
+    from matplotlib.patheffects import withStroke
+
     edge = float(np.sqrt(1 - np.sin(np.radians(rim))))
     axes.set_ylim(0, 1.04 * edge)
     axes.set_yticks(np.sqrt(1 - np.sin(np.radians(np.arange(rim, 90, RING)))), [])
@@ -136,41 +132,12 @@ def _draw_panel(axes, one: Round, rim: int, colours: dict) -> None:
     stars, star = one.candidates[one.chosen], min(260, max(120, 8 * dot)) if numbered else 70
     axes.scatter(*stars.T, c=one.values[one.chosen], s=star, zorder=3, **STAR, **colours)
     if numbered and one.chosen:
-        _draw_labels(axes, stars, one.taken, edge)
+        for order, at in enumerate(stars, 1):
+            label = axes.annotate(f"{order}", at, (8, 0), textcoords="offset points", va="center", zorder=4, **NUMBER)
+            label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
     chosen = f"{len(one.chosen)} of {len(one.values)} poses" if one.chosen else "no pose"
     photos = "1 photo" if len(one.taken) == 1 else f"{len(one.taken)} photos"
     axes.set_title(f"round {one.number}: {chosen}, after {photos}", fontsize=12)
-
-
-def _draw_labels(axes, stars: Float64[Array, "k 2"], taken: Float64[Array, "m 2"], edge: float) -> None:
-    from matplotlib.patheffects import withStroke
-
-    halo = [withStroke(linewidth=2.5, foreground="white")]
-    for order, (x, y) in enumerate(place_labels(_to_cartesian(stars), _to_cartesian(taken), edge), 1):
-        at = np.arctan2(y, x), np.hypot(x, y)
-        how = {"ha": "center", "va": "center_baseline", "fontsize": 11, "weight": "bold"}
-        axes.text(*at, f"{order}", zorder=4, path_effects=halo, **how)
-
-
-def place_labels(stars: Float64[Array, "k 2"], taken: Float64[Array, "m 2"], edge: float) -> Float64[Array, "k 2"]:
-    """Where numbers go, x and y: APART from their star, on that of eight sides where most is free of stars, photos
-    and the numbers before; the first of equal ones, from the right and counter-clockwise. edge: radius of the disc,
-    outside of which none stands."""
-    turns = np.radians(np.arange(0, 360, 45))
-    sides = APART * edge * np.stack([np.cos(turns), np.sin(turns)], -1)
-    used, found = np.concatenate([stars, taken]), []
-    for star in stars:
-        free = np.linalg.norm((star + sides)[:, None] - used, axis=-1).min(1)
-        free[np.linalg.norm(star + sides, axis=1) > edge] = -1
-        found.append(star + sides[np.argmax(np.round(free, 9))])
-        used = np.concatenate([used, found[-1:]])
-    return np.array(found)
-
-
-def _to_cartesian(polar: Float64[Array, "n 2"]) -> Float64[Array, "n 2"]:
-    """Angle and radius as x and y."""
-    angle, radius = polar.T
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], -1)
 
 
 def _legend_handles() -> list:

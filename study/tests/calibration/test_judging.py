@@ -40,15 +40,13 @@ def replayed(tmp_path):
     south = truth.means[:, 1] < 0.6
     colour = np.where(south[:, None, None], truth.sh + np.float32(0.8), truth.sh)
     wrong = replace(truth, sh=colour, uncertainty=np.where(south, 1, 0).astype(np.float32))
-    return judging.CalibrationTarget(
-        {"agent": "replay"}, wrong, patch.grid(), patch.FRAME, patch.photos(), 96
-    ), tmp_path
+    return judging.CalibrationTarget(wrong, patch.grid(), patch.FRAME, patch.photos(), 96), tmp_path
 
 
 def judge(replayed, prior=None, count=12):
     judged, folder = replayed
     found = scoring.score_poses(judged.field, judged.grid, pool(), judged.taken, judged.frame, prior)
-    some = judging.choose_candidates(judged, pool(), found.scores, {"images": folder}, count)
+    some = judging.choose_candidates(pool(), found.scores, folder, count)
     return judging.calibrate_scores(judged, *some, (found.scores, found.maps), 0.1, 0, prior)
 
 

@@ -3,7 +3,7 @@ import pytest
 
 from dav_gswt.geometry.scene_frame import Extent
 from dav_gswt.images import image_files
-from dav_gswt.photos.synthetic.labels import LabelMap, ObjectLabel
+from dav_gswt.photos.synthetic.labels import LabelMap
 from dav_gswt_study.materials import accuracy
 
 BARE = np.zeros((20, 20), int)
@@ -20,8 +20,7 @@ def truth(objects=None):
     material = np.ones((20, 20), int)
     material[:, 12:] = 2
     objects = at(slice(4, 8), slice(4, 8)) if objects is None else objects
-    names, shrubs = {"sand": 1, "meadow": 2}, (ObjectLabel(1, "shrub", 0.6, 0.6, 0.2),)
-    return LabelMap(material, objects, Extent(0.0, 0.0, 2.0, 2.0), names, shrubs)
+    return LabelMap(material, objects, Extent(0.0, 0.0, 2.0, 2.0), {"sand": 1, "meadow": 2})
 
 
 def found(material, objects=BARE):

@@ -59,7 +59,7 @@ def test_a_picture_that_repeats_stands_out_at_its_period_and_noise_does_not():
 
 
 TILINGS = {"semantic": {"tile": 0.5, "strip": 0.06, "candidates": 9, "variants": 1}, "small": {"tile": 0.3}}
-SCENES = {"desert": {"tiling": "semantic-refined"}, "beach": {"tiling": "small"}, "moon": {"tiling": "semantic"}}
+SCENES = {"desert": {"tiling": "semantic-expansion"}, "beach": {"tiling": "small"}, "moon": {"tiling": "semantic"}}
 ONCE = {"tilings": [], "replicates": 1, "compared_replicates": 1}
 
 

@@ -9,10 +9,10 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
 from dav_gswt.files import write_json
 from dav_gswt.images import image_files
-from dav_gswt_study.stability import running, tables
+from dav_gswt_study.stability import running
 from dav_gswt_study.stability.extremes import ALL, EXTREMES, make_ground_field
 
-FILES = [running.DEFAULT_CONFIG, "study/config.yaml", running.TEST_CONFIG]
+FILES = [running.DEFAULT_CONFIG, running.TEST_CONFIG]
 WELL = {"exit_code": 0, "message": None, "traceback": False, "not_finite": 0, "blank_stills": 0, "stills_psnr": None}
 
 
@@ -23,7 +23,7 @@ def test_what_is_laid_over_the_config_is_what_the_config_allows_or_says(root):
             load.check_config(load.add_scene_files(given, root / "config/scenes"))
         except InputError as error:
             said = WELL | {"exit_code": 1, "message": str(error)}
-            assert extreme.error_pattern and tables.has_failed_as_expected(extreme, said), extreme.name
+            assert extreme.error_pattern and running.has_failed_as_expected(extreme, said), extreme.name
 
 
 def test_worlds_differ_in_size_alone():
@@ -34,14 +34,14 @@ def test_worlds_differ_in_size_alone():
 
 
 def test_a_run_ends_well_only_without_any_fault_and_fails_well_only_with_its_own_message():
-    assert tables.has_finished(EXTREMES["tau-0"], WELL)
+    assert running.has_finished(EXTREMES["tau-0"], WELL)
     faults = dict(exit_code=1, traceback=True, not_finite=2, blank_stills=1, stills_psnr=20.0)
-    assert not any(tables.has_finished(EXTREMES["tau-0"], WELL | {name: value}) for name, value in faults.items())
+    assert not any(running.has_finished(EXTREMES["tau-0"], WELL | {name: value}) for name, value in faults.items())
     one = EXTREMES["one-gaussian"]
     right = WELL | {"exit_code": 1, "message": "finished.ply: the field has 1 opaque Gaussians; a surface"}
-    assert tables.has_failed_as_expected(one, right)
+    assert running.has_failed_as_expected(one, right)
     for fault in (dict(exit_code=0), dict(message="another"), dict(message=None), dict(traceback=True)):
-        assert not tables.has_failed_as_expected(one, right | fault)
+        assert not running.has_failed_as_expected(one, right | fault)
 
 
 def test_a_number_that_is_not_finite_is_found_in_a_table_in_a_field_and_in_a_chunk(tmp_path):
@@ -69,11 +69,11 @@ def test_a_number_that_is_not_finite_is_found_in_a_table_in_a_field_and_in_a_chu
 def test_a_row_tells_whether_a_world_looks_as_one_of_another_size(tmp_path):
     def tabulate(picture, name="world-1e6", not_finite=()):
         (tmp_path / name).mkdir(exist_ok=True)
-        for still in tables.NEAR_STILLS:
+        for still in running.NEAR_STILLS:
             image_files.write_png(tmp_path / name / f"{still}.png", picture)
         found = WELL | {"name": name, "warnings": [], "checked": 3, "not_finite": list(not_finite)}
         write_json(tmp_path / name / "outcome.json", found | {"gaussians": 9, "seconds": 1.0, "peak_mb": 2.0})
-        return tables.tabulate_run(EXTREMES[name], tmp_path)
+        return running.tabulate_run(EXTREMES[name], tmp_path)
 
     picture = np.random.default_rng(0).uniform(0, 1, (20, 30, 3)).astype(np.float32)
     tabulate(picture, "world-1")

@@ -1,14 +1,12 @@
 import numpy as np
 import pytest
 from fixtures.splats import rough_ground
-from fixtures.terrains import MAGENTA, manifest_of, stony_terrain
 from fixtures.tile_sets import report_of
 
 from dav_gswt.bundle import build, store
 from dav_gswt.bundle.content import BundleContent
-from dav_gswt.terrain import draw_order
 from dav_gswt.tiles.build import TileSet
-from dav_gswt_study.terrain import flicker, presort
+from dav_gswt_study.terrain import presort
 
 SIDE = 4.0
 
@@ -47,19 +45,3 @@ def test_every_shortcut_has_a_price_of_its_own(bundled):
     assert of(rows, "levels")["walker"] < of(rows, "rounding")["walker"], "coarse discs are seen, rounding is not"
     for view, found in of(rows, "all").items():
         assert found < 3 + min(v for s in presort.APPROXIMATIONS[:-1] if (v := of(rows, s).get(view)) is not None)
-
-
-MANIFEST = manifest_of(eye_floor=1.0, ground_colour=MAGENTA)
-
-
-def test_a_slow_walk_in_pre_sorted_orders_jumps_no_more_than_twice_as_far_and_a_jump_is_found(monkeypatch):
-    """The jump: orders that turn about from one frame to the next."""
-    stony = stony_terrain()
-    found = flicker.measure_flicker(stony, MANIFEST, 2, 2.0, 96, 54, 10**6)
-    assert (found[0]["east"], found[0]["north"]) == (0.5, 0.5)  # the way is counted in tiles
-    assert all(row["exact_largest"] > 0 for row in found)
-    assert flicker.compare_largest_changes(found) < flicker.MAX_RATIO
-    turns = iter(range(10**6))
-    monkeypatch.setattr(draw_order, "nearest_order", lambda directions, kept, *_: next(turns) * 5 % len(kept))
-    found = flicker.measure_flicker(stony, MANIFEST, 2, 1.0, 48, 27, 10**6)
-    assert flicker.compare_largest_changes(found) > flicker.MAX_RATIO

@@ -42,8 +42,8 @@ def test_a_sweep_runs_shared_stages_once(planned, tmp_path, vary, jobs):
 EXPERIMENTS = {  # target: settings of the study, jobs
     "stability": ({}, dict(run_extreme=len(EXTREMES), measure_formulas=1, write_stability=1)),
     "calibration": (
-        {"calibration": {"scenes": ["desert", "planet"], "rounds": 2}},
-        dict(render_candidates=2, calibrate_coarse=2, calibrate_round=4, plot_calibration=1),
+        {"calibration": {"scenes": ["desert_pool", "planet_pool"], "rounds": 2}},
+        dict(calibrate_coarse=2, calibrate_round=4, plot_calibration=1),
     ),
     "seams": (  # two ways to cut, of the same levels
         {

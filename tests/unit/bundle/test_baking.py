@@ -12,18 +12,23 @@ from dav_gswt.bundle import build, gswt
 from dav_gswt.bundle.build import BundleOptions
 
 
+def first(thing):
+    """The object on the first material."""
+    return replace(thing, material=0)
+
+
 @pytest.fixture(scope="module")
 def content():
-    return replace(cover_content(), objects=[shrub(0.4, 0.2)])
+    return replace(cover_content(), objects=[first(shrub(0.4, 0.2))])
 
 
 @pytest.fixture(scope="module")
 def baked(content):
-    return gswt.bake_objects(content, 1, 7)
+    return gswt.bake_objects(content, 7)
 
 
 def added(content, baked, tile, level=0):
-    return baked[level][tile][len(content.tiles[1].fields[level][tile]) :]
+    return baked[level][tile][len(content.tiles[0].fields[level][tile]) :]
 
 
 def test_tiles_have_as_many_objects_as_the_density_says(content, baked):
@@ -36,7 +41,7 @@ def test_tiles_keep_the_same_mean_height_and_their_borders(content, baked):
     """The public renderer shifts each tile by its own mean height."""
     heights = [float(field.means[:, 2].astype(float).mean()) for field in baked[0]]
     assert np.ptp(heights) < 1e-5 * SIDE
-    for before, after in zip(content.tiles[1].fields[0], baked[0], strict=True):
+    for before, after in zip(content.tiles[0].fields[0], baked[0], strict=True):
         edge = np.abs(before.means[:, :2] - SIDE / 2).max(1) > 0.49 * SIDE
         np.testing.assert_allclose(after.means[: len(before)][edge], before.means[edge], atol=2e-4)
         middle = after.means[len(before) :, :2]
@@ -44,7 +49,7 @@ def test_tiles_keep_the_same_mean_height_and_their_borders(content, baked):
 
 
 def test_the_public_renderers_checker_finds_no_fault_with_objects(content, gswt_checker, tmp_path):
-    fields = gswt.bake_objects(replace(content, objects=[shrub(0.4, 0.2), shrub(0.2, 0.5)]), 1, 7)
+    fields = gswt.bake_objects(replace(content, objects=[first(shrub(0.4, 0.2)), first(shrub(0.2, 0.5))]), 7)
     gswt.write_gswt(fields, SIDE, tmp_path / "objects.zip")
     command = [sys.executable, gswt_checker, tmp_path / "objects.zip"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -60,17 +65,13 @@ def test_every_level_has_the_same_objects_and_every_tile_others(content, baked):
 
 
 def test_an_object_wider_than_a_tile_is_left_out(content):
-    assert gswt.bake_objects(content, 0, 7) is content.tiles[0].fields  # this material has none at all
-    wide = replace(content, objects=[shrub(2.5, 0.2)])
-    fields = gswt.bake_objects(wide, 1, 7)
-    assert [len(f) for f in fields[0]] == [len(f) for f in content.tiles[1].fields[0]]
+    other = replace(content, objects=[shrub(0.4, 0.2)])
+    assert gswt.bake_objects(other, 7) is content.tiles[0].fields  # it stands on the second material
+    fields = gswt.bake_objects(replace(content, objects=[first(shrub(2.5, 0.2))]), 7)
+    assert [len(f) for f in fields[0]] == [len(f) for f in content.tiles[0].fields[0]]
 
 
-def test_every_material_has_an_archive_and_old_ones_go(content, tmp_path, root):
-    out = tmp_path / "b"
-    out.mkdir()
-    (out / "gswt_material5.zip").write_bytes(b"old")
-    build.write_bundle(content, out, BundleOptions(tau=0.5, salt=7), {})
-    assert sorted(p.name for p in out.glob("*.zip")) == ["gswt.zip", "gswt_material1.zip"]
-    read = gswt.read_gswt(out / "gswt_material1.zip", SIDE)
-    assert [len(f) for f in read[0]] == [len(f) for f in gswt.bake_objects(content, 1, 7)[0]]
+def test_the_archive_has_the_first_material_with_its_objects(content, baked, tmp_path):
+    build.write_bundle(content, tmp_path / "b", BundleOptions(tau=0.5, salt=7), {})
+    read = gswt.read_gswt(tmp_path / "b/gswt.zip", SIDE)
+    assert [len(f) for f in read[0]] == [len(f) for f in baked[0]]

@@ -77,26 +77,22 @@ def test_a_bundle_reads_back_as_the_tiles_it_was_made_of(bundle, tiles):
     folder, written = bundle
     read = store.read_bundle(folder)
     assert read.manifest == written
-    error, along = written.error, np.array(written.directions)
+    along = np.array(written.directions)
     for number, tile in enumerate(read.manifest.tiles):
         for entry in tile.chunks:
             source = tiles.fields[entry.level][number]
             field, order = read.chunk(number, entry.level)
             rows, data = written.encoding.encode(source), (folder / entry.file).read_bytes()
             assert data == rows.tobytes() + b"".join(row.astype("<u2").tobytes() for row in order)
-            # what the manifest states; a float32's last digits on top
+            # half a step of 2 / 65535 along x and y, of 0.2 / 65535 along z
             away = np.linalg.norm(field.means.astype(float) - source.means, axis=1).max()
-            assert 0 < away <= error.position * (1 + 1e-6)
-            assert np.abs(field.base_colours - source.base_colours).max() <= error.colour + 1e-6
+            assert 0 < away <= np.hypot(np.hypot(1, 1), 0.1) / 65535 * 1.001
+            assert np.abs(field.base_colours - source.base_colours).max() <= 0.5 / 255 + 1e-6
             assert field.means[:, 2].min() >= tile.z[0] and field.means[:, 2].max() <= tile.z[1]
             for direction, row in zip(entry.orders, order, strict=True):
                 depth = source.means[row].astype(float) @ along[direction]
                 # depths are sorted in 65535 steps of what the tile spans, at most its diagonal
                 assert (np.diff(depth) <= 2 * SIDE / 65535).all()
-    # half a step of 2 / 65535 along x and y, of 0.2 / 65535 along z
-    assert error.position <= np.hypot(np.hypot(1, 1), 0.1) / 65535 * 1.001
-    assert error.position_pixels == pytest.approx(error.position / (0.1 / 12))
-    assert error.clipped == 0 and min(error.walker_db, error.oblique_db) > 40
     uncertain = [len(tile.chunks[0].orders) for tile in written.tiles if tile.uncertainty >= 0.5]
     plain = [len(tile.chunks[0].orders) for tile in written.tiles if tile.uncertainty < 0.5]
     assert set(uncertain) == {len(along)} and set(plain) == {(len(along) + 1) // 2}
@@ -126,9 +122,8 @@ def test_the_zip_holds_what_the_public_renderer_reads(bundle, tiles):
     assert (values[:, 9:54] == 0).all() and (values[:, 3:6] == 0).all()
 
 
-def test_the_zip_reads_back_as_the_tiles(bundle, tiles, tmp_path):
+def test_the_zip_reads_back_as_the_tiles_and_a_damaged_one_is_refused(bundle, tiles, tmp_path):
     path = shutil.copy(bundle[0] / "gswt.zip", tmp_path)
-    rezipped(path, lambda entries: entries.append(("notes.txt", b"skipped")))
     fields = gswt.read_gswt(path, SIDE)
     assert [len(level) for level in fields] == [16, 16]
     for mine, source in zip(fields[1], tiles.fields[1], strict=True):
@@ -136,54 +131,13 @@ def test_the_zip_reads_back_as_the_tiles(bundle, tiles, tmp_path):
         np.testing.assert_allclose(mine.log_scales, source.log_scales, atol=1e-6)
         np.testing.assert_allclose(mine.sh[:, 0], source.sh[:, 0], atol=1e-6)
         np.testing.assert_allclose(mine.opacity_logits, source.opacity_logits)
-
-
-def rezipped(path, change):
-    """The archive with other entries: a list of (name, bytes), changed."""
-    with zipfile.ZipFile(path) as archive:
-        entries = [(name, archive.read(name)) for name in archive.namelist()]
-    change(entries)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in entries:
-            archive.writestr(name, data)
-
-
-def first(change):
-    return lambda entries: entries.__setitem__(0, (entries[0][0], change(entries[0][1])))
-
-
-@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
-def test_what_each_method_says_of_damage_is_one_message(tmp_path, method):
-    path = tmp_path / "gswt.zip"
-    with zipfile.ZipFile(path, "w", method) as archive:
-        archive.writestr("lod0_tile_00.ply", bytes(range(256)) * 20)
-    whole = path.read_bytes()
-    start = whole.index(b".ply") + 16
-    for damaged in (whole[:start] + b"\xff" * 8 + whole[start + 8 :], whole[:-50]):
-        path.write_bytes(damaged)
-        with pytest.raises(InputError, match=r"gswt\.zip: not readable"):
-            gswt.read_gswt(path, SIDE)
-
-
-@pytest.mark.parametrize(
-    "change, message",
-    [
-        pytest.param(first(lambda d: d[:-4]), "lod0_tile_00.ply: not a readable PLY", id="cut short"),
-        pytest.param(
-            first(lambda d: d.replace(b"vertex 60", b"vertex 99999999")), "the header announces more", id="a huge count"
-        ),
-        pytest.param(first(lambda d: b"ply\n" + bytes(2000)), "not a readable PLY", id="no such PLY"),
-        pytest.param(first(lambda d: d[:-4] + b"\xff\xff\xff\x7f"), "rot_3 .* is not finite", id="not finite"),
-        pytest.param(first(lambda d: d[:-16] + bytes(16)), "Gaussian 59 has a zero quaternion", id="no rotation"),
-        pytest.param(lambda entries: entries.pop(), "not a whole set", id="a tile is missing"),
-        pytest.param(lambda entries: entries.append(("up/../lod0_tile_00.ply", entries[0][1])), "twice", id="twice"),
-        pytest.param(lambda entries: entries.clear(), "not a whole set", id="empty"),
-    ],
-)
-def test_an_archive_that_is_no_tile_set_is_refused(copy_of, change, message):
-    rezipped(copy_of / "gswt.zip", change)
-    with pytest.raises(InputError, match=message):
-        gswt.read_gswt(copy_of / "gswt.zip", SIDE)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("notes.txt", b"")
+    with pytest.raises(InputError, match=r"'notes\.txt' is no tile"):
+        gswt.read_gswt(path, SIDE)
+    (tmp_path / "gswt.zip").write_bytes((bundle[0] / "gswt.zip").read_bytes()[:-50])
+    with pytest.raises(InputError, match=r"gswt\.zip: not readable"):
+        gswt.read_gswt(path, SIDE)
 
 
 def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
@@ -198,14 +152,12 @@ def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
 
 
 def test_the_archive_lacks_levels_that_its_renderer_could_not_take(tiles, tmp_path, monkeypatch, caplog):
-    levels = list(tiles.fields)
-    sizes = [sum(len(field) for field in level) for level in levels]
+    sizes = [sum(len(field) for field in level) for level in tiles.fields]
     monkeypatch.setattr(gswt, "MAX_SPLATS", sum(sizes[1:]))
-    assert gswt.fit_to_renderer(levels) == levels[1:] and "lacks the finest 1 of" in caplog.text
-    with pytest.raises(InputError, match="the renderer takes"):
-        gswt.write_gswt(levels, SIDE, tmp_path / "gswt.zip")
-    monkeypatch.setattr(gswt, "MAX_SPLATS", sum(sizes))
-    assert gswt.fit_to_renderer(levels) == levels
+    gswt.write_gswt(tiles.fields, SIDE, tmp_path / "gswt.zip")
+    (level,) = gswt.read_gswt(tmp_path / "gswt.zip", SIDE)
+    assert [len(field) for field in level] == [len(field) for field in tiles.fields[1]]
+    assert "lacks the finest 1 of" in caplog.text
 
 
 def test_a_new_bundle_replaces_the_old_one_and_leaves_its_neighbours(tiles, tmp_path):

@@ -83,18 +83,17 @@ def test_so_many_splats_as_two_bytes_count_need_four():
 
 
 def test_a_picture_in_its_own_order_is_the_rasterizer_s():
-    field, sight = ground(1), direction_search.TileView(0, 37.0, 45.0)
-    exact, same = (
-        direction_search.render_in_order(field, SIDE, sight.direction, 0.01, o) for o in (None, sight.direction)
+    field, along = ground(1), orders.unit_vectors(np.radians([37.0]), np.radians(45.0))[0]
+    exact, same, backwards = (
+        direction_search.render_in_order(field, SIDE, along, 0.01, o) for o in (None, along, -along)
     )
     assert (exact == same).all() and exact.max() > 0.5
-    backwards = direction_search.render_in_order(field, SIDE, sight.direction, 0.01, -sight.direction)
     assert np.abs(backwards - exact).max() > 0.1
 
 
 def test_one_colour_needs_the_fewest_directions():
-    found = direction_search.search_directions([ground(0, colours=0.0)], SIDE, 40.0)
-    assert found.rings == DirectionRings((20.0,), 2 * direction_search.MIN_AZIMUTHS) and set(found.decibels) == {
+    rings, decibels = direction_search.search_directions([ground(0, colours=0.0)], SIDE, 40.0)
+    assert rings == DirectionRings((20.0,), 2 * direction_search.MIN_AZIMUTHS) and set(decibels) == {
         "walker",
         "oblique",
     }
@@ -103,9 +102,8 @@ def test_one_colour_needs_the_fewest_directions():
 def test_directions_are_added_until_the_error_is_small_or_the_room_is_full(monkeypatch):
     monkeypatch.setattr(direction_search, "VIEWS", 2)
     fields = [ground(seed, stones=150) for seed in range(2)]
-    wanted = [15.0, 60.0]
-    found = [direction_search.search_directions(fields, SIDE, w) for w in wanted]
-    counts = [len(f.rings.select_directions(0.0, 1.0)) for f in found]
-    assert counts == sorted(counts) and counts[0] < counts[-1] <= direction_search.MAX_ORDERS
-    assert min(found[0].decibels.values()) >= 15.0
-    assert min(found[-1].decibels.values()) < 60.0, "no room for what this asks for"
+    (few, good), (many, bad) = (direction_search.search_directions(fields, SIDE, wanted) for wanted in (15.0, 60.0))
+    first, last = (len(rings.select_directions(0.0, 1.0)) for rings in (few, many))
+    assert first < last <= direction_search.MAX_ORDERS
+    assert min(good.values()) >= 15.0
+    assert min(bad.values()) < 60.0, "no room for what this asks for"

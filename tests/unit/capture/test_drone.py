@@ -26,7 +26,7 @@ ORBITS = [(90, 0, 1.0), (60, 10, 1.0), (45, 200, 1.2), (30, 100, 0.8), (10, 45, 
 
 @pytest.fixture
 def requested():
-    found = [camera_layouts.orbit(*orbit, [0, 0, 0], 64, 48, 60) for orbit in ORBITS]
+    found = [camera_layouts.orbit(*orbit, [0, 0, 0], 64, 48, 60.0) for orbit in ORBITS]
     return [(pose_of_camera(f"pose_{i}", camera, FRAME), camera) for i, camera in enumerate(found)]
 
 

@@ -38,7 +38,7 @@ def site(tmp_path, monkeypatch, root):
 
 @pytest.fixture
 def requested():
-    found = [camera_layouts.orbit(*orbit, MIDDLE, 64, 48, 60) for orbit in ORBITS]
+    found = [camera_layouts.orbit(*orbit, MIDDLE, 64, 48, 60.0) for orbit in ORBITS]
     return [(pose_of_camera(f"pose_{i}", camera, FRAME), camera) for i, camera in enumerate(found)]
 
 
@@ -103,7 +103,7 @@ def test_an_older_list_goes_and_photos_stay(site, requested, monkeypatch):
 
 
 def test_words_say_where_to_stand_and_where_to_look():
-    camera = camera_layouts.orbit(40, 0, 2.0, MIDDLE, 64, 48, 60)  # to the right on the map, 1.53 away, 1.29 up
+    camera = camera_layouts.orbit(40, 0, 2.0, MIDDLE, 64, 48, 60.0)  # to the right on the map, 1.53 away, 1.29 up
     assert directions.describe_pose(camera, UNKNOWN, directions.make_ruler(UNKNOWN)) == (
         "Stand 1.0 flying height from the middle, towards the right of the map, camera 0.8 flying heights above the "
         "ground; face the middle, which is to the left of the map; look down 40 degrees."
@@ -122,7 +122,7 @@ def test_words_for_cameras_that_do_not_look_at_the_middle():
     by = directions.make_ruler(FRAME)
     aside = cameras.pinhole([0.5, 3.0, 1.5], [3.0, 5.5, 1.5], 48, 64, 60.0)
     assert "face the upper right of the map; look level." in directions.describe_pose(aside, FRAME, by)
-    down = camera_layouts.orbit(90, 270, 1.8, MIDDLE, 64, 48, 60)
+    down = camera_layouts.orbit(90, 270, 1.8, MIDDLE, 64, 48, 60.0)
     assert directions.describe_pose(down, FRAME, by) == (
         "Stand in the middle, camera 1.8 m above the ground; turn the top of the picture to the top of the map; "
         "look straight down."

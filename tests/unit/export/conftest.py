@@ -41,7 +41,7 @@ def cover_bundle(tmp_path_factory, root):
 @pytest.fixture(scope="session")
 def export_settings():
     """The config's `export`, all keys."""
-    settings = Export(columns=3, rows=2, centre=[0.0, 0.0], max_gb=1)
+    settings = Export(columns=3, rows=2, centre=[0.0, 0.0])
     return settings.model_dump(mode="json", exclude_none=True)
 
 

@@ -9,7 +9,7 @@ from fixtures.land_covers import cover_content
 from fixtures.splat_files import read_glb_splats
 
 from dav_gswt.export import ground_files, splat_files, terrain_files
-from dav_gswt.export.axes import Y_DOWN, Y_UP, turn_field
+from dav_gswt.export.axes import Y_DOWN, turn_field
 from dav_gswt.export.spool import Spool
 from dav_gswt.field import read_field
 from dav_gswt.geometry import cameras
@@ -47,7 +47,7 @@ def exported(cover_bundle, cover_terrain, export_settings, tmp_path_factory):
     out, manifest, tiles = tmp_path_factory.mktemp("terrain") / "out", cover_bundle.manifest, cover_content().tiles
     terrain_files.export_terrain(cover_terrain, manifest, export_settings | {"formats": ["ply", "glb"]}, out)
     settings = export_settings | {"columns": 6, "rows": 5, "centre": [3.0, 1.5]}  # with objects
-    ground_files.export_ground(cover_terrain, manifest, tiles, None, settings, out / "ground")
+    ground_files.export_ground(cover_terrain, manifest, tiles, settings, out / "ground")
     return out
 
 
@@ -67,7 +67,7 @@ def test_the_reference_decoder_of_spz_sees_the_same_picture(exported, node_modul
     field = read_field(exported / "terrain.ply")
     with Spool(tmp_path / "spool") as placed:
         placed.append(turn_field(field, Y_DOWN.T))
-    splat_files.write_spz(placed, tmp_path / "a.spz", Y_UP, version)
+    splat_files.write_spz(placed, tmp_path / "a.spz", version)
     program = node_modules / "@playcanvas/splat-transform/bin/cli.mjs"
     command = ["node", program, "-q", "-w", tmp_path / "a.spz", tmp_path / "b.ply"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)

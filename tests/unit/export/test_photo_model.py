@@ -1,13 +1,11 @@
 """A round's photos as other programs read them: cameras, points and pictures, without a trace of the test photos."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pycolmap
 import pytest
 from fixtures import photos as synth
-from plyfile import PlyData
 
 from dav_gswt.errors import InputError
 from dav_gswt.export import photo_model
@@ -16,7 +14,6 @@ from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import CapturedPhoto, list_taken_photos, write_capture_record
 from dav_gswt.photos.colmap_model import read_colmap_model
-from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.view_split import ViewSplit
 
 HALF = 1.0
@@ -93,29 +90,11 @@ def test_points_lie_where_the_photos_see_them(written, known):
     assert np.ptp(colours.mean(1)) > 30  # of the pictures, not the model's grey
 
 
-def test_the_importer_reads_the_poses_of_transforms_json_back(written, taken):
-    path = written / "transforms.json"
-    read = import_nerfstudio(path, json.loads(path.read_text()), written, lambda name: None)
-    assert tuple(shot.name for shot in read.shots) == tuple(f"images/{name}" for name in NAMES)
-    for shot, photo in zip(read.shots, taken, strict=True):
-        camera = photo.camera
-        assert shot.rotation == pytest.approx(camera.rotation, abs=1e-9)
-        assert shot.translation == pytest.approx(camera.translation, abs=1e-9)
-        assert shot.lens.params == pytest.approx(np.array([camera.fx, camera.fy, camera.cx, camera.cy]))
-    stored = read_colmap_model(written / "sparse/0")
-    rows = PlyData.read(str(written / "sparse_pc.ply"))["vertex"].data
-    assert np.stack([rows[axis] for axis in "xyz"], -1) == pytest.approx(stored.points, abs=1e-6)
-    colours = np.stack([rows[name] for name in ("red", "green", "blue")], -1)
-    assert colours / 255 == pytest.approx(stored.colours, abs=1e-6)
-
-
 def test_photos_that_test_have_a_folder_of_their_own(written, known):
     tests = read_colmap_model(written / "test/sparse/0")
     assert tests.names == SPLIT.test and len(tests.point_of) == 0
     assert_same(tests.cameras[0], known.camera("006.png"))
     assert tests.points == pytest.approx(read_colmap_model(written / "sparse/0").points)
-    frames = json.loads((written / "test/transforms.json").read_text())["frames"]
-    assert [frame["file_path"] for frame in frames] == ["images/006.png"]
 
 
 def test_what_the_test_photos_see_leaves_no_trace(written, taken, folder, known, tmp_path):
@@ -123,7 +102,7 @@ def test_what_the_test_photos_see_leaves_no_trace(written, taken, folder, known,
     pixels = known.pixels + unseen[:, None] * 30.0
     moved = replace(known, pixels=pixels, points=known.points + unseen.sum(), colours=1 - known.colours)
     photo_model.write_photo_models(tmp_path / "other", folder / "images", moved, SPLIT, taken)
-    for name in ("sparse/0/points3D.bin", "sparse/0/images.bin", "sparse_pc.ply", "transforms.json"):
+    for name in ("sparse/0/points3D.bin", "sparse/0/images.bin"):
         assert digest_files(written / name) == digest_files(tmp_path / "other" / name), name
 
 

@@ -28,9 +28,9 @@ def rover(root):
 def exports(cover_bundle, cover_terrain, export_settings, tmp_path_factory):
     """The folder that `dav-gswt export` writes, without objects: a rover may stop at a shrub; and the terrain."""
     out, terrain = tmp_path_factory.mktemp("exports"), replace(cover_terrain, scatter=None)
-    settings = export_settings | {"columns": 8, "rows": 8, "formats": ["ply"], "axes": "z-up"}
+    settings = export_settings | {"columns": 8, "rows": 8, "formats": ["ply"]}
     terrain_files.export_terrain(terrain, cover_bundle.manifest, settings, out / "terrain")
-    ground_files.export_ground(terrain, cover_bundle.manifest, cover_content().tiles, None, settings, out / "ground")
+    ground_files.export_ground(terrain, cover_bundle.manifest, cover_content().tiles, settings, out / "ground")
     return out, terrain
 
 

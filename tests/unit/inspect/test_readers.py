@@ -221,18 +221,6 @@ def test_neighbours_meet_at_edges_of_one_colour():
         assert edge_colours(west)[2] == edge_colours(tile)[0] and edge_colours(south)[1] == edge_colours(tile)[3]
 
 
-def test_a_cut_covers_the_cells_where_labels_change_just_above_the_ground(cut):
-    labels = cut.labels[5]
-    centres = readers.make_cuts(cut, 5, 0).cell_centers().points
-    column, row = np.floor(centres[:, :2] / cut.spacing).astype(int).T
-    changes = np.pad(labels, ((1, 0), (1, 0)), mode="edge")
-    changed = (changes[1:, 1:] != changes[1:, :-1]) | (changes[1:, 1:] != changes[:-1, 1:])
-    assert changed.sum() == len(centres) > 0 and changed[row, column].all()
-    ground = cut.fields[0][5].means[cut.fields[0][5].ground]
-    lift = centres[:, 2] - [ground[np.abs(ground[:, :2] - at[:2]).sum(1).argmin(), 2] for at in centres]
-    assert abs(np.median(lift) - cut.spacing) < 0.3 * cut.spacing
-
-
 def test_gaussians_have_the_patch_of_their_cell(cut):
     some = cut.fields[0][3]
     found = readers.find_patches(some, cut, 3)

@@ -201,7 +201,7 @@ def test_a_window_is_filled_by_its_material_where_it_can_be():
 def test_what_an_outline_leaves_out_is_excluded(found, monkeypatch):
     kept = np.arange(made.CELLS) % 2 == 0  # columns
 
-    def halve(maps, footprints, segmenter):
+    def halve(maps, footprints):
         return [replace(each, cells=each.cells & kept) for each in footprints]
 
     monkeypatch.setattr(build.outlines, "refine_footprints", halve)

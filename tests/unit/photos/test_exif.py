@@ -70,12 +70,6 @@ def test_a_focal_length_that_cannot_be_is_passed_over(tmp_path):
     assert read_focal_length(photo(tmp_path / "a.png", 360, 240)) is None
 
 
-def test_a_number_that_is_none_is_passed_over(tmp_path):
-    nan = (12, "d", (float("nan"),))
-    entries = {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1)), 0xA210: nan}
-    assert read_focal_length(with_block(tmp_path / "a.jpg", entries)) == pytest.approx(1000)
-
-
 def located(path, latitude=(12.0, 30.0, 36.0), longitude=(151.0, 15.0, 0.0), altitude=70.0, refs="SW", below=0):
     """A JPEG with a position and a time."""
     spec = oiio.ImageSpec(4, 3, 3, oiio.UINT8)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from fixtures import photos as synth
-from fixtures.blas_threads import print_with_threads
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
@@ -170,16 +169,3 @@ def test_up_says_on_which_side_the_normal_is_and_leaves_out_steep_planes(rng):
 def test_points_that_fix_no_plane_are_refused(points, rng):
     with pytest.raises(InputError, match="points"):
         fit_plane(points, rng)
-
-
-@pytest.mark.slow
-def test_the_plane_has_the_same_bits_whatever_the_threads_of_blas(root):
-    code = """if True:
-        import numpy as np
-        from dav_gswt.photos.ground_frame import fit_plane
-        points = np.random.default_rng(1).normal(size=(200_003, 3)) * [1, 1, 0.01]
-        normal, offset, spread = fit_plane(points, np.random.default_rng(0))
-        print(*(value.hex() for value in (*normal.tolist(), offset, spread)))
-    """
-    found = print_with_threads(root, code)
-    assert len(found[0].split()) == 5 and len(set(found)) == 1

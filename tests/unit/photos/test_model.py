@@ -41,20 +41,16 @@ def test_points_do_not_change_when_other_images_change(flown, rng):
     pixels = flown.pixels.copy()
     pixels[outside] += rng.normal(0, 50, (outside.sum(), 2))
     other = replace(flown, pixels=pixels, points=flown.points + 1.0, colours=1 - flown.colours)
-    for one, two in zip(triangulate_points(flown, names), triangulate_points(other, names), strict=True):
-        assert np.array_equal(one, two)
+    one, two = triangulate_model(flown, names), triangulate_model(other, names)
+    assert np.array_equal(one.points, two.points) and np.array_equal(one.colours, two.colours)
 
 
-def test_wrong_matches_and_points_of_too_few_images_are_left_out(flown):
+def test_wrong_matches_are_left_out(flown):
     twice = np.flatnonzero(np.bincount(flown.point_of, minlength=len(flown.points)) >= 3)
     pixels = flown.pixels.copy()
     pixels[np.flatnonzero(flown.point_of == twice[0])[0]] += [40, 0]
     good = triangulate_model(flown, flown.names)
     assert len(triangulate_model(replace(flown, pixels=pixels), flown.names).points) == len(good.points) - 1
-    counts = np.bincount(flown.point_of, minlength=len(flown.points))
-    assert len(triangulate_model(flown, flown.names, at_least=4).points) == (counts >= 4).sum()
-    with pytest.raises(ValueError, match="two rays"):
-        triangulate_model(flown, flown.names, at_least=1)
 
 
 def test_rays_that_are_nearly_parallel_are_left_out():

@@ -8,16 +8,12 @@ from fixtures import photos as synth
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json
 from dav_gswt.photos import view_split
 from dav_gswt.photos.view_split import (
-    ViewSplit,
     find_aim_point,
     measure_picture_share,
     measure_visible_share,
-    read_view_split,
     split_views,
-    write_view_split,
 )
 
 FRAME = scene_frame(exemplar=(-0.6, -0.6, 1.2))
@@ -104,12 +100,3 @@ def test_the_test_views_that_ground_json_names_are_taken_or_refused(flown):
         split(flown, frame=replace(FRAME, test=("nowhere.png",)))
     with pytest.raises(InputError, match="every image is a test view"):
         split(flown, frame=replace(FRAME, test=flown.names))
-
-
-SPLIT = ViewSplit(start=("a.png", "b.png"), pool=(), test=("c.png",))
-
-
-def test_what_is_written_is_read_back(tmp_path):
-    write_view_split(tmp_path / "views.json", SPLIT)
-    assert read_view_split(tmp_path / "views.json") == SPLIT
-    assert read_json(tmp_path / "views.json") == {"start": ["a.png", "b.png"], "pool": [], "test": ["c.png"]}

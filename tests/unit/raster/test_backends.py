@@ -20,7 +20,7 @@ from dav_gswt.raster import backends
 
 FAKED = "cuda through a made-up gsplat"
 ISAS = [] if backends.explain_unavailable("cpu") else backends.load_backend("cpu").instruction_sets()
-FEW = ["a cloud on a map", "features", "antialiased", "opacities up to 1"]
+FEW = ["a cloud on a map", "antialiased", "opacities up to 1"]
 
 
 @pytest.fixture(params=[*ISAS, "torch", "cuda", FAKED])
@@ -70,14 +70,12 @@ def test_pictures_and_gradients_are_the_oracles(backend, name, scene, on_gpu):
     pictures, shown, wanted = answers(name)
     raster = backend(**scene.options)
     seen = raster.forward(**scene.arrays, camera=scene.camera)
-    found = [seen.colour, seen.alpha, seen.depth, seen.features]
-    assert (found.pop() is None) if len(pictures) == 3 else True
+    found = [seen.colour, seen.alpha, seen.depth]
     for a, b in zip(found, pictures, strict=True):
         np.testing.assert_allclose(a, b, atol=image * max(1, np.abs(b).max()))
     gradients = raster.backward(*shown)
     for parameter, value in wanted.items():
         assert relative(getattr(gradients, parameter), value) < gradient, parameter
-    assert (gradients.features is None) == ("features" not in wanted)
 
 
 @pytest.mark.parametrize("name", FEW, indirect=True)
@@ -111,11 +109,11 @@ def test_what_has_no_pixel_is_not_drawn_and_all_else_is(backend, name, scene):
 
 def test_gradients_left_out_count_as_zero(backend, on_gpu):
     tolerance = 1e-4 if on_gpu else 1e-6  # atomic sums there
-    scene = SCENES["features"]
+    scene = SCENES["a cloud"]
     raster = backend()
     raster.forward(**scene.arrays, camera=scene.camera)
-    shown = answers("features")[1]
-    for kept in range(4):
+    shown = answers("a cloud")[1]
+    for kept in range(3):
         some = [g if i in (0, kept) else None for i, g in enumerate(shown)]
         all_given = [np.zeros_like(g) if s is None else g for s, g in zip(some, shown, strict=True)]
         short, long = raster.backward(*some), raster.backward(*all_given)
@@ -197,5 +195,3 @@ def test_what_cannot_be_drawn_is_refused_with_its_index(backend):
     with pytest.raises(ValueError, match="5 coefficients"):
         raster.forward(**(gaussians(20) | {"colours": np.zeros((20, 5, 3), np.float32)}), camera=camera)
     raster.forward(**gaussians(20), camera=camera)
-    with pytest.raises(ValueError, match="grad_features is given, but forward was given no features"):
-        raster.backward(np.zeros((52, 70, 3), np.float32), grad_features=np.zeros((52, 70, 5), np.float32))

@@ -92,7 +92,7 @@ def test_memory_kept_from_a_larger_scene_leaves_no_trace(isa):
     used.forward(**gaussians(600, seed=3, channels=7), camera=CAMERA)
     used.backward(np.ones((52, 70, 7), np.float32))
     bent = gaussians(500, seed=5) | {"colours": np.ones((500, 16, 3), np.float32)}
-    used.forward(**bent, camera=CAMERA, features=np.ones((500, 2), np.float32))
+    used.forward(**bent, camera=CAMERA)
     used.backward(np.ones((52, 70, 3), np.float32))
     small = gaussians(50, seed=4)
     for raster in (fresh, used):
@@ -115,14 +115,14 @@ def a_cloud(isa: str, threads: int) -> list[np.ndarray]:
 
 
 def a_ground_mostly_outside(isa: str, threads: int) -> list[np.ndarray]:
-    """With harmonics, features, antialiased; most of it beside the picture and before the near plane."""
+    """With harmonics, antialiased; most of it beside the picture and before the near plane."""
     n, rng = 3000, np.random.default_rng(3)
     arrays = gaussians(n)
     arrays["means"] *= 6
-    arrays["colours"], extra = (rng.normal(size=(n, *s)).astype(np.float32) for s in ((9, 3), (5,)))
+    arrays["colours"] = rng.normal(size=(n, 9, 3)).astype(np.float32)
     raster = cpu.Rasterizer(antialiased=True, instruction_set=isa, threads=threads)
-    seen = raster.forward(**arrays, camera=CAMERA, features=extra)
-    gradients = raster.backward(*image_gradients(CAMERA, 3), image_gradients(CAMERA, 5, seed=2)[0])
+    seen = raster.forward(**arrays, camera=CAMERA)
+    gradients = raster.backward(*image_gradients(CAMERA, 3))
     assert 100 < raster.visible.sum() < n // 2
     return [*vars(seen).values(), *vars(gradients).values(), raster.visible, np.array(raster.count_pairs())]
 

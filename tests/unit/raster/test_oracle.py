@@ -60,23 +60,6 @@ def test_pairs_are_counted_where_a_pixel_takes_a_splat(isa, name):
     assert abs(raster.count_pairs() - wanted) <= 1e-4 * wanted + 1  # at a splat's rim 1/255 may be missed by a rounding
 
 
-@pytest.mark.parametrize("features", [0, 1, 7])
-def test_features_are_channels_of_a_picture_of_their_own(raster, features):
-    arrays, camera = gaussians(120), CAMERAS["pinhole"]
-    extra = gaussians(120, seed=3, channels=features)["colours"]
-    both = arrays | {"colours": np.concatenate([arrays["colours"], extra], 1)}
-    joined = raster.forward(**both, camera=camera).colour
-    grad = image_gradients(camera, 3 + features)[0]
-    wanted = raster.backward(grad)
-    seen = raster.forward(**arrays, camera=camera, features=extra)
-    np.testing.assert_array_equal(np.concatenate([seen.colour, seen.features], 2), joined)
-    found = raster.backward(grad[..., :3].copy(), None, None, grad[..., 3:].copy())
-    np.testing.assert_array_equal(np.concatenate([found.colours, found.features], 1), wanted.colours)
-    for name in ("means", "log_scales", "quats", "opacity_logits"):
-        # other groups of channels, other sums
-        assert relative(getattr(found, name), getattr(wanted, name)) < 1e-5, name
-
-
 @pytest.mark.parametrize("view, antialiased", [("pinhole", False), ("orthographic", True)])
 def test_splats_that_reach_in_from_outside_are_not_left_out(isa, view, antialiased):
     arrays, camera = gaussians(200, seed=9), CAMERAS[view]

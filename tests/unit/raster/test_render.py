@@ -24,14 +24,11 @@ def field(n: int = 100, degree: int = 0) -> GaussianField:
     return GaussianField(*(arrays[k] for k in names), sh.astype(np.float32), np.zeros(n, np.float32), np.zeros(n, bool))
 
 
-@pytest.mark.parametrize("options", [{}, {"near": 4.0, "dilation": 1.0, "antialiased": True}], ids=["usual", "other"])
-def test_a_field_is_drawn_by_any_backend_as_its_arrays_are(options):
+def test_a_field_is_drawn_as_its_arrays_are():
     some, camera = field(degree=3), CAMERAS["pinhole"]
-    seen = render(some, camera, backend="torch", **options)
-    plain = backends.load_backend("torch").Rasterizer(**options).forward(**to_raster_arrays(some), camera=camera)
+    seen, plain = render(some, camera), backends.make_rasterizer().forward(**to_raster_arrays(some), camera=camera)
     for name in ("colour", "alpha", "depth"):
         np.testing.assert_array_equal(getattr(seen, name), getattr(plain, name))
-    np.testing.assert_allclose(render(some, camera, **options).colour, seen.colour, atol=2e-5)
 
 
 def test_the_picture_is_linear_in_the_background():
@@ -42,17 +39,6 @@ def test_the_picture_is_linear_in_the_background():
     np.testing.assert_allclose(grey + red - black, both, atol=1e-6)
     alpha = render(field(), camera).alpha
     np.testing.assert_allclose((red - black)[..., 0], 1 - alpha, atol=1e-6)
-
-
-def test_own_colours_may_have_any_number_of_channels():
-    given = gaussians(100, channels=6)["colours"]
-    seen = render(field(), CAMERAS["pinhole"], colours=given)
-    assert seen.colour.shape == (52, 70, 6)
-    np.testing.assert_array_equal(
-        seen.colour[..., 4], render(field(), CAMERAS["pinhole"], colours=given[:, 4:5]).colour[..., 0]
-    )
-    with pytest.raises(ValueError, match="one value or 6"):
-        render(field(), CAMERAS["pinhole"], (1, 0, 0), colours=given)
 
 
 # --- spherical harmonics

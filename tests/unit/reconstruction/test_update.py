@@ -37,13 +37,6 @@ def test_a_coarse_field_from_photos_alone():
     assert evaluate_field(found.field, mask_to_ground(photos[:1], found.grid))["psnr"] == pytest.approx(30, abs=12)
 
 
-@pytest.mark.parametrize("height, warned", [(0.02, False), (5.0, True)])
-def test_points_all_over_the_air_are_no_ground_and_the_log_says_so(height, warned, caplog):
-    points = np.random.default_rng(0).uniform(0.2, 3.0, (400, 3)) * [1, 1, height]
-    fit_coarse_field(start_of(made.photos(3), points), replace(SETTINGS, steps=1), np.random.default_rng(0))
-    assert ("a height field explains only" in caplog.text) == warned
-
-
 def updated_from_scratch(new):
     earlier = made.photos(3)
     first = fit(earlier)
@@ -67,7 +60,7 @@ def test_rounds_and_chosen_photos_are_one_fit_to_all_photos_unless_the_preset_sa
         np.testing.assert_array_equal(found.field.sh, once.field.sh)
         np.testing.assert_array_equal(found.grid.heights, once.grid.heights)
         assert found.report.steps == 52
-    assert again.report.new_views.taken and continued.report.steps == 40
+    assert again.report.taken and continued.report.steps == 40
 
 
 def test_steps_grow_with_the_photos_and_an_update_begins_with_lower_rates():
@@ -81,7 +74,7 @@ def test_no_photos_and_those_that_contradict_the_earlier_ones_change_nothing():
     wrong = [replace(view, image=np.ascontiguousarray(view.image[::-1, ::-1])) for view in made.photos(7)[3:]]
     for new in ([], wrong):
         first, same = updated_from_scratch(new)
-        assert same.report.new_views.taken == (not new)
+        assert same.report.taken == (not new)
         assert same.field is first.field and same.grid is first.grid
 
 
@@ -93,11 +86,11 @@ def test_where_earlier_photos_lose_much_an_update_tells_whether_the_new_ones_are
     def updated(*given):
         asked.append(given)
         found = update_field(*given)
-        return replace(found, report=replace(found.report, new_views=replace(found.report.new_views, taken=taken)))
+        return replace(found, report=replace(found.report, taken=taken))
 
     monkeypatch.setattr(update, "update_field", updated)
     first, after = updated_from_scratch(made.photos(5)[3:])
-    assert len(asked) == 1 and after.report.new_views.taken == taken
+    assert len(asked) == 1 and after.report.taken == taken
     assert (after.field is first.field) == (not taken)
 
 

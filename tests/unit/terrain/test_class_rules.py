@@ -3,14 +3,12 @@
 import json
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from fixtures.land_covers import SIDE, two_classes
 
-from dav_gswt.bundle.land_cover import ImageTerm, ObjectOrders, RangeTerm, ScatterEntry
+from dav_gswt.bundle.land_cover import ObjectOrders, RangeTerm, ScatterEntry
 from dav_gswt.bundle.manifest import MaterialEntry, TileSetInfo
 from dav_gswt.errors import InputError
-from dav_gswt.images import image_files
 from dav_gswt.terrain import class_rules
 from dav_gswt.terrain.class_rules import apply_rule, read_paint
 
@@ -29,16 +27,6 @@ def manifest():
 
 
 @pytest.fixture
-def picture(tmp_path):
-    image = np.zeros((2, 3, 3))
-    image[:, 0] = [1, 1, 0]
-    image[:, 1] = [0, 0.98, 0]
-    image_files.write_png(tmp_path / "classes.png", image)
-    colours = {"grass": "#00ff00", "sand": "#ffff00"}
-    return {"kind": "image", "file": str(tmp_path / "classes.png"), "width": 30, "colours": colours}
-
-
-@pytest.fixture
 def write(tmp_path):
     def write(**changes) -> dict:
         (tmp_path / "painted.json").write_text(json.dumps(FILE | changes))
@@ -48,52 +36,40 @@ def write(tmp_path):
 
 
 def test_the_default_is_the_noise_of_the_bundle(manifest):
-    assert apply_rule(manifest, class_rules.NOISE) == (manifest, {})
-    changed, _ = apply_rule(manifest, [{"kind": "noise", "weight": 0.5}])
+    assert apply_rule(manifest, class_rules.NOISE) == manifest
+    changed = apply_rule(manifest, [{"kind": "noise", "weight": 0.5}])
     assert changed.classes.rule[0].weight == 0.5
 
 
 def test_heights_are_given_in_tile_sides_and_slopes_as_they_are(manifest):
-    changed, _ = apply_rule(manifest, [{"kind": "height"} | RANGE, {"kind": "slope"} | RANGE])
+    changed = apply_rule(manifest, [{"kind": "height"} | RANGE, {"kind": "slope"} | RANGE])
     assert changed.classes.rule == [
         RangeTerm("height", 2.0, 1, SIDE, None, 0.5 * SIDE),
         RangeTerm("slope", 2.0, 1, 1.0, None, 0.5),
     ]
 
 
-def test_a_picture_becomes_numbers_of_materials(manifest, picture, caplog):
-    changed, pictures = apply_rule(manifest, [picture])
-    (term,) = changed.classes.rule
-    assert isinstance(term, ImageTerm) and (term.rows, term.columns, term.width) == (2, 3, 30.0)
-    assert pictures[term.file].tolist() == [[0, 1, 255]] * 2
-    assert "33.3 % of the pixels" in caplog.text
-
-
-def test_a_bad_term_is_refused_by_name(manifest, picture, write, monkeypatch):
+def test_a_bad_term_is_refused_by_name(manifest, write):
     noiseless = replace(manifest, classes=replace(manifest.classes, rule=[]))
     for given, rule, said in (
         (manifest, [{"kind": "slope"} | RANGE | {"material": "mud"}], "no material 'mud'; the terrain has sand, grass"),
-        (manifest, [picture | {"colours": {"sand": "#ff00ff"}}], "no pixel has the colour"),
         (noiseless, [{"kind": "noise"}], "no noise of its own"),
         (manifest, [write()], "one file, beside other terms"),
         (manifest, [{"kind": "noise"}, write(), write()], "one file, beside other terms"),
     ):
         with pytest.raises(InputError, match=said):
             apply_rule(given, rule)
-    monkeypatch.setattr(class_rules, "MAX_SIDE", 2)
-    with pytest.raises(InputError, match="3 x 2 pixels; at most 2"):
-        apply_rule(manifest, [picture])
 
 
 def test_painted_materials_are_found_by_their_names(manifest, write):
-    made, _ = apply_rule(manifest, [{"kind": "noise"}, write()])
+    made = apply_rule(manifest, [{"kind": "noise"}, write()])
     assert made.classes.painted == [[0, 0, 3, 1], [1, 1, 1, 0]]
     assert made.classes.rule == manifest.classes.rule and made.objects == manifest.objects
 
 
 def test_offsets_are_added_to_the_noise_and_densities_to_probabilities(manifest, write, caplog):
     entry = write(densities={"shrub": 0.5, "stone": 2, "tower": 2}, offsets={"grass": 0.25})
-    made, _ = apply_rule(manifest, [{"kind": "noise"}, entry])
+    made = apply_rule(manifest, [{"kind": "noise"}, entry])
     assert made.classes.rule[0].biases == [0.05, 0.25]
     assert [each.probability for each in made.objects] == pytest.approx([0.15, 0.6, 0.3])
     assert "not there: tower" in caplog.text
@@ -101,17 +77,17 @@ def test_offsets_are_added_to_the_noise_and_densities_to_probabilities(manifest,
 
 def test_no_more_objects_stand_than_there_is_room_for(manifest, write):
     entry = write(densities={"shrub": 3, "tuft": 3})
-    made, _ = apply_rule(manifest, [{"kind": "noise"}, entry])
+    made = apply_rule(manifest, [{"kind": "noise"}, entry])
     assert [each.probability for each in made.objects] == pytest.approx([0.5, 0.3, 0.5]), "1 for a material's objects"
     dense = replace(manifest, scatter=replace(manifest.scatter, cells=64))
-    made, _ = apply_rule(dense, [{"kind": "noise"}, entry])
+    made = apply_rule(dense, [{"kind": "noise"}, entry])
     assert 64**2 * sum(each.probability for each in made.objects) == pytest.approx(512), "what the page draws on a tile"
 
 
 def test_with_one_material_densities_count_alone(manifest, write):
     objects = [replace(each, material=0) for each in manifest.objects]
     alone = replace(manifest, materials=manifest.materials[:1], classes=None, objects=objects)
-    made, _ = apply_rule(alone, [{"kind": "noise"}, write(materials=["sand"], runs=[], densities={"stone": 0})])
+    made = apply_rule(alone, [{"kind": "noise"}, write(materials=["sand"], runs=[], densities={"stone": 0})])
     assert made.classes is None and made.objects[1].probability == 0
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fixtures.land_covers import SIDE, gaussians, two_classes
 
-from dav_gswt.bundle.land_cover import ClassesEntry, ImageTerm, find_run_fault
+from dav_gswt.bundle.land_cover import ClassesEntry, find_run_fault
 from dav_gswt.files import parse_record
 from dav_gswt.terrain.classes import LATTICE, Classes, Painted
 from dav_gswt.terrain.heights import FlatSurface, Hills
@@ -21,12 +21,7 @@ def classes_of(terrain) -> Classes:
     heights = FlatSurface()
     if surface["kind"] == "hills":
         heights = Hills(*(surface[key] for key in ("height", "wavelength", "octaves", "salt")))
-    pictures = {
-        term.file: np.array(terrain["pixels"], np.uint8).reshape(term.rows, term.columns)
-        for term in entry.rule
-        if isinstance(term, ImageTerm)
-    }
-    return Classes(entry, terrain["materials"], terrain["side"], heights, pictures)
+    return Classes(entry, terrain["materials"], terrain["side"], heights)
 
 
 @pytest.fixture

@@ -37,7 +37,7 @@ def noise_exemplar(seed, kind="semantic", side=12):
     rng = np.random.default_rng(seed)
     colour = rng.random((side, side, 3))
     segments = np.kron(np.arange((side // 3) ** 2).reshape(side // 3, -1), np.ones((3, 3), int))
-    layers = energy.make_colour_layer(colour), semantics.describe_segments(segments, colour, None, {})
+    layers = energy.make_colour_layer(colour), semantics.describe_segments(segments, colour, None)
     return energy.SeamEnergy(kind, 2.0, *layers)
 
 

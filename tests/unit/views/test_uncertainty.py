@@ -68,14 +68,6 @@ def test_latents_that_are_not_finite_are_an_error_that_names_the_poses(bad):
 def test_what_cannot_be_measured_is_refused():
     with pytest.raises(ValueError, match="at least 2 samples of a pose, not 1"):
         un.w2_sq(normal(3, 1, 2, 4, 4))
-    variances = normal(3, 2, 2, 4, 4) ** 2
-    variances[1, 1, 0, 0, 0] = -1e-3
-    with pytest.raises(ValueError, match="variance below 0 of pose b$"):
-        un.w2_sq(normal(3, 2, 2, 4, 4), variances, names=["a", "b", "c"])
-    pictures = grey(np.zeros((4, 4)))
-    pictures[0, 1, 2, 2, 0] = np.nan
-    with pytest.raises(ValueError, match="not finite: the decoded pictures of pose north"):
-        un.image_gradient(pictures, names=["north"])
     with pytest.raises(ValueError, match="2 x 2 pixels, not 2 of 5 x 1"):
         un.image_gradient(grey(np.zeros((1, 5))))
 
@@ -146,14 +138,6 @@ def test_sums_refuse_what_has_no_meaning():
             un.combine_terms(w2, lpips, lam, scales)
     with pytest.raises(ValueError, match="lpips has no frozen scale"):
         un.combine_terms(w2, lpips, 0.1, un.Scales({"w2_sq": 1.0}))
-    lpips[[3, 5]] = np.nan
-    names = [f"a{i}" for i in range(40)]
-    for call in (
-        lambda: un.combine_terms(w2, lpips, 0.1, scales, names),
-        lambda: un.Scales.from_terms({"w2_sq": w2, "lpips": lpips}, names),
-    ):
-        with pytest.raises(ValueError, match="not finite: lpips of pose a3, a5"):
-            call()
     with pytest.raises(ValueError, match="scale of lpips"):
         un.Scales({"w2_sq": 1.0, "lpips": math.nan})
 
@@ -163,8 +147,6 @@ def test_normalised_goes_from_0_at_the_low_quantile_to_1_at_the_high_one():
     np.testing.assert_array_equal(un.normalise(np.array([-9.0, 2, 3, 4, 1e30]), quantiles), [0, 0, 0.5, 1, 1])
     maps = np.array([[[2.0, 3.0]], [[4.0, 5.0]]], np.float32)
     np.testing.assert_array_equal(un.normalise(maps, quantiles), [[[0, 0.5]], [[1, 1]]])
-    with pytest.raises(ValueError, match="of pose 1"):
-        un.normalise(np.array([2.0, np.nan]), quantiles)
     equal = un.Quantiles.from_values(np.full(10, 3.0))
     np.testing.assert_array_equal(un.normalise(np.array([2.0, 3.0, 3.1]), equal), [0, 0, 1])
     assert un.Quantiles.from_values(np.arange(101.0)) == un.Quantiles(5.0, 95.0)

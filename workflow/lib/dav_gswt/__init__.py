@@ -1,3 +1,19 @@
-"""DAV-GSWT: Gaussian-splat Wang tiles from a few photos. One subpackage a stage, shared vocabulary beside them."""
+"""DAV-GSWT: Gaussian-splat Wang tiles from a few photos.
+
+The functions of `dav_gswt.api` are offered here: `dav_gswt.read_field(path)`. One subpackage a stage has the rest.
+"""
+
+from typing import Any
 
 __version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    """Load a function of `dav_gswt.api` when it is first used: loading takes time, and jobs use none."""
+    if name.startswith("_") or name == "api":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from dav_gswt import api
+
+    if name not in api.__all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(api, name)

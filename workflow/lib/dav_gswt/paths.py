@@ -15,7 +15,6 @@ RESULTS = "results"
 # Directories beside the scenes' own; no scene may have such a name.
 RESERVED = ("logs", "benchmarks", "snapshots", "weights", "sweeps", "tables", "gallery")
 SNAPSHOTS = f"{RESULTS}/snapshots"  # of running fits: outside the outputs, so that a killed fit can go on
-MOBILESAM = f"{RESULTS}/weights/mobilesam"  # a folder
 
 # One directory level a stage, which names only the settings that the stage adds. <name> stands for another entry.
 TREE = {
@@ -26,7 +25,7 @@ TREE = {
     "fit": "{scene}/seed{seed}/{preset}",
     "coarse": "<fit>/coarse",
     "scored": "<coarse>/scores_{prior}_pdrop{p_drop}",
-    "active": "<fit>/active_{policy}_{prior}_pdrop{p_drop}_lam{lam}_k{k}{stop}",
+    "active": "<fit>/active_{policy}_{prior}_pdrop{p_drop}_lam{lam}_k{k}",
     "external": "<fit>/active_external_none_pdrop0_lam0_k0/iter0",
     "round": "<active>/iter{t}",
     "materials": "<round>{inpainted}/materials",
@@ -43,7 +42,6 @@ POSITIVE = r"[1-9]\d*"
 FRACTION = r"0|1|0\.\d*[1-9]"
 SHARE = r"0|0\.\d*[1-9]"
 NUMBER = r"0|[1-9]\d*|(?:0|[1-9]\d*)\.\d*[1-9]"
-STOP = rf"(?:_upto(?:{POSITIVE}))?(?:_gain(?!0/)(?:{NUMBER}))?"  # or nothing
 INPAINTED = r"(?:/inpainted_[a-z][a-z0-9_-]*)?"  # or nothing
 WILDCARDS = {
     "scene": NAME,
@@ -54,36 +52,18 @@ WILDCARDS = {
     "p_drop": SHARE,
     "lam": NUMBER,
     "k": NATURAL,
-    "stop": STOP,
     "t": NATURAL,
     "inpainted": INPAINTED,
     "tiling": NAME,
     "tau": FRACTION,
 }
-_STOPS = {"photos": "_upto", "marginal_gain": "_gain"}  # keys of the config's `stop`, and their marks in a path
-_EXTERNAL = dict(policy="external", prior="none", p_drop="0", lam="0", k=0, stop="", t=0, inpainted="")
+_EXTERNAL = dict(policy="external", prior="none", p_drop="0", lam="0", k=0, t=0, inpainted="")
 
 
 def encode_number(value: int | float | str) -> str:
     """A number as it stands in paths: 0.1, never 0.10."""
     text = f"{Decimal(str(value)).normalize():f}"
     return "0" if text == "-0" else text
-
-
-def encode_stop(stop: Mapping) -> str:
-    """When rounds end, as the end of a branch's name; empty where they do not: _upto20_gain0.05."""
-    return "".join(f"{mark}{encode_number(stop[key])}" for key, mark in _STOPS.items() if stop.get(key) is not None)
-
-
-def decode_stop(text: str) -> dict[str, int | float]:
-    """The config's `stop` from the end of a branch's name. Raises: ValueError: it is not one."""
-    pattern = "".join(rf"(?:{mark}(?P<{key}>[\d.]+))?" for key, mark in _STOPS.items())
-    match = re.fullmatch(pattern, text)
-    values = {key: value for key, value in match.groupdict().items() if value} if match else {}
-    stop = {key: int(value) if key == "photos" else float(value) for key, value in values.items()}
-    if not match or encode_stop(stop) != text:
-        raise ValueError(f"{text!r} does not say when rounds end; an example is '_upto20_gain0.05'")
-    return stop
 
 
 def encode_branch(config: Mapping, scene: str, policy: str | None = None, changes: Mapping | None = None) -> dict:
@@ -104,7 +84,7 @@ def encode_branch(config: Mapping, scene: str, policy: str | None = None, change
     policy = resolve_policy(policy or settings["policy"], entry.get("agent"))
     unread = ZERO_SETTINGS.get(policy, ()) if policy in PRIOR_POLICIES else ("p_drop", "lam")
     numbers = {key: "0" if key in unread else encode_number(settings[key]) for key in ("p_drop", "lam")}
-    rounds = {"k": settings["k"], "stop": encode_stop(config["stop"]), "t": settings["rounds"]}
+    rounds = {"k": settings["k"], "t": settings["rounds"]}
     rounds["inpainted"] = f"/inpainted_{config['prior']}" if config["inpaint"] else ""  # a level below the round
     prior = settings["prior"] if policy in PRIOR_POLICIES else "none"
     return fit | {"policy": policy, "prior": prior} | numbers | rounds | tiles

@@ -97,21 +97,6 @@ export async function readHeightMap({ heights }, source) {
 }
 
 /**
- * The pixels of the classes' pictures, by file. Throws a PageError.
- *
- * @param {Manifest} manifest @param {Source} source
- * @returns {Promise<import("../terrain/classes.js").Pictures>}
- */
-export async function readPictures({ classes }, source) {
-  const pictures = new Map();
-  for (const term of classes?.rule ?? []) {
-    if (term.kind !== "image" || pictures.has(term.file)) continue;
-    pictures.set(term.file, new Uint8Array(await readChecked(source, term)));
-  }
-  return pictures;
-}
-
-/**
  * The chunks to read first, the coarsest level first: all, or the coarsest level alone if the set does not fit into the
  * cache. The worker then asks for what a view needs.
  *

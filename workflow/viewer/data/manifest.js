@@ -33,8 +33,7 @@ import {
 export const NAME = "davgswt.json";
 export const MAX_TILES = 256; // of a material
 export const MAX_CANDIDATES = 512; // objects on a tile at most
-const FORMAT = "davgswt", MAX_SIDE = 4096; // pixels along a side of a height map or of a picture of materials
-const MAX_PIXELS = 2 ** 26; // of all pictures of materials together
+const FORMAT = "davgswt", MAX_SIDE = 4096; // pixels along a side of a height map
 const MAX_FACE = 1 << 24; // cells along the side of a planet's face
 const WIDEST = 8; // of deviations, in tile sides
 const MAX_TERMS = 64, MAX_OBJECTS = 256, MAX_CELLS = 64; // of a rule; of a terrain; of the scatter along a tile's side
@@ -44,7 +43,7 @@ const DEEPEST = 6; // levels of lists and objects within a manifest
 const KEYS = new Set(`format version unit tile_side salt eye_floor ground_colour sky zenith horizon
   sun direction colour encoding origin step log_scale sh_degree directions levels level mean_scale
   distance band tiles tile uncertainty z chunks file bytes count orders sha256 heights kind height
-  wavelength octaves radius cells rows columns width beyond materials name share first_tile classes
+  wavelength octaves radius cells rows columns width materials name share first_tile classes
   rule weight wavelengths biases material low high soft jitter amplitude rise slope most ground
   clearance painted objects density probability scatter turn size`.split(/\s+/));
 
@@ -177,12 +176,9 @@ function isSurface(h, side) {
   if (h?.kind === "hills") {
     return isCoordinate(h.height) && isLength(h.wavelength) && isSalt(h.salt) && isWhole(h.octaves, 1, MAX_OCTAVES);
   }
-  return h?.kind === "image" && isPicture(h, 4);
+  return h?.kind === "image" && isInside(h.file) && [h.rows, h.columns].every((n) => isWhole(n, 1, MAX_SIDE))
+    && isLength(h.width) && h.bytes === 4 * h.rows * h.columns && isDigest(h.sha256);
 }
-
-/** @param {any} one @param {number} size bytes of a pixel */
-const isPicture = (one, size) => isInside(one.file) && [one.rows, one.columns].every((n) => isWhole(n, 1, MAX_SIDE))
-  && isLength(one.width) && one.bytes === size * one.rows * one.columns && isDigest(one.sha256);
 
 /** @param {any} one @param {number} firstTile */
 const isMaterial = (one, firstTile) => isName(one?.name) && isShare(one.share) && one.first_tile === firstTile
@@ -194,11 +190,7 @@ function areClasses(classes, count) {
   if (painted !== undefined && findRunFault(painted, count)) return false;
   if (!isSalt(salt) || !isFilled(rule) || rule.length > MAX_TERMS) return false;
   if (!rule.every((/** @type {any} */ term) => isSize(term?.weight) && isTerm(term, count))) return false;
-  const pictures = rule.filter((/** @type {any} */ term) => term.kind === "image");
-  const pixels = pictures.reduce((/** @type {number} */ sum, /** @type {any} */ { bytes }) => sum + bytes, 0);
-  const files = new Set(pictures.map((/** @type {any} */ { file }) => file));
-  return pixels <= MAX_PIXELS && files.size === pictures.length
-    && isWhole(jitter?.cells, 1, MAX_WAVES) && isWhole(jitter.octaves, 1, MAX_JITTER)
+  return isWhole(jitter?.cells, 1, MAX_WAVES) && isWhole(jitter.octaves, 1, MAX_JITTER)
     && isSize(jitter.amplitude) && isSize(rise?.slope) && isSize(rise.most)
     && isList(rise.ground, count, isCoordinate) && isList(rise.clearance, count, isSize);
 }
@@ -209,7 +201,6 @@ function isTerm(term, count) {
     return isList(term.wavelengths, count, isLength) && isList(term.biases, count, isCoordinate)
       && isList(term.octaves, count, (octaves) => isWhole(octaves, 1, MAX_JITTER));
   }
-  if (term.kind === "image") return isPicture(term, 1) && (term.beyond === "mirror" || term.beyond === "clamp");
   /** @param {any} bound */
   const isBound = (bound) => bound === null || isCoordinate(bound);
   return (term.kind === "height" || term.kind === "slope") && isWhole(term.material, 0, count - 1)

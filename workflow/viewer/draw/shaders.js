@@ -78,9 +78,7 @@ uniform highp sampler2D relief;
 uniform ivec2 cellUnder[1];
 uniform vec2 placeUnder[1];
 uniform float scale[1];
-uniform bool mirrored;
 int inside(int k, int n) {
-  if (!mirrored) return clamp(k, 0, n - 1);
   k = ((k % (2 * n)) + 2 * n) % (2 * n);
   return k < n ? k : 2 * n - 1 - k;
 }

@@ -198,7 +198,6 @@ function setConstants(gl, uniforms, manifest, heights) {
     gl.uniform1fv(uniforms["scale[0]"], padded(heights.scales, MAX_OCTAVES));
   } else if (heights.kind === "image") {
     gl.uniform1i(uniforms.relief, RELIEF);
-    gl.uniform1i(uniforms.mirrored, Number(heights.mirrored));
     gl.uniform1fv(uniforms["scale[0]"], [heights.perUnit]);
   }
 }

@@ -1,7 +1,7 @@
 // An open terrain: its manifest and surface, the worker that chooses what is drawn, and the reading of its chunks. The
 // page and the importable terrain (terrain_api.js) have this in common.
 
-import { initialChunks, readChunks, readHeightMap, readManifest, readPictures } from "../data/bundle.js";
+import { initialChunks, readChunks, readHeightMap, readManifest } from "../data/bundle.js";
 import { chunkKey, listChunks } from "../data/layout.js";
 import { REACH } from "../terrain/cells.js";
 import { createHeights } from "../terrain/heights.js";
@@ -21,7 +21,7 @@ const MIN_LOW = 1e-4; // sine of the angle below the horizon at which tiles end,
  *
  * What is read before anything is drawn.
  * @typedef {{ source: import("../data/source.js").Source, manifest: import("../data/manifest.js").Manifest,
- *   pixels: Float32Array | null, pictures: import("../terrain/classes.js").Pictures }} TerrainFiles
+ *   pixels: Float32Array | null }} TerrainFiles
  *
  * @typedef {{ onRecords: (records: import("../worker/worker.js").Records) => void,
  *   onFrame: (frame: FrameAnswer) => void, onError: (error: Error) => void }} Handlers
@@ -31,18 +31,18 @@ const MIN_LOW = 1e-4; // sine of the angle below the horizon at which tiles end,
  */
 
 /**
- * Read manifest, height map and pictures. Throws a PageError.
+ * Read manifest and height map. Throws a PageError.
  *
  * @param {import("../data/source.js").Source} source
  * @returns {Promise<TerrainFiles>}
  */
 export async function readTerrain(source) {
   const manifest = await readManifest(source), pixels = await readHeightMap(manifest, source);
-  return { source, manifest, pixels, pictures: await readPictures(manifest, source) };
+  return { source, manifest, pixels };
 }
 
 /** Start the worker of a terrain. @param {TerrainFiles} files @param {Handlers} handlers */
-export function openTerrain({ source, manifest, pixels, pictures }, { onRecords, onFrame, onError }) {
+export function openTerrain({ source, manifest, pixels }, { onRecords, onFrame, onError }) {
   let begun = false; // the first chunks were read
   /** @type {FrameAnswer | null} */
   let last = null;
@@ -51,7 +51,7 @@ export function openTerrain({ source, manifest, pixels, pictures }, { onRecords,
   /** @type {Set<number>} */
   const pending = new Set(); // keys of chunks that are being read, or on their way to the worker
   const stop = new AbortController();
-  const client = createWorkerClient({ manifest, pixels, pictures }, {
+  const client = createWorkerClient({ manifest, pixels }, {
     onRecords(records) {
       pending.delete(chunkKey(records.tile, records.level));
       onRecords(records);

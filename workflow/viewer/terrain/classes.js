@@ -5,7 +5,7 @@ import { createCellRing } from "./caches.js";
 import {
   decideSquares, findMaterials, GOES, LATTICE, LOW, measureShares, POINTS, squareOf, SURE, UNDECIDED,
 } from "./class_squares.js";
-import { createNoise, SHIFT, wrapIndex } from "./heights.js";
+import { createNoise, SHIFT } from "./heights.js";
 import { createJitter, MAX_OCTAVES, octaveGains } from "./jitter.js";
 import { applyPaint, createPainted } from "./painted.js";
 
@@ -15,14 +15,10 @@ import { applyPaint, createPainted } from "./painted.js";
  * @typedef {{ kind: "noise", weight: number, wavelengths: number[], octaves: number[], biases: number[] }} NoiseTerm
  * @typedef {{ kind: "height" | "slope", weight: number, material: number, low: number | null, high: number | null,
  *   soft: number }} RangeTerm
- * @typedef {{ kind: "image", weight: number, file: string, bytes: number, sha256?: string, rows: number,
- *   columns: number, width: number, beyond: string }} PictureTerm
- * @typedef {NoiseTerm | RangeTerm | PictureTerm} Term
+ * @typedef {NoiseTerm | RangeTerm} Term
  * @typedef {{ salt: number, rule: Term[], jitter: { cells: number, octaves: number, amplitude: number },
  *   rise: { slope: number, most: number, ground: number[], clearance: number[] }, painted?: number[][] }} ClassesEntry
  *
- * Pixels of the rule's pictures by file, the northern row first.
- * @typedef {Map<string, Uint8Array>} Pictures
  * @typedef {import("./heights.js").HeightField} HeightField
  *
  * @typedef {import("./class_squares.js").Lattice} Lattice
@@ -41,14 +37,14 @@ const PAINT = 1.25; // lead of what is painted over all others, as a multiple of
  *
  * @param {ClassesEntry} entry @param {number} materials
  * @param {number} side of a tile
- * @param {HeightField} heights @param {Pictures} [pictures]
+ * @param {HeightField} heights
  */
-export function createClasses(entry, materials, side, heights, pictures = new Map()) {
+export function createClasses(entry, materials, side, heights) {
   const { jitter, rise } = entry, wave = 2 * jitter.amplitude, here = new Float64Array(materials);
   const painted = createPainted(LATTICE), weights = new Float64Array(materials), lead = paintLead(entry);
   for (const [i, j, length, m] of entry.painted ?? []) for (let k = 0; k < length; k++) painted.set(i + k, j, m);
   const rule = entry.rule.map((term) => (term.kind === "noise" ? { ...term, biases: [...term.biases] } : term));
-  const addTerms = rule.map((term) => createTerm(term, { materials, side, heights, pictures, salt: entry.salt }));
+  const addTerms = rule.map((term) => createTerm(term, { materials, side, heights, salt: entry.salt }));
   const jitterAt = createJitter(entry, materials), waves = new Float64Array(materials);
   const spare = new Float64Array(POINTS * POINTS * materials); // corners of one square
   /** @type {WeakMap<Float32Array, { material: number, squares: Uint8Array }>} */
@@ -224,24 +220,15 @@ function isHighest(scores, moved, material, bonus) {
  * A function that adds a term's scores of all materials at a lattice point.
  *
  * @param {Term} term
- * @param {{ materials: number, side: number, heights: HeightField, pictures: Pictures, salt: number }} terrain
+ * @param {{ materials: number, side: number, heights: HeightField, salt: number }} terrain
  * @returns {(i: number, j: number, out: Float64Array, at: number) => void}
  */
-function createTerm(term, { materials, side, heights, pictures, salt }) {
+function createTerm(term, { materials, side, heights, salt }) {
   const { weight } = term, step = side / LATTICE;
   if (term.kind === "noise") {
     const noises = term.wavelengths.map((wavelength, m) => createClassNoise(wavelength, term.octaves[m], m, salt));
     return (i, j, out, at) => {
       for (let m = 0; m < materials; m++) out[at + m] += weight * (noises[m](i, j) + term.biases[m]);
-    };
-  }
-  if (term.kind === "image") {
-    const pixels = pictures.get(term.file);
-    if (!pixels) throw new TypeError("a picture of materials needs its pixels");
-    const shares = new Float64Array(256); // by the value of a pixel: 255 is no material
-    return (i, j, out, at) => {
-      pictureShares(term, pixels, i * step, j * step, shares);
-      for (let m = 0; m < materials; m++) out[at + m] += weight * shares[m];
     };
   }
   const low = term.low ?? -Infinity, high = term.high ?? Infinity;
@@ -272,21 +259,4 @@ function createClassNoise(wavelength, octaves, material, salt) {
     }
     return noise / total;
   };
-}
-
-/**
- * Share of each value among the four pixels around a place, by the distances to their centres.
- *
- * @param {PictureTerm} term @param {Uint8Array} pixels @param {number} x @param {number} y
- * @param {Float64Array} shares
- */
-function pictureShares({ rows, columns, width, beyond }, pixels, x, y, shares) {
-  const perUnit = columns / width, p = x * perUnit + 0.5 * columns - 0.5, q = 0.5 * rows - y * perUnit - 0.5;
-  const column = Math.floor(p), row = Math.floor(q), s = p - column, t = q - row, mirrored = beyond === "mirror";
-  shares.fill(0);
-  for (let k = 0; k < 4; k++) {
-    const a = k & 1, b = k >> 1;
-    const at = wrapIndex(row + b, rows, mirrored) * columns + wrapIndex(column + a, columns, mirrored);
-    shares[pixels[at]] += (a ? s : 1 - s) * (b ? t : 1 - t);
-  }
 }

@@ -16,7 +16,7 @@ export const MAX_OCTAVES = 12;
  * @typedef {{ kind: "flat" }} FlatEntry
  * @typedef {{ kind: "hills", height: number, wavelength: number, octaves: number, salt: number }} HillsEntry
  * @typedef {{ kind: "image", file: string, bytes: number, sha256?: string, rows: number, columns: number,
- *   width: number, beyond?: string }} ImageEntry
+ *   width: number }} ImageEntry
  * @typedef {FlatEntry | HillsEntry | ImageEntry | import("./sphere.js").SphereEntry} HeightsEntry
  *
  * What all height fields have: `at` gives [height, slope by x, slope by y]; `low`, `high` and `steepest` are bounds.
@@ -27,8 +27,8 @@ export const MAX_OCTAVES = 12;
  * @typedef {(x: number, y: number) => { cells: Int32Array, places: Float32Array }} Under
  * @typedef {Bounds & { kind: "flat" }} FlatSurface
  * @typedef {Bounds & { kind: "hills", amplitudes: number[], scales: number[], salt: number, under: Under }} Hills
- * @typedef {Bounds & { kind: "image", rows: number, columns: number, perUnit: number, mirrored: boolean,
- *   pixels: Float32Array, under: Under }} HeightMap
+ * @typedef {Bounds & { kind: "image", rows: number, columns: number, perUnit: number, pixels: Float32Array,
+ *   under: Under }} HeightMap
  * @typedef {FlatSurface | Hills | HeightMap | import("./sphere.js").Sphere} HeightField
  */
 
@@ -144,26 +144,24 @@ export const fade = (t) => t * t * t * (t * (6 * t - 15) + 10);
 const fadeSlope = (t) => 30 * t * t * (t * (t - 2) + 1);
 
 /** @param {ImageEntry} entry @param {Float32Array} pixels @returns {HeightMap} */
-function createHeightMap({ rows, columns, width, beyond }, pixels) {
-  const perUnit = columns / width, mirrored = beyond !== "clamp";
-  /** @param {number} index @param {number} n */
-  const inside = (index, n) => wrapIndex(index, n, mirrored);
-  // the pixel under the eye as a small integer: beyond the map it repeats, or stays at the border
+function createHeightMap({ rows, columns, width }, pixels) {
+  const perUnit = columns / width;
+  // the pixel under the eye as a small integer: beyond the map it repeats
   /** @param {number} u @param {number} n */
   const pixelUnder = (u, n) => {
     const pixel = Math.floor(u);
-    return [mirrored ? pixel % (2 * n) : Math.min(Math.max(pixel, -(2 ** 24)), 2 ** 24), u - pixel];
+    return [pixel % (2 * n), u - pixel];
   };
   return {
-    kind: "image", rows, columns, perUnit, mirrored, pixels, ...boundsOf(pixels, rows, columns, perUnit),
+    kind: "image", rows, columns, perUnit, pixels, ...boundsOf(pixels, rows, columns, perUnit),
     at(x, y) {
       const [i, across, turnX] = splineWeights(x * perUnit + 0.5 * columns);
       const [j, along, turnY] = splineWeights(0.5 * rows - y * perUnit);
       let h = 0, byX = 0, byY = 0;
       for (let b = 0; b < 3; b++) {
-        const row = inside(j + b - 1, rows) * columns;
+        const row = mirrorIndex(j + b - 1, rows) * columns;
         for (let a = 0; a < 3; a++) {
-          const value = pixels[row + inside(i + a - 1, columns)];
+          const value = pixels[row + mirrorIndex(i + a - 1, columns)];
           h += value * across[a] * along[b];
           byX += value * turnX[a] * along[b];
           byY -= value * across[a] * turnY[b]; // rows go south
@@ -179,13 +177,8 @@ function createHeightMap({ rows, columns, width, beyond }, pixels) {
   };
 }
 
-/**
- * Index of a picture's n pixels for any index: mirrored, or the border's.
- *
- * @param {number} index @param {number} n @param {boolean} mirrored
- */
-export function wrapIndex(index, n, mirrored) {
-  if (!mirrored) return Math.min(Math.max(index, 0), n - 1);
+/** Index of an image's n pixels for any index. @param {number} index @param {number} n */
+function mirrorIndex(index, n) {
   const k = ((index % (2 * n)) + 2 * n) % (2 * n);
   return k < n ? k : 2 * n - 1 - k;
 }

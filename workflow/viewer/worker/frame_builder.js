@@ -41,10 +41,9 @@ const BORDER_LIMIT = 0.2; // milliseconds of making those of single cells, which
 /**
  * @param {import("../data/manifest.js").Manifest} manifest
  * @param {import("../terrain/heights.js").HeightField} heights
- * @param {import("../terrain/classes.js").Pictures} [pictures]
  */
-export function createFrameBuilder(manifest, heights, pictures) {
-  const terrain = createTerrainTables(manifest, heights, pictures);
+export function createFrameBuilder(manifest, heights) {
+  const terrain = createTerrainTables(manifest, heights);
   const store = createChunkStore(terrain, manifest, recordRows(manifest), (tile) => batches.forget(tile));
   const borders = createBorders(terrain, store);
   const batches = createSortedBatches(store, terrain, borders, orderPages(manifest));

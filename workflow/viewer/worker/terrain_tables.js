@@ -43,10 +43,9 @@ import { createFraying } from "../terrain/sphere_edges.js";
 /**
  * @param {import("../data/manifest.js").Manifest} manifest
  * @param {import("../terrain/heights.js").HeightField} heights
- * @param {import("../terrain/classes.js").Pictures} [pictures]
  * @returns {TerrainTables}
  */
-export function createTerrainTables(manifest, heights, pictures) {
+export function createTerrainTables(manifest, heights) {
   const { tile_side: side, salt, levels, directions, encoding, materials, objects = [], scatter } = manifest;
   const range = uncertaintyRange(manifest.tiles);
   const owners = [...manifest.tiles, ...objects.map(({ chunks }) => ({ chunks, uncertainty: range[0] }))];
@@ -61,7 +60,7 @@ export function createTerrainTables(manifest, heights, pictures) {
   const each = manifest.tiles.length / materials.length, largest = deviationOf(encoding, 255);
   const beyond = (RIM - 3) * largest; // the manifest's heights reach three deviations beyond the centres
   const classes = manifest.classes
-    ? createClasses(manifest.classes, materials.length, side, heights, pictures) : null;
+    ? createClasses(manifest.classes, materials.length, side, heights) : null;
   const sphere = heights.kind === "sphere" ? heights : null;
   /** @type {TerrainTables} */
   const tables = {

@@ -7,8 +7,7 @@ import { createFrameBuilder } from "./frame_builder.js";
  * @typedef {import("../data/bundle.js").Chunk} Chunk
  *
  * What the page posts.
- * @typedef {{ kind: "begin", manifest: import("../data/manifest.js").Manifest, pixels: Float32Array | null,
- *   pictures: import("../terrain/classes.js").Pictures }} Begin
+ * @typedef {{ kind: "begin", manifest: import("../data/manifest.js").Manifest, pixels: Float32Array | null }} Begin
  * @typedef {{ kind: "view", id: number, camera: import("../terrain/camera.js").Camera, budget: number,
  *   patient: boolean }} View
  * @typedef {{ offsets: number[] | null, probabilities: number[] | null }} Changes see `adjustCover`
@@ -68,8 +67,8 @@ function workAhead() {
 /** @param {Request} request */
 function answer(request) {
   if (request.kind === "begin") {
-    const { manifest, pixels, pictures } = request;
-    builder = createFrameBuilder(manifest, createHeights(manifest.heights, pixels), pictures);
+    const { manifest, pixels } = request;
+    builder = createFrameBuilder(manifest, createHeights(manifest.heights, pixels));
   } else if (request.kind === "chunk") addChunk(request.chunk);
   else if (request.kind === "view") {
     answerView(request);

@@ -46,9 +46,9 @@ def test_a_seed_makes_the_same_examples_of_what_a_prior_takes_and_the_fit_resemb
 
 
 def test_a_camera_inside_a_thing_is_known_and_a_turned_one_stays_where_it_is():
-    field, camera = examples.make_world(0).field, camera_layouts.orbit(90, 0, 7.0, (0, 0, 0), 8, 8, 55)
+    field, camera = examples.make_world(0).field, camera_layouts.orbit(90, 0, 7.0, (0, 0, 0), 8, 8, 55.0)
     assert examples.is_clear(field, camera)
-    assert not examples.is_clear(field, camera_layouts.orbit(90, 0, 0.1, field.means[0], 8, 8, 55))
+    assert not examples.is_clear(field, camera_layouts.orbit(90, 0, 0.1, field.means[0], 8, 8, 55.0))
     turned = examples.aim_camera(camera, np.array([1.0, 2.0, 0.0]))
     np.testing.assert_allclose(turned.centre, camera.centre, atol=1e-9)
     np.testing.assert_allclose(turned.project(np.array([[1.0, 2.0, 0.0]]))[0], [[4, 4]], atol=1e-9)
@@ -68,11 +68,9 @@ def test_stored_examples_come_back_to_the_bytes_precision(stored, tmp_path, made
 @pytest.mark.parametrize(
     "name, value, message",
     [
-        ("photo", None, "photo is missing"),
-        ("rgba", lambda a: a[:-1], "rgba is"),
-        ("colour", lambda a: a.astype(np.float32), "colour is float32"),
+        ("photo", None, "photo"),
+        ("colour", lambda a: a[:-1], "colour has the shape"),
         ("relative", lambda a: np.full_like(a, np.nan), "relative holds numbers that are not finite"),
-        ("photo", lambda a: np.array([{}]), "photo is object"),
     ],
 )
 def test_wrong_arrays_are_refused_by_name_and_half_a_file_is_refused(stored, name, value, message):

@@ -6,7 +6,7 @@ import pytest
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.raster import render
-from dav_gswt_study.prior.training import worlds, worlds_ground, worlds_light
+from dav_gswt_study.prior.training import worlds, worlds_ground
 
 
 def same(a: GaussianField, b: GaussianField) -> bool:
@@ -19,46 +19,44 @@ def test_a_seed_makes_one_world_which_can_be_drawn_and_fills_a_photo_from_above(
     assert 40_000 < len(made.field) < 250_000
     assert all(np.isfinite(getattr(made.field, f.name)).all() for f in fields(GaussianField))
     assert made.field.base_colours.min() >= -1e-6 and made.field.base_colours.max() <= 1 + 1e-6
-    seen = render(made.field, camera_layouts.orbit(90, 0, worlds.FLYING_HEIGHT, (0, 0, 0), 64, 64, 55))
+    seen = render(made.field, camera_layouts.orbit(90, 0, worlds.FLYING_HEIGHT, (0, 0, 0), 64, 64, 55.0))
     assert seen.alpha.min() > 0.95
     assert 0.05 < seen.colour.mean() < 0.9
 
 
 def test_the_sky_is_the_horizons_colour_level_and_the_zeniths_straight_up():
     sky = worlds.Sky(np.array([0.1, 0.2, 0.3]), np.array([0.7, 0.8, 0.9]))
-    level = sky.render(camera_layouts.orbit(0, 0, 5, (0, 0, 0), 33, 33, 55))
-    up = sky.render(camera_layouts.orbit(-90, 0, 5, (0, 0, 0), 33, 33, 55))
+    level = sky.render(camera_layouts.orbit(0, 0, 5, (0, 0, 0), 33, 33, 55.0))
+    up = sky.render(camera_layouts.orbit(-90, 0, 5, (0, 0, 0), 33, 33, 55.0))
     np.testing.assert_allclose(level[16, 16], [0.7, 0.8, 0.9], atol=1e-4)
     np.testing.assert_allclose(up[16, 16], [0.1, 0.2, 0.3], atol=1e-4)
 
 
-def sun_at(elevation: float) -> worlds_light.Light:
+def sun_at(elevation: float) -> worlds.Light:
     up = np.radians(elevation)
-    return worlds_light.Light(np.array([np.cos(up), 0, np.sin(up)]), np.ones(3), 0.5 * np.ones(3), 0.01)
+    return worlds.Light(np.array([np.cos(up), 0, np.sin(up)]), np.ones(3), 0.5 * np.ones(3), 0.01)
 
 
 def flat_with_a_wall():
     """A flat ground with a wall 1 m high along x = 1, at the map's cells."""
-    x, _ = worlds_light.cell_centres()
-    return worlds_light.ShadowMap(
-        np.where(np.abs(x - 1) < 0.1, 1.0, 0.0).astype(np.float32), np.ones(x.shape, np.float32)
-    )
+    x, _ = worlds.cell_centres()
+    return worlds.ShadowMap(np.where(np.abs(x - 1) < 0.1, 1.0, 0.0).astype(np.float32), np.ones(x.shape, np.float32))
 
 
 def test_a_wall_casts_a_shadow_as_long_as_it_is_high_and_its_foot_sees_less_sky():
     x = np.array([-2.0, -0.5, 0.3, 0.7, 1.5])
     points = np.stack([x, np.zeros(5), np.zeros(5)], 1)
-    found = worlds_light.sun_visibility(sun_at(45), flat_with_a_wall(), points)
+    found = worlds.sun_visibility(sun_at(45), flat_with_a_wall(), points)
     np.testing.assert_allclose(found, [1, 1, 0, 0, 1], atol=0.05)
-    seen = worlds_light.sky_visibility(flat_with_a_wall(), np.array([[0.85, 0, 0], [-3.0, 0, 0], [1.0, 0, 1.0]]))
+    seen = worlds.sky_visibility(flat_with_a_wall(), np.array([[0.85, 0, 0], [-3.0, 0, 0], [1.0, 0, 1.0]]))
     assert seen[0] < 0.7
     np.testing.assert_allclose(seen[1:], 1, atol=1e-3)
 
 
 def test_a_lit_level_surface_reflects_sun_and_sky():
     one = np.array([[-3.0, 0, 0]])
-    surface = worlds_light.Surface(one, np.array([[0, 0, 1.0]]), np.full((1, 3), 0.4), np.ones(1))
-    found = worlds_light.reflect(sun_at(30), flat_with_a_wall(), surface, np.zeros(3))
+    surface = worlds.Surface(one, np.array([[0, 0, 1.0]]), np.full((1, 3), 0.4), np.ones(1))
+    found = worlds.reflect(sun_at(30), flat_with_a_wall(), surface, np.zeros(3))
     np.testing.assert_allclose(found, 0.4 * (0.5 + 0.5), rtol=1e-3)  # sin 30 of the sun, all of the sky
 
 

@@ -102,11 +102,3 @@ def test_a_field_without_a_surface_is_refused_by_file_name(rng, tmp_path):
     with pytest.raises(InputError, match="haze.ply.*opaque"):
         import_field(tmp_path / "haze.ply", tmp_path / "out.ply", tmp_path / "ground.json")
     assert not (tmp_path / "out.ply").exists() and not (tmp_path / "ground.json").exists()
-
-
-def test_the_same_file_gives_the_same_bytes(rng, tmp_path):
-    write_field(ground_field(rng, n=1000), tmp_path / "in.ply")
-    for name in ("a", "b"):
-        import_field(tmp_path / "in.ply", tmp_path / f"{name}.ply", tmp_path / f"{name}.json", (0, 0, 1))
-    assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
-    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()

@@ -1,10 +1,8 @@
 """Features of photos, the pairs that are matched, and the places of further photos of a known scene."""
 
 import logging
-from contextlib import closing
 
 import numpy as np
-import pycolmap
 import pytest
 from fixtures import photos as synth
 
@@ -15,47 +13,13 @@ from dav_gswt.photos.sfm import features, localization
 from dav_gswt.photos.sfm.features import (
     compare_descriptions,
     describe_photos,
-    enter_camera,
-    enter_image,
-    extract_features,
-    match_photos,
     select_pairs,
 )
 from dav_gswt.photos.sfm.localization import localize_photos
 
 
-@pytest.fixture
-def photos(tmp_path):
-    """Four photos and a database that knows them."""
-    synth.shoot(tmp_path, synth.flight(2, 2, step=0.2), synth.texture(np.random.default_rng(4)), 1.0)
-    with closing(pycolmap.Database.open(tmp_path / "database.db")) as store:
-        params = [synth.FOCAL, synth.WIDTH / 2, synth.HEIGHT / 2, 0.0]
-        lens = pycolmap.Camera(model="SIMPLE_RADIAL", width=synth.WIDTH, height=synth.HEIGHT, params=params)
-        numbers = enter_camera(store, lens)
-        for i in range(4):
-            enter_image(store, f"{i:03d}.png", *numbers)
-    return tmp_path
-
-
-def find_and_match(photos, name):
-    """The database of features and matches, as rows by image and by pair."""
-    (photos / name).mkdir()
-    database = photos / name / "database.db"
-    database.write_bytes((photos / "database.db").read_bytes())
-    extract_features(photos, database, 320, 300, 1)
-    match_photos(4, database, 9, 1, 0)
-    with closing(pycolmap.Database.open(database)) as store:
-        found = [store.read_keypoints(i) for i in range(1, 5)]
-        return found + [store.read_two_view_geometry(i, j).inlier_matches for i in range(1, 5) for j in range(i + 1, 5)]
-
-
-def test_batches_change_nothing(photos, monkeypatch):
-    whole = find_and_match(photos, "whole")
-    assert all(300 < len(points) < 600 for points in whole[:4]) and all(len(pairs) > 30 for pairs in whole[4:])
-    monkeypatch.setattr(features, "PHOTOS", 3)
-    monkeypatch.setattr(features, "PAIRS", 4)
-    few = find_and_match(photos, "few")
-    assert all(np.array_equal(one, two) for one, two in zip(whole, few, strict=True))
+def test_batches_hold_every_item_once():
+    assert list(features.split_batches(list(range(7)), 3, "count")) == [[0, 1, 2], [3, 4, 5], [6]]
 
 
 def walk(photos, rng, overlap=0.7, each=100):

@@ -8,7 +8,7 @@ import pytest
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import FocalLength, SfmSign, SfmVerdict
 from dav_gswt.photos.sfm import mapping
-from dav_gswt.photos.sfm.mapping import Approach, SfmPhoto, SfmScene, SfmSolution, list_alternatives
+from dav_gswt.photos.sfm.mapping import Approach, SfmPhoto, SfmScene, SfmSolution
 
 
 def verdict(grade: str, *names: str) -> SfmVerdict:
@@ -44,7 +44,7 @@ def solutions(monkeypatch):
 
         monkeypatch.setattr(mapping, "_solve", solve)
         scene = SfmScene("folder", [], {1: 300.0}, None, Path("database.db"))
-        return mapping.find_solution(scene, "incremental", 0), asked
+        return mapping.find_solution(scene, 0), asked
 
     return give
 
@@ -79,7 +79,7 @@ def test_where_the_first_way_gives_no_model_others_are_tried(solutions, monkeypa
 
 
 def test_photos_left_out_alone_ask_for_no_other_way(solutions):
-    assert len(solutions(verdict("doubtful", "placed", "groups"))[1]) == 1
+    assert len(solutions(verdict("doubtful", "placed"))[1]) == 1
 
 
 def test_photos_none_of_which_match_are_mapped_once(solutions, monkeypatch):
@@ -95,8 +95,3 @@ def test_photos_without_a_place_are_named_with_what_they_share():
     assert unsure == 1
     assert two[0] == "2.jpg" and "shares 50 points" in two[1]
     assert three[0] == "3.jpg" and "matches no photo" in three[1] and "shares 1 points" in four[1]
-
-
-def test_other_ways_hold_the_focal_length_and_use_gps_where_there_is_some():
-    held, priors = Approach("incremental", hold_focal=True), Approach("incremental", hold_focal=True, use_gps=True)
-    assert list_alternatives(Approach("global"), True, True) == [Approach("global", hold_focal=True), priors, held]

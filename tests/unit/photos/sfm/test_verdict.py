@@ -11,7 +11,6 @@ from dav_gswt.photos.sfm.verdict import (
     THRESHOLDS,
     SfmEvidence,
     combine_grades,
-    find_groups,
     judge_model,
 )
 
@@ -53,22 +52,17 @@ def test_a_good_model_is_good_by_every_sign(model):
     assert verdict.grade == "good" and not verdict.objections
     assert set(grades(verdict)) == set(THRESHOLDS)
     bare = judge(model)
-    assert bare.grade == "good" and not {"GPS", "focal length", "climb"} & set(grades(bare))
+    assert bare.grade == "good" and not {"GPS", "focal length", "ground"} & set(grades(bare))
 
 
 def test_fog_of_a_wrong_focal_length_is_refused(fog):
-    """Also without EXIF the ground stands upright under a flight that looks down."""
+    """Also without EXIF: the ground stands upright under a flight that looks down."""
     verdict = judge(fog, error=1.39, focal_ratio=1 / 1.7)
     assert verdict.grade == "refused"
     assert grades(verdict)["roughness"] == grades(verdict)["focal length"] == "refused"
     assert grades(verdict)["reprojection error"] == "doubtful"
-    signs = {sign.name: sign for sign in verdict.signs}
-    assert signs["ground"].grade == "refused" and "look straight down" in signs["ground"].reason
-
-
-def test_a_level_flight_that_climbs_over_the_ground_of_the_model_is_seen(model, fog):
-    assert grades(judge(model, positions=positions(model, 3.0)))["climb"] == "good"
-    assert grades(judge(fog, positions=positions(fog, 3.0)))["climb"] == "refused"
+    bare = judge(fog)
+    assert grades(bare)["tilt"] == "refused" and bare.grade == "refused"
 
 
 def test_gps_alone_makes_a_model_doubtful(model):
@@ -76,7 +70,7 @@ def test_gps_alone_makes_a_model_doubtful(model):
     assert grades(verdict)["GPS"] == "refused" and verdict.grade == "doubtful"
     assert grades(judge(model, positions=positions(model, 4.0)))["GPS"] == "good"
     drift = judge(model, positions=positions(model, 1.0) + np.linspace(0, 80, 20)[:, None] * [0, 0, 1])
-    assert grades(drift)["GPS"] == grades(drift)["climb"] == "good"  # altitudes drift in flights that are right
+    assert grades(drift)["GPS"] == "good"  # altitudes drift in flights that are right
 
 
 def test_a_slope_is_level_ground_by_gps_and_a_wall_is_not(model):
@@ -93,13 +87,6 @@ def test_points_that_two_photos_see_are_no_good_sign(model):
     assert grades(judge(short))["track length"] == "refused"
 
 
-def test_two_groups_make_a_model_doubtful(model):
-    groups = find_groups(list("abcdefgh"), [(0, 1, 90), (1, 2, 90), (3, 4, 90), (4, 5, 90), (5, 6, 90), (2, 3, 12)])
-    assert groups == (tuple("defg"), tuple("abc"))
-    assert find_groups(list("abcd"), [(0, 1, 90), (2, 3, 90)], placed=[0, 3]) == (tuple("abcd"),)
-    assert judge(model, groups=groups).grade == "doubtful"
-
-
 def signs(*grades: tuple[str, str]) -> list[SfmSign]:
     return [SfmSign(name, grade, "a reason") for name, grade in grades]
 
@@ -113,7 +100,7 @@ def signs(*grades: tuple[str, str]) -> list[SfmSign]:
         ([("tilt", "refused"), ("GPS", "doubtful")], "refused"),
         ([("tilt", "doubtful"), ("GPS", "doubtful"), ("relief", "doubtful")], "refused"),
         ([("reprojection error", "refused")], "refused"),
-        ([("placed", "refused"), ("groups", "doubtful"), ("tilt", "doubtful")], "doubtful"),
+        ([("placed", "refused"), ("tilt", "doubtful")], "doubtful"),
     ],
 )
 def test_signs_are_weighed_together(found, grade):

@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos.synthetic import land, oasis, scene
+from dav_gswt.photos.synthetic import oasis, scene
 from dav_gswt.photos.synthetic.land import make_ground_mesh  # as it is before `small_land` replaces it
 
 every_family = pytest.mark.parametrize("name", scene.FAMILIES)
@@ -31,7 +31,7 @@ def parts_of(made):
     yield np.stack([made.light.sun, made.light.zenith, made.light.horizon, made.light.below])
     if made.labels:
         yield made.labels.material.ravel()
-        yield from (thing.vertices for thing in made.labels.objects)
+        yield from made.labels.objects
 
 
 @every_family
@@ -77,21 +77,6 @@ def test_the_mesh_of_the_ground_is_fine_about_the_origin_and_faces_up():
     assert axis[-1] == -axis[0] == y.max() == -y.min() and axis[-1] > 500
     a, b, c = (mesh.vertices[mesh.faces[:, i]].astype(float) for i in range(3))
     assert (np.cross(b - a, c - a)[:, 2] > 0).all() and len(mesh.faces) == 2 * (side - 1) ** 2
-
-
-def test_mounds_add_up_and_end():
-    rng = np.random.default_rng(0)
-    x, y = rng.uniform(-3, 3, (2, 40, 30))
-    z, plants = rng.normal(size=x.shape), np.column_stack([rng.uniform(-2, 2, (9, 2)), rng.uniform(0.1, 0.5, 9)])
-    expected = z.copy()
-    for px, py, size in plants:
-        square = (x - px) ** 2 + (y - py) ** 2
-        mound = 0.2 * size * np.exp(-square / (0.7 * size) ** 2)
-        expected += np.where(np.abs(x - px) + np.abs(y - py) < 3 * size, mound, 0)
-    before = z.copy()
-    assert np.allclose(land.add_mounds(z, x, y, plants, height=0.2, width=0.7, end=3.0), expected, rtol=0, atol=1e-12)
-    assert np.array_equal(z, before)
-    assert np.array_equal(land.add_mounds(z, x, y, plants[:0], height=0.2, width=0.7, end=3.0), z)
 
 
 def test_materials_hold_their_share_of_the_exemplar_on_both_sides_of_a_narrow_path():

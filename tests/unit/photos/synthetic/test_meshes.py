@@ -7,21 +7,15 @@ import pytest
 
 from dav_gswt.photos.synthetic import desert, meshes, planet, plants
 
-BUSHES = plants.POPPY, plants.CORNFLOWER, plants.OXEYE, plants.BUTTERCUP, plants.COSMOS, plants.MARIGOLD, plants.DAISY
 PLANTS = {
     "shrub": plants.make_shrub,
     "dry tuft": plants.make_dry_tuft,
     "tuft": plants.make_tuft,
     "seed grass": plants.make_seed_grass,
     "clover": plants.make_clover,
-    "spire": partial(plants.make_spire, colour=plants.LARKSPUR),
-    "umbel": plants.make_umbel,
-    "tussock": partial(plants.make_tussock, tint=plants.TINTS[0]),
-    "dock": plants.make_dock,
 }
 PLANTS |= {f"flower {k}": partial(plants.make_flower, kind=f) for k, f in enumerate(plants.MEADOW_FLOWERS)}
-PLANTS |= {f"bush {k}": partial(plants.make_bush, kind=kind) for k, kind in enumerate(BUSHES)}
-PLANTS |= {ear.__name__: ear for ear in plants.EARS}
+PLANTS |= {"bush": partial(plants.make_flower, kind=plants.MEADOW_FLOWERS[0], most=9)}
 STONES = {
     "stone": partial(meshes.make_stone, subdivisions=2, palette=desert.STONES),
     "rock": partial(meshes.make_rock, subdivisions=2, palette=planet.ROCKS),
@@ -29,10 +23,7 @@ STONES = {
 MATS = {
     "mat": partial(plants.make_mat, count=40, length=0.12, dry=0.2),
     "stand": partial(plants.make_stand, count=40, length=0.9, width=0.01, tint=plants.TINTS[1]),
-    "flat": partial(plants.make_flat_grass, count=40, length=0.9, width=0.01, tint=plants.TINTS[1]),
-    "swathe": lambda rng: plants.make_swathe(
-        rng, [plants.make_bush(rng, plants.POPPY) for _ in range(2)], 4, (0.3, 0.4)
-    ),
+    "swathe": lambda rng: plants.make_swathe(rng, [PLANTS["flower 3"](rng) for _ in range(2)], 4, (0.3, 0.4)),
 }
 EVERY = PLANTS | STONES | MATS
 

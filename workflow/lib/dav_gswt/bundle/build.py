@@ -2,7 +2,7 @@
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +11,11 @@ import numpy as np
 from dav_gswt.bundle import chunks, direction_search, gswt, level_distances, manifest, orders
 from dav_gswt.bundle.chunks import ChunkOrders
 from dav_gswt.bundle.content import BundleContent, compute_ground_colour
-from dav_gswt.bundle.encoding import Encoding, EncodingErrors
+from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.bundle.land_cover import ObjectEntry, ObjectOrders
 from dav_gswt.bundle.manifest import (
     Manifest,
     MaterialEntry,
-    OrdersReport,
-    RoundingErrors,
     Sky,
     TileEntry,
     TileOrders,
@@ -27,6 +25,8 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, mean_scale
 from dav_gswt.files import write_json
 from dav_gswt.logs import progress
+
+FLOOR_PIXELS = 12.0  # width of a finest disc in the nearest ground that the lowest eye sees
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,8 @@ class BundleOptions:
         unit: of lengths, for display.
         level_pixels: mean standard deviation of a level, in pixels, where it takes over from its finer neighbour.
         band: half the width of that cross-fade, as a share of the distance.
-        floor_pixels: width in pixels of a finest disc in the nearest ground that the lowest eye sees.
         decibels: PSNR from which drawing in a neighbour's order counts as invisible.
-        threads: that sort tiles; they change no byte. From two on archives are written beside them.
-        sky: behind everything.
+        threads: that sort tiles; they change no byte. From two on the archive is written beside them.
     """
 
     tau: float
@@ -50,10 +48,8 @@ class BundleOptions:
     unit: str = "metre"
     level_pixels: float = 1.0
     band: float = 0.1
-    floor_pixels: float = 12.0
     decibels: float = 40.0
     threads: int = 1
-    sky: Sky = field(default_factory=Sky)
 
 
 def write_bundle(
@@ -62,10 +58,10 @@ def write_bundle(
     """Write davgswt.json, chunks/ and gswt.zip to a folder; returns the manifest.
 
     Everything is made beside the folder and moved in when it is whole, the manifest last, so a manifest
-    never names a file that is missing. Other entries of the folder stay. Each material has an archive
-    (gswt.zip, gswt_material1.zip and so on) with its objects baked into the tiles.
+    never names a file that is missing. Other entries of the folder stay. gswt.zip has the tiles of the
+    first material with its objects baked into them.
 
-    Raises: InputError: mean scales that do not rise, an empty tile, or too many splats.
+    Raises: InputError: mean scales that do not rise, or an empty tile.
     """
     out = Path(out_dir)
     part = out.with_name(f".{out.name}.part")
@@ -73,13 +69,15 @@ def write_bundle(
     (part / "chunks").mkdir(parents=True)
     try:
         with ThreadPoolExecutor(1) as beside:
-            archives = beside.submit(_write_archives, content, options.salt, part)
+            archive = beside.submit(
+                lambda: gswt.write_gswt(gswt.bake_objects(content, options.salt), content.side, part / gswt.NAME)
+            )
             if options.threads == 1:
-                archives.result()
+                archive.result()
             try:
                 made = _write_content(content, options, provenance, part)
             finally:
-                archives.result()  # what it raises says more of the tiles than what else they made fail
+                archive.result()  # what it raises says more of the tiles than what else they made fail
         value = made.to_dict()
         Manifest.from_dict(value)
         write_json(part / manifest.NAME, value)
@@ -89,32 +87,19 @@ def write_bundle(
     return made
 
 
-def _write_archives(content: BundleContent, salt: int, part: Path) -> None:
-    for material in range(len(content.materials)):
-        fields = gswt.fit_to_renderer(gswt.bake_objects(content, material, salt))
-        gswt.write_gswt(fields, content.side, part / (f"gswt_material{material}.zip" if material else "gswt.zip"))
-
-
 def _write_content(content: BundleContent, options: BundleOptions, provenance: dict[str, Any], part: Path) -> Manifest:
     """Write the chunks; returns the manifest."""
-    found = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
-    rings, reached = found.rings, found.decibels
-    report = (list(rings.elevations), rings.azimuths, options.tau, options.decibels)
+    rings, _ = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
     info = describe_tiles(content, options, rings)
-    pixel = content.spacing / options.floor_pixels
-    encoding = Encoding.fit(list(content.iterate_fields()), content.side, pixel)
-    entries, errors = _write_chunks(content, encoding, info, options, part)
-    known: dict[str, Any] = vars(info) | entries
-    rounding: dict[str, Any] = asdict(errors) | _measure_rounding(content, encoding, pixel)
+    encoding = Encoding.fit(list(content.iterate_fields()), content.side, content.spacing / FLOOR_PIXELS)
+    known: dict[str, Any] = vars(info) | _write_chunks(content, encoding, info, options, part)
     return Manifest(
         **known,
         format=manifest.FORMAT,
         version=manifest.VERSION,
         unit=options.unit,
-        sky=options.sky,
+        sky=Sky(),
         encoding=encoding,
-        error=RoundingErrors(**rounding),
-        orders=OrdersReport(*report, reached["walker"], reached["oblique"]),
         provenance=provenance,
     )
 
@@ -141,7 +126,7 @@ def describe_tiles(content: BundleContent, options: BundleOptions, rings: orders
     return TileSetInfo(
         tile_side=content.side,
         salt=options.salt,
-        eye_floor=level_distances.compute_eye_floor(content.spacing, options.floor_pixels),
+        eye_floor=level_distances.compute_eye_floor(content.spacing, FLOOR_PIXELS),
         ground_colour=content.ground_colour(),
         directions=rings.directions().tolist(),
         levels=level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band),
@@ -174,9 +159,9 @@ def _measure_heights(levels: list[GaussianField]) -> list[float]:
 
 def _write_chunks(
     content: BundleContent, encoding: Encoding, info: TileSetInfo, options: BundleOptions, part: Path
-) -> tuple[dict[str, list], EncodingErrors]:
-    """Write all chunks; returns the entries of tiles and objects in the manifest, and the largest errors."""
-    along, pixel = np.array(info.directions), content.spacing / options.floor_pixels
+) -> dict[str, list]:
+    """Write all chunks; returns the entries of tiles and objects in the manifest."""
+    along = np.array(info.directions)
     tiles = [content.tile_fields(level) for level in range(content.levels)]
     things = [content.object_fields(level) for level in range(content.levels)]
     objects = list(info.objects or [])
@@ -187,17 +172,13 @@ def _write_chunks(
         for kept in each.chunks
     ]
 
-    def write(source: tuple[str, ChunkOrders, GaussianField]) -> tuple[chunks.ChunkEntry, EncodingErrors]:
+    def write(source: tuple[str, ChunkOrders, GaussianField]) -> chunks.ChunkEntry:
         name, kept, field = source
         rows, order = encoding.encode(field), orders.presort(field.means, along[kept.orders])
-        entry = chunks.write_chunk(rows, order, part, f"chunks/lod{kept.level}_{name}.bin", kept)
-        return entry, EncodingErrors.measure(encoding, field, rows, pixel)
+        return chunks.write_chunk(rows, order, part, f"chunks/lod{kept.level}_{name}.bin", kept)
 
-    written, errors = [], EncodingErrors()
     with ThreadPoolExecutor(options.threads) as pool:
-        for _, (entry, more) in zip(progress(sources, "sort tiles"), pool.map(write, sources), strict=True):
-            written.append(entry)
-            errors = errors.combine(more)
+        written = [entry for _, entry in zip(progress(sources, "sort tiles"), pool.map(write, sources), strict=True)]
     groups = iter([written[first : first + content.levels] for first in range(0, len(written), content.levels)])
     entries: dict[str, list] = {
         "tiles": [TileEntry(tile.tile, tile.uncertainty, tile.z, next(groups)) for tile in info.tiles]
@@ -205,23 +186,7 @@ def _write_chunks(
     if objects:
         known: list[dict[str, Any]] = [vars(each) | {"chunks": next(groups)} for each in objects]
         entries["objects"] = [ObjectEntry(**values) for values in known]
-    return entries, errors
-
-
-def _measure_rounding(content: BundleContent, encoding: Encoding, pixel: float) -> dict[str, float | None]:
-    """PSNR of rounded tiles against the tiles, as near as the lowest eye sees them: {elevation}_db."""
-    found, tiles = {}, content.sample_tiles()
-    for name, elevation in direction_search.ELEVATIONS.items():
-        pairs = []
-        for view in direction_search.spread_views(len(tiles), elevation):
-            source = tiles[view.tile]
-            rounded, exact = (
-                direction_search.render_in_order(field, content.side, view.direction, pixel)
-                for field in (encoding.decode(encoding.encode(source)), source)
-            )
-            pairs.append((rounded, exact))
-        found[f"{name}_db"] = direction_search.compute_psnr(pairs)
-    return found
+    return entries
 
 
 def _move_in(part: Path, out: Path) -> None:
@@ -229,7 +194,5 @@ def _move_in(part: Path, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     (out / manifest.NAME).unlink(missing_ok=True)
     shutil.rmtree(out / "chunks", ignore_errors=True)
-    for old in out.glob("gswt_material*.zip"):
-        old.unlink()
-    for name in ("chunks", *sorted(path.name for path in part.glob("*.zip")), manifest.NAME):
+    for name in ("chunks", gswt.NAME, manifest.NAME):
         (part / name).replace(out / name)

@@ -6,14 +6,14 @@ Gaussian is moved to the depth of its place in it.
 """
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import level_distances, orders
-from dav_gswt.bundle.orders import DirectionRings
+from dav_gswt.bundle.orders import DirectionRings, unit_vectors
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images.metrics import mse_to_psnr
@@ -30,37 +30,9 @@ VIEWS = 8  # at each elevation
 Picture = Float32[Array, "h w 3"]
 
 
-@dataclass(frozen=True)
-class TileView:
-    """A tile's number, and from where it is looked at: degrees from the east, degrees below the horizon."""
-
-    tile: int
-    azimuth: float
-    elevation: float
-
-    @property
-    def direction(self) -> Float[Array, "3"]:
-        return orders.unit_vectors(np.radians([self.azimuth]), np.radians(self.elevation))[0]
-
-
-@dataclass(frozen=True)
-class DirectionSearchResult:
-    """Directions, and the PSNR of pictures drawn in their orders.
-
-    Attributes:
-        rings: the directions.
-        decibels: by elevation (ELEVATIONS), the PSNR of the finest level drawn in the order of the
-            nearest direction that a tile with every second azimuth keeps, half-way between two of these
-            azimuths, where it is worst. None: no difference.
-    """
-
-    rings: DirectionRings
-    decibels: dict[str, float | None]
-
-
 def search_directions(
     fields: list[GaussianField], side: float, wanted: float, most: int = MAX_ORDERS
-) -> DirectionSearchResult:
+) -> tuple[DirectionRings, dict[str, float | None]]:
     """The fewest directions with which every view reaches `wanted` decibels, or as many as `most` allow.
 
     The search starts with a ring of MIN_AZIMUTHS azimuths 20 degrees below the horizon. While the worst
@@ -68,16 +40,17 @@ def search_directions(
     of the error, a ring at that elevation is added, otherwise every ring gets twice the azimuths. Views
     steeper than 45 degrees are left out: they show the tiles about the eye, which are sorted exactly.
 
-    fields: the tiles of the finest level; a coarser level is used only where its discs cover a pixel.
+    Args:
+        fields: the tiles of the finest level; a coarser level is used only where its discs cover a pixel.
+        most: orders of a tile that keeps every second azimuth.
+    Returns: the directions, of which such a tile keeps every second azimuth; and `measure_elevations` of what it keeps.
     """
     elevations, kept = (20.0,), MIN_AZIMUTHS
     while True:
-        found = DirectionSearchResult(
-            DirectionRings(elevations, 2 * kept), measure_elevations(fields, side, elevations, kept)
-        )
-        decibels, worst = min((_as_number(level), view) for view, level in found.decibels.items())
+        rings, found = DirectionRings(elevations, 2 * kept), measure_elevations(fields, side, elevations, kept)
+        decibels, worst = min((_as_number(level), view) for view, level in found.items())
         if decibels >= wanted:
-            return found
+            return rings, found
         elevation = ELEVATIONS[worst]
         more = tuple(sorted({*elevations, elevation}))
         along_azimuths = measure_psnr(fields, side, DirectionRings(elevations, kept), elevation, halfway=False)
@@ -85,7 +58,7 @@ def search_directions(
         elevations_next, kept_next = (more, kept) if missing else (elevations, 2 * kept)
         if len(elevations_next) * kept_next + 1 > most:
             _log.warning("orders: %.1f dB with %d directions, and no room for more", decibels, most)
-            return found
+            return rings, found
         elevations, kept = elevations_next, kept_next
 
 
@@ -104,26 +77,22 @@ def measure_elevations(
 def measure_psnr(
     fields: list[GaussianField], side: float, rings: DirectionRings, elevation: float, halfway: bool = True
 ) -> float | None:
-    """PSNR of views at one elevation, drawn in the order of the nearest direction, against their own order.
+    """PSNR of VIEWS views of different tiles, drawn in the order of the nearest direction, against their own order.
 
-    halfway: views lie half-way between two azimuths, where an order is worst; otherwise along an azimuth.
+    The views lie evenly around at an elevation in degrees below the horizon. halfway: half-way between two azimuths,
+    where an order is worst; otherwise along an azimuth. None: no difference.
     """
     pixel = side / level_distances.FOCAL  # of the reference picture a tile's side away: nearer tiles are sorted exactly
     along, pairs = rings.directions(), []
-    for view in spread_views(len(fields), elevation, rings.azimuths):
-        seen = view if halfway else replace(view, azimuth=view.azimuth - 180 / rings.azimuths)
-        field, direction = fields[seen.tile], seen.direction
+    for k in range(VIEWS):
+        azimuth = 360 / rings.azimuths * (round(rings.azimuths * k / VIEWS) + 0.5) % 360
+        azimuth -= 0 if halfway else 180 / rings.azimuths
+        field, direction = fields[5 * k % len(fields)], unit_vectors(np.radians([azimuth]), np.radians(elevation))[0]
         best = along[int(np.argmax(along @ direction))]
         exact = render_in_order(field, side, direction, pixel)
         same = np.array_equal(best, direction)
         pairs.append((exact if same else render_in_order(field, side, direction, pixel, best), exact))
     return compute_psnr(pairs)
-
-
-def spread_views(tiles: int, elevation: float, azimuths: int = 1) -> list[TileView]:
-    """VIEWS views of different tiles, evenly around, each half-way between two of so many azimuths."""
-    around = [round(azimuths * k / VIEWS) + 0.5 for k in range(VIEWS)]
-    return [TileView(5 * k % tiles, 360 / azimuths * a % 360, elevation) for k, a in enumerate(around)]
 
 
 def render_in_order(

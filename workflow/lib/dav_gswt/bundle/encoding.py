@@ -1,4 +1,4 @@
-"""Gaussians as records of 16 bytes (one texel of four 32-bit words of a viewer), and the errors of that rounding.
+"""Gaussians as records of 16 bytes (one texel of four 32-bit words of a viewer).
 
 A record is little-endian:
 
@@ -11,7 +11,7 @@ All tiles of a bundle share one grid, and a tile's side is a whole number of its
 border move alike. Colour does not depend on the direction.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -153,51 +153,3 @@ def find_smallest_rotations(quats: Float[Array, "n 4"]) -> tuple[Float64[Array, 
 def _multiply_quaternions(p: Float[Array, "n 4"], q: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
     a, u, b, v = p[:, :1], p[:, 1:], q[:, :1], q[:, 1:]
     return np.concatenate([a * b - (u * v).sum(1, keepdims=True), a * v + b * u + np.cross(u, v)], 1)
-
-
-@dataclass(frozen=True)
-class EncodingErrors(Entry):
-    """Largest differences between Gaussians and their records.
-
-    Attributes:
-        position, position_pixels: in world units, and in pixels of the nearest visible ground.
-        scale_percent: of a standard deviation.
-        angle_degrees: between rotations.
-        colour, opacity: in [0, 1].
-        clipped: number of axes outside of the encoding's range of sizes; they do not count for scale_percent.
-    """
-
-    position: Size = 0.0
-    position_pixels: Size = 0.0
-    scale_percent: Size = 0.0
-    angle_degrees: Size = 0.0
-    colour: Size = 0.0
-    opacity: Size = 0.0
-    clipped: Natural = 0
-
-    @classmethod
-    def measure(cls, encoding: Encoding, field: GaussianField, rows: Array, pixel: float) -> "EncodingErrors":
-        """The errors of a field's records."""
-        back, (rotation, axes) = encoding.decode(rows), find_smallest_rotations(field.quats)
-        away = float(np.linalg.norm(back.means.astype(float) - field.means, axis=1).max(initial=0.0))
-        sizes = np.take_along_axis(field.log_scales.astype(float), axes, 1)
-        low, high = encoding.log_scale[0], encoding.log_scale[0] + SCALE_STEPS * encoding.log_scale[1]
-        inside = (sizes >= low - 1e-6) & (sizes <= high + 1e-6)
-        log_ratio = np.abs(back.log_scales - sizes)[inside]
-        between = _multiply_quaternions(rotation * [1, -1, -1, -1], back.quats.astype(float))
-        half = np.linalg.norm(between[:, 1:], axis=1)
-        opacity = expit(field.opacity_logits.astype(float))
-        return cls(
-            position=away,
-            position_pixels=away / pixel,
-            scale_percent=100 * float(np.expm1(log_ratio.max(initial=0.0))),
-            angle_degrees=float(np.degrees(2 * np.arcsin(np.minimum(half, 1)).max(initial=0.0))),
-            colour=float(np.abs(back.base_colours - np.clip(field.base_colours, 0, 1)).max(initial=0.0)),
-            opacity=float(np.abs(rows["rgba"][:, 3] / 255 - opacity).max(initial=0.0)),
-            clipped=int((~inside).sum()),
-        )
-
-    def combine(self, more: "EncodingErrors") -> "EncodingErrors":
-        """The larger of each error, and all clipped axes."""
-        worst = {name: max(value, getattr(more, name)) for name, value in asdict(self).items()}
-        return EncodingErrors(**worst | {"clipped": self.clipped + more.clipped})

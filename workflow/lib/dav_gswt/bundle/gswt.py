@@ -7,8 +7,7 @@ is optional. It knows tiles only, so objects are baked into them.
 import logging
 import re
 import zipfile
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,7 +17,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.field import HEADER_BYTES, GaussianField, concatenate_fields, read_field, write_field
+from dav_gswt.field import GaussianField, concatenate_fields, read_field, write_field
 from dav_gswt.files import UNREADABLE
 from dav_gswt.logs import progress
 from dav_gswt.materials.model import ObjectLevels, turn_and_scale, turn_rows
@@ -26,25 +25,14 @@ from dav_gswt.tiles.compose import equalise_heights
 
 _log = logging.getLogger(__name__)
 
+NAME = "gswt.zip"
 TILE_WIDTH = 4.0
 MAX_SPLATS = 8_388_608
-SPLAT_BYTES = 4 * 62
-TILE_NAME = re.compile(r"lod(\d{1,3})_tile_(\d{1,4}).*\.ply")  # as the renderer looks for them
+TILE_NAME = re.compile(r"lod(\d+)_tile_\d+\.ply")
 STAMP = (1980, 1, 1, 0, 0, 0)  # the earliest a zip knows: the same tiles give the same bytes
 TURN, SIZE = np.radians(15.0), 0.15  # largest turn and change of size of a baked object
 TRIES = 60  # places that are tried for each object
 EDGE = 0.04  # of a tile's side: a border that no object touches, so that tiles fit as they did without objects
-TURN, SIZE = np.radians(15.0), 0.15  # largest turn and change of size of a baked object
-TRIES = 60  # places that are tried for each object
-EDGE = 0.04  # of a tile's side: a border that no object touches, so that tiles fit as they did without objects
-PROPERTIES = [
-    *("x", "y", "z", "nx", "ny", "nz"),
-    *(f"f_dc_{i}" for i in range(3)),
-    *(f"f_rest_{i}" for i in range(45)),
-    "opacity",
-    *(f"scale_{i}" for i in range(3)),
-    *(f"rot_{i}" for i in range(4)),
-]
 
 
 def to_renderer(field: GaussianField, side: float) -> GaussianField:
@@ -66,28 +54,19 @@ def to_renderer(field: GaussianField, side: float) -> GaussianField:
     )
 
 
-def fit_to_renderer(fields: list[list[GaussianField]]) -> list[list[GaussianField]]:
-    """Fields by level and tile without the finest levels, as far as the renderer could not take them all."""
-    levels = list(fields)
-    while len(levels) > 1 and sum(len(field) for level in levels for field in level) > MAX_SPLATS:
-        levels.pop(0)
-    if len(levels) < len(fields):
-        said = "gswt.zip lacks the finest %d of %d levels: its renderer takes %d splats"
-        _log.warning(said, len(fields) - len(levels), len(fields), MAX_SPLATS)
-    return levels
-
-
 def write_gswt(fields: list[list[GaussianField]], side: float, path: Path) -> None:
     """Write fields[level][tile] as lod{L}_tile_{T}.ply entries, in a fixed order with a fixed time.
 
-    Raises: InputError: a tile has no splat, there are more than the renderer takes, or a value is not finite.
+    The finest levels are left out, with a warning, as far as the renderer could not take them all.
+    Raises: InputError: a tile has no splat, or a value is not finite.
     """
-    total = sum(len(field) for level in fields for field in level)
-    if total > MAX_SPLATS:
-        raise InputError(
-            f"{path.name}: {total} splats, the renderer takes {MAX_SPLATS}; use smaller tiles or fewer variants"
-        )
-    flat = [(level, tile, field) for level, tiles in enumerate(fields) for tile, field in enumerate(tiles)]
+    levels = list(fields)
+    while len(levels) > 1 and sum(len(field) for level in levels for field in level) > MAX_SPLATS:
+        levels.pop(0)
+    if (left_out := len(fields) - len(levels)) > 0:
+        said = "gswt.zip lacks the finest %d of %d levels: its renderer takes %d splats"
+        _log.warning(said, left_out, len(fields), MAX_SPLATS)
+    flat = [(level, tile, field) for level, tiles in enumerate(levels) for tile, field in enumerate(tiles)]
     with zipfile.ZipFile(path, "w") as archive, TemporaryDirectory(dir=path.parent) as folder:
         for level, tile, field in progress(flat, "write gswt.zip"):
             if not len(field):
@@ -100,57 +79,32 @@ def write_gswt(fields: list[list[GaussianField]], side: float, path: Path) -> No
             entry = zipfile.ZipInfo(ply.name, STAMP)
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, ply.read_bytes(), compresslevel=1)
-            ply.unlink()
 
 
 def read_gswt(path: Path | str, side: float) -> list[list[GaussianField]]:
-    """fields[level][tile] of an archive, made by `write_gswt` or another program, for tiles `side` wide.
+    """fields[level][tile] of an archive that `write_gswt` wrote, for tiles `side` wide.
 
-    An entry's recorded size is compared with the most that the renderer takes before it is unpacked. Only base names
-    count; other entries are skipped.
-    Raises: InputError: no zip, a damaged entry, an entry that `read_field` refuses, too many splats, or levels or tiles
-    that do not count up from 0.
+    Raises: InputError: not readable, a name that no tile has, or an entry that `read_field` refuses.
     """
-    found, room = {}, MAX_SPLATS
+    levels: dict[int, list[GaussianField]] = {}
     try:
         with zipfile.ZipFile(path) as archive, TemporaryDirectory() as folder:
             for entry in archive.infolist():
-                if not (match := TILE_NAME.search(Path(entry.filename).name)):
-                    continue
-                if (key := (int(match[1]), int(match[2]))) in found:
-                    raise InputError(f"{path}: {entry.filename[:80]!r} is there twice; make the bundle again")
-                found[key] = _read_entry(archive, entry, Path(folder, "tile.ply"), room, side)
-                room -= len(found[key])
+                if not (match := TILE_NAME.fullmatch(entry.filename)):
+                    raise InputError(f"{path}: {entry.filename[:80]!r} is no tile; make the bundle again")
+                ply = Path(archive.extract(entry, folder))
+                levels.setdefault(int(match[1]), []).append(_from_renderer(read_field(ply), side))
+                ply.unlink()
     except UNREADABLE as error:
         raise InputError(f"{path}: not readable ({summarize_error(error)}); make the bundle again") from error
-    levels, tiles = ({key[axis] for key in found} for axis in (0, 1))
-    if not found or len(tiles) % 16 or set(found) != set(product(range(len(levels)), range(len(tiles)))):
-        raise InputError(f"{path}: not a whole set of 16 tiles at each level; make the bundle again")
-    return [[found[level, tile] for tile in range(len(tiles))] for level in range(len(levels))]
+    return list(levels.values())
 
 
-def _read_entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, ply: Path, room: int, side: float) -> GaussianField:
-    """An entry's Gaussians. ply: where to unpack it. room: how many Gaussians are left of MAX_SPLATS."""
-    name = f"{archive.filename}: {' '.join(entry.filename.split())[:80]}"
-    if entry.file_size > HEADER_BYTES + room * SPLAT_BYTES:
-        raise InputError(f"{name}: {entry.file_size} bytes are more than the renderer takes; make the bundle again")
-    ply.write_bytes(archive.read(entry))
-    try:
-        field = read_field(ply)
-    except InputError as error:
-        raise InputError(str(error).replace(str(ply), name)) from error
-    if not 0 < len(field) <= room:
-        raise InputError(f"{name}: {len(field)} splats where at most {room} fit; make the bundle again")
-    scale, n = TILE_WIDTH / side, len(field)
-    return GaussianField(
-        (field.means / scale).astype(np.float32),
-        (field.log_scales - np.log(scale)).astype(np.float32),
-        field.quats,
-        field.opacity_logits,
-        field.sh[:, :1].copy(),  # a view would keep all harmonics in memory
-        np.zeros(n, np.float32),
-        np.zeros(n, bool),
-    )
+def _from_renderer(field: GaussianField, side: float) -> GaussianField:
+    """A tile TILE_WIDTH wide, scaled to `side`, without its harmonics."""
+    scale = TILE_WIDTH / side
+    means, log_scales = (field.means / scale).astype(np.float32), (field.log_scales - np.log(scale)).astype(np.float32)
+    return replace(field, means=means, log_scales=log_scales, sh=field.sh[:, :1].copy())  # a view would keep them
 
 
 @dataclass(frozen=True)
@@ -164,21 +118,21 @@ class _BakedObject:
     radius: float
 
 
-def bake_objects(content: BundleContent, material: int, salt: int) -> list[list[GaussianField]]:
-    """fields[level][tile] of a material with its objects in them: another draw for each tile, none over an edge.
+def bake_objects(content: BundleContent, salt: int) -> list[list[GaussianField]]:
+    """fields[level][tile] of the first material with its objects: another draw for each tile, none over an edge.
 
     A tile has as many of an object as its area and the density give, rounded by chance. Footprints do not overlap; what
     finds no room is left out. The public renderer shifts each tile by its own mean height, so these are made equal
     again.
     """
-    tiles = content.tiles[material]
-    mine = [each for each in content.objects if each.material == material]
+    tiles = content.tiles[0]
+    mine = [each for each in content.objects if each.material == 0]
     if not mine:
         return tiles.fields
-    fields, ground = [list(level) for level in tiles.fields], content.ground_height(material)
+    fields, ground = [list(level) for level in tiles.fields], content.ground_height(0)
     wanted = placed = 0
     for tile in range(len(tiles.labels)):
-        rng = np.random.default_rng([salt, material, tile])
+        rng = np.random.default_rng([salt, 0, tile])
         counts = [int(each.density * content.side**2 + rng.random()) for each in mine]
         drawn = _draw_objects(mine, counts, content.side, ground, rng)
         wanted, placed = wanted + sum(counts), placed + len(drawn)
@@ -187,8 +141,7 @@ def bake_objects(content: BundleContent, material: int, salt: int) -> list[list[
     if placed < wanted:
         _log.info("gswt: %d of %d objects find room in the middle of tiles", placed, wanted)
     tiles_first = [list(levels) for levels in zip(*fields, strict=True)]
-    raised, _ = equalise_heights(tiles_first, content.side)
-    return [list(level) for level in zip(*raised, strict=True)]
+    return [list(level) for level in zip(*equalise_heights(tiles_first, content.side), strict=True)]
 
 
 def _draw_objects(

@@ -1,6 +1,7 @@
 """Entries of the manifest that say which material lies where, and where objects stand.
 
-`terrain.classes` and `terrain.scatter` compute from them; docs/formats.md has the formulas.
+`terrain.classes` and `terrain.scatter` compute from them; docs/formats.md says what each key means and has the
+formulas.
 """
 
 from collections.abc import Iterator, Sequence
@@ -9,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders, Digest
+from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders
 from dav_gswt.bundle.encoding import Entry, Length, Natural, Pair, Share, Size
 
 MAX_PAINTED = 2**18  # points
@@ -23,14 +24,7 @@ Name = Annotated[str, Field(min_length=1, max_length=80)]
 
 @dataclass(frozen=True)
 class NoiseTerm:
-    """A term of the rule of classes: gradient noise whose classes have the materials' shares.
-
-    Attributes:
-        weight: of the term in the sum.
-        wavelengths: by material, of the widest octave, in tile sides.
-        octaves: by material.
-        biases: by material, added to the noise.
-    """
+    """A term of the rule of classes: gradient noise whose classes have the materials' shares."""
 
     kind: Literal["noise"]
     weight: Size
@@ -41,14 +35,7 @@ class NoiseTerm:
 
 @dataclass(frozen=True)
 class RangeTerm:
-    """A term of the rule of classes: a material is found where the surface's height or slope lies in a range.
-
-    Attributes:
-        weight: of the term in the sum.
-        material: number of the material.
-        low, high: bounds of the range; None: none.
-        soft: by how far beyond a bound the material's score falls by `weight`.
-    """
+    """A term of the rule of classes: a material is found where the surface's height or slope lies in a range."""
 
     kind: Literal["height", "slope"]
     weight: Size
@@ -56,29 +43,6 @@ class RangeTerm:
     low: float | None
     high: float | None
     soft: Length
-
-
-@dataclass(frozen=True)
-class ImageTerm:
-    """A term of the rule of classes: a picture of materials, one byte a pixel, the northern row first.
-
-    Attributes:
-        weight: of the term in the sum.
-        file, bytes, sha256: of the pixels; a pixel is the number of a material, or that of none.
-        rows, columns: of the picture, whose middle lies at the world's origin.
-        width: of the picture, in world units.
-        beyond: what comes after its edge.
-    """
-
-    kind: Literal["image"]
-    weight: Size
-    file: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+\.bin$")]
-    bytes: Natural
-    sha256: Digest
-    rows: Pixels
-    columns: Pixels
-    width: Length
-    beyond: Literal["mirror", "clamp"]
 
 
 @dataclass(frozen=True)
@@ -94,14 +58,7 @@ class JitterEntry(Entry):
 
 @dataclass(frozen=True)
 class RiseEntry(Entry):
-    """How far what rises above the ground reaches over a border of classes.
-
-    Attributes:
-        slope: score per unit of length away from the ground.
-        most: largest gain of score.
-        ground: by material, mean z of its ground.
-        clearance: by material, the relief of the ground itself, which gains nothing.
-    """
+    """How far what rises above the ground reaches over a border of classes."""
 
     slope: Size
     most: Size
@@ -109,20 +66,12 @@ class RiseEntry(Entry):
     clearance: list[Size]
 
 
-RuleTerm = Annotated[NoiseTerm | RangeTerm | ImageTerm, Field(discriminator="kind")]
+RuleTerm = Annotated[NoiseTerm | RangeTerm, Field(discriminator="kind")]
 
 
 @dataclass(frozen=True)
 class ClassesEntry(Entry):
-    """Which material lies where: a sum of terms, and the transition between two materials.
-
-    Attributes:
-        salt: of the noises, 32 bits.
-        rule: the terms whose sum is the score of a material.
-        jitter, rise: of the transition.
-        painted: runs [I, J, length, material] of points where what a person painted takes the rule's place; only in
-            the manifest of a page.
-    """
+    """Which material lies where: a sum of terms, and the transition between two materials."""
 
     salt: Salt
     rule: Annotated[list[RuleTerm], Field(min_length=1, max_length=64)]
@@ -138,8 +87,6 @@ class ClassesEntry(Entry):
                 lists += [term.wavelengths, term.octaves, term.biases]
             elif isinstance(term, RangeTerm) and term.material >= materials:
                 yield "a term is of a material that is not there"
-            elif isinstance(term, ImageTerm) and term.bytes != term.rows * term.columns:
-                yield f"{term.file}: bytes do not fit rows and columns"
         if any(len(values) != materials for values in lists):
             yield f"a list does not have one value for each of {materials} materials"
         if fault := find_run_fault(self.painted, materials):
@@ -162,18 +109,7 @@ def find_run_fault(runs: Sequence[Sequence[int]], materials: int) -> str | None:
 
 @dataclass(frozen=True)
 class ObjectOrders(Entry):
-    """An object on the terrain.
-
-    Attributes:
-        name: for people.
-        radius: of its footprint.
-        z: lowest and highest z of its Gaussians, from its foot.
-        ground: z of the foot in a tile: the mean height of its material's ground.
-        material: number of the material that it stands on.
-        density: wanted number per unit of area of its material.
-        probability: that a candidate on its material is this object.
-        chunks: one a level.
-    """
+    """An object on the terrain."""
 
     name: Name
     radius: Length
@@ -194,14 +130,7 @@ class ObjectEntry(ObjectOrders):
 
 @dataclass(frozen=True)
 class ScatterEntry(Entry):
-    """Where objects stand.
-
-    Attributes:
-        cells: of the scatter grid along a tile's side; each has one candidate.
-        turn: largest turn either way, in degrees.
-        size: largest change of size either way, as a share.
-        salt: of the hashes, 32 bits.
-    """
+    """Where objects stand."""
 
     cells: Annotated[int, Field(ge=1, le=64)]
     turn: Annotated[float, Field(ge=0, le=180)]

@@ -1,9 +1,9 @@
 """davgswt.json: the manifest of a bundle, the only contract between the pipeline and a viewer.
 
-The classes here are the JSON objects of the file, with the same keys in the same order. Their types hold
-the bounds of the values, which `Manifest.from_dict` checks with what belongs together;
-workflow/schemas/davgswt.schema.json is generated from them. All lengths are in the bundle's unit, z is
-up, and x, y of a tile count from its south-western corner.
+The classes here are the JSON objects of the file, with the same keys in the same order; docs/formats.md
+says what each key means. The types hold the bounds of the values. `Manifest.from_dict` checks them and
+what belongs together, and workflow/schemas/davgswt.schema.json is generated from them. All lengths are in
+the bundle's unit, z is up, and x, y of a tile count from its south-western corner.
 """
 
 import json
@@ -20,7 +20,6 @@ from dav_gswt.bundle.encoding import (
     SCALE_STEPS,
     Colour,
     Encoding,
-    EncodingErrors,
     Entry,
     Length,
     Natural,
@@ -63,14 +62,7 @@ class Sky(Entry):
 
 @dataclass(frozen=True)
 class LevelEntry(Entry):
-    """One level of detail.
-
-    Attributes:
-        level: its number; 0 is the finest.
-        mean_scale: mean standard deviation of its Gaussians.
-        distance: from the eye, where it gives way to the next level; None for the last level.
-        band: half the width of the cross-fade about `distance`.
-    """
+    """One level of detail."""
 
     level: Natural
     mean_scale: Length
@@ -112,21 +104,7 @@ class MaterialEntry(Entry):
 
 @dataclass(frozen=True)
 class TileSetInfo(Entry):
-    """How a tile set is placed and drawn: all that a terrain needs beside the Gaussians.
-
-    Attributes:
-        tile_side: width of a tile.
-        salt: which of all endless terrains this is, 32 bits.
-        eye_floor: lowest sensible height of the eye above the ground.
-        ground_colour: mean sRGB colour of the ground, beyond the last tiles.
-        directions: unit vectors of viewing directions that tiles keep orders for.
-        levels: finest first.
-        tiles: by number, those of the first material first.
-        materials: at least one.
-        classes: which material lies where; None with one material.
-        objects: on the tiles; None without.
-        scatter: where objects stand; None without objects.
-    """
+    """How a tile set is placed and drawn: all that a terrain needs beside the Gaussians."""
 
     tile_side: Length
     salt: Salt
@@ -143,44 +121,8 @@ class TileSetInfo(Entry):
 
 
 @dataclass(frozen=True)
-class RoundingErrors(EncodingErrors):
-    """Largest errors of the records, and the PSNR of pictures of rounded tiles, seen by a walker and from 45 degrees;
-    None: no difference.
-    """
-
-    walker_db: float | None = None
-    oblique_db: float | None = None
-
-
-@dataclass(frozen=True)
-class OrdersReport(Entry):
-    """Rings of directions: elevations in degrees below the horizon, azimuths of a ring, the tau from which a tile keeps
-    all of them, the PSNR that was asked for, and the PSNR of pictures drawn in a neighbour's order (None: no
-    difference).
-    """
-
-    elevations: Annotated[list[Annotated[float, Field(ge=0, le=90)]], Field(min_length=1)]
-    azimuths: Annotated[int, Field(ge=2)]
-    tau: Share
-    wanted_db: float
-    walker_db: float | None
-    oblique_db: float | None
-
-
-@dataclass(frozen=True)
 class Manifest(TileSetInfo):
-    """davgswt.json.
-
-    Attributes:
-        format, version: FORMAT and VERSION.
-        unit: of lengths, for display.
-        sky: behind everything.
-        encoding: how the records of all chunks are read.
-        error: what rounding to records costs.
-        orders: how the directions were found.
-        provenance: of the files that the bundle was made from.
-        heights: of the surface under the tiles; only in the manifest of a page.
-    """
+    """davgswt.json."""
 
     tiles: Annotated[Sequence[TileEntry], Field(min_length=16)]
     objects: Annotated[Sequence[ObjectEntry], Field(min_length=1, max_length=256)] | None = field(
@@ -191,8 +133,6 @@ class Manifest(TileSetInfo):
     unit: Annotated[str, Field(min_length=1)]
     sky: Sky
     encoding: Encoding
-    error: RoundingErrors
-    orders: OrdersReport
     provenance: dict[str, Any]
     heights: Surface | None = None
 

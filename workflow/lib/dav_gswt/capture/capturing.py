@@ -84,9 +84,7 @@ def filter_attainable(
         return candidates
     if agent.keep_reachable:
         candidates = agent.keep_reachable(scene, frame, candidates)
-    clearance = feasibility.CLEARANCE * frame.flying_height
-    feasible = feasibility.filter_feasible(candidates, grid, scene.get("feasibility"), clearance)
-    return feasibility.drop_blocked(feasible, field, grid)
+    return feasibility.filter_feasible(candidates, field, grid, frame.flying_height)
 
 
 def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[Pose], folder: Path) -> None:

@@ -165,7 +165,7 @@ class SerialLine:
             raise InputError(f"{self._name}: the rig refused {verb}: {why}")
         raise InputError(
             f"{self._name}: the rig did not answer {verb}, asked {1 + self._retries} times with {wait:g} s each; "
-            "check that it is on, its cable, rig.port and rig.baud"
+            f"check that it is on, its cable, rig.port and its speed ({self._port.baudrate} bit/s)"
         )
 
     def _read_answer(self, verb: str, wait: float) -> list[str] | None:

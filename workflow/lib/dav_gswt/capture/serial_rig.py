@@ -17,7 +17,7 @@ import numpy as np
 
 from dav_gswt.capture import rig_limits, serial_protocol
 from dav_gswt.capture.capturing import RequestedPose, Site
-from dav_gswt.capture.rig_limits import Axes, Mount, RigLimits, build_mount
+from dav_gswt.capture.rig_limits import Axes, AxisLimits, Mount, build_mount
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame
@@ -28,6 +28,9 @@ from dav_gswt.photos.lenses import undistort_scene_photo
 _log = logging.getLogger(__name__)
 
 POLL = 0.05  # seconds between queries of the position
+BAUD, ANSWER_TIMEOUT, RETRIES = 115_200, 2.0, 3  # seconds for an answer; how often a question is repeated
+MOVE_TIMEOUT, PHOTO_TIMEOUT = 120.0, 30.0  # seconds for a move or homing, and for a photo to be complete in the inbox
+SETTLE = 1.0  # seconds of rest before a photo
 PHOTO_POLL = 0.25  # seconds between looks at the inbox; a photo that did not change in between may be complete
 
 Rig = Mapping[str, Any]  # a scene's `rig`; docs/reference/config.md describes its keys
@@ -43,13 +46,13 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     rig: Rig = site.scene["rig"]
     list_photos(Path(rig["inbox"]))  # raises if the folder does not exist
     mount = build_mount(rig, site.frame)
-    with serial_protocol.open_line(rig["port"], rig["baud"], float(rig["timeout"]), rig["retries"]) as line:
+    with serial_protocol.open_line(rig["port"], BAUD, ANSWER_TIMEOUT, RETRIES) as line:
         reported, home = line.hello()
-        limits = rig_limits.combine_limits(rig["limits"], rig["no_go"], reported)
+        limits = rig_limits.combine_limits(rig["limits"], reported)
         stops = _plan_stops(limits, home, mount, requested)
         if rig["dry_run"]:
-            for name, path in stops:
-                _log.info("%s: %s", name, "; then ".join(describe_axes(place) for place in path) or "no move")
+            for name, place in stops:
+                _log.info("%s: %s", name, describe_axes(place))
         else:
             _photograph_poses(site, SerialRig(rig, line, limits, home), mount, requested)
     if rig["dry_run"]:
@@ -66,11 +69,10 @@ def filter_reachable(scene: dict, frame: SceneFrame, candidates: list[RequestedP
     """
     rig: Rig = scene["rig"]
     mount = build_mount(rig, frame)
-    limits = rig_limits.combine_limits(rig["limits"], rig["no_go"], np.array([[-np.inf, np.inf]] * 3))
+    limits = rig_limits.combine_limits(rig["limits"], np.array([[-np.inf, np.inf]] * 3))
 
     def is_allowed(camera: Camera) -> bool:
-        places = rig_limits.list_turns(limits, mount.axes_of(camera), 0.0)
-        return any(rig_limits.find_violation(limits, place) is None for place in places)
+        return not isinstance(rig_limits.choose_turn(limits, mount.axes_of(camera), 0.0), str)
 
     found = [(pose, camera) for pose, camera in candidates if not mount.find_violation(camera) and is_allowed(camera)]
     _log.info("the rig can stand at %d of %d candidate poses", len(found), len(candidates))
@@ -82,10 +84,8 @@ def filter_reachable(scene: dict, frame: SceneFrame, candidates: list[RequestedP
     return found
 
 
-def _plan_stops(
-    limits: RigLimits, home: Axes, mount: Mount, requested: list[RequestedPose]
-) -> list[tuple[str, list[Axes]]]:
-    """Plan the stops on the way to each pose, from home through all poses in order.
+def _plan_stops(limits: AxisLimits, home: Axes, mount: Mount, requested: list[RequestedPose]) -> list[tuple[str, Axes]]:
+    """Plan the position of each pose, from home through all poses in order.
 
     Raises: InputError: names every pose that cannot be reached, and why.
     """
@@ -95,17 +95,16 @@ def _plan_stops(
         )
     at, found, barred = home, [], []
     for pose, camera in requested:
-        stops = mount.find_violation(camera) or rig_limits.plan_route(limits, at, mount.axes_of(camera))
-        if isinstance(stops, str):
-            barred.append(f"{pose.name} ({describe_axes(mount.axes_of(camera))}): {stops}")
+        place = mount.find_violation(camera) or rig_limits.choose_turn(limits, mount.axes_of(camera), at[0])
+        if isinstance(place, str):
+            barred.append(f"{pose.name} ({describe_axes(mount.axes_of(camera))}): {place}")
             continue
-        found.append((pose.name, stops))
-        at = stops[-1] if stops else at
+        found.append((pose.name, place))
+        at = place
     if barred:
         raise InputError(
-            f"the rig cannot reach {len(barred)} of {len(requested)} poses, so nothing was moved; change rig.limits or "
-            "rig.no_go if it may go there, or ask for other poses (the scene's min_elevation, k):\n  "
-            + "\n  ".join(barred)
+            f"the rig cannot reach {len(barred)} of {len(requested)} poses, so nothing was moved; change rig.limits if "
+            "it may go there, or ask for other poses (the scene's poses, k):\n  " + "\n  ".join(barred)
         )
     return found
 
@@ -121,50 +120,47 @@ class SerialRig:
 
     rig: Rig
     line: serial_protocol.SerialLine
-    limits: RigLimits
+    limits: AxisLimits
     home: Axes
     at: Axes | None = None
 
     def move_to(self, name: str, target: Axes) -> Axes:
-        """Move to a pose along its stops, the first time from home. Returns the reported position.
+        """Move to a pose, the first time from home. Returns the reported position.
 
-        Raises: InputError: no free path, or the rig ends elsewhere.
+        Raises: InputError: the pose is outside of the limits, or the rig ends elsewhere.
         """
         if self.at is None:
             self.line.home()
             self._wait_until_still(self.home)
         start = self.home if self.at is None else self.at
-        stops = rig_limits.plan_route(self.limits, start, target)
-        if isinstance(stops, str):
-            raise InputError(f"the rig cannot go on to {name} ({describe_axes(target)}): {stops}")
-        for stop in stops:
-            self.line.move(stop)
-            self._wait_until_still(stop)
-        time.sleep(self.rig["settle"])
-        return self._wait_until_still(stops[-1] if stops else start)
+        place = rig_limits.choose_turn(self.limits, target, start[0])
+        if isinstance(place, str):
+            raise InputError(f"the rig cannot go on to {name} ({describe_axes(target)}): {place}")
+        if not np.array_equal(place, start):
+            self.line.move(place)
+            self._wait_until_still(place)
+        time.sleep(SETTLE)
+        return self._wait_until_still(place)
 
     def take_photo(self, name: str, target: Axes) -> tuple[Path, Axes, str]:
         """Take one photo of a pose. Returns its file, the position of the axes, and the time."""
-        folder, patience = Path(self.rig["inbox"]), float(self.rig["photo_timeout"])
+        folder = Path(self.rig["inbox"])
         position = self.move_to(name, target)
         before, taken = list_photos(folder), datetime.now(UTC).isoformat(timespec="seconds")
         self.line.shoot()
-        if photo := wait_for_photo(folder, before, patience):
+        if photo := wait_for_photo(folder, before, PHOTO_TIMEOUT):
             return photo, position, taken
         raise InputError(
-            f"{name}: the camera was released, but no photo came into {folder} within {patience:g} s; check the "
-            "camera and the software that saves its photos there, and rig.photo_timeout"
+            f"{name}: the camera was released, but no photo came into {folder} within {PHOTO_TIMEOUT:g} s; check "
+            "the camera and the software that saves its photos there"
         )
 
     def _wait_until_still(self, goal: Axes) -> Axes:
         """Wait until the rig stands still at the goal. Returns the reported position."""
-        until = time.monotonic() + self.rig["move_timeout"]
+        until = time.monotonic() + MOVE_TIMEOUT
         while (reported := self.line.where())[0]:
             if time.monotonic() > until:
-                raise InputError(
-                    f"the rig still moves after {self.rig['move_timeout']:g} s, to {describe_axes(goal)}; "
-                    "if it is that slow, raise rig.move_timeout"
-                )
+                raise InputError(f"the rig still moves after {MOVE_TIMEOUT:g} s, to {describe_axes(goal)}; check it")
             time.sleep(POLL)
         if (np.abs(reported[1] - goal) > rig_limits.SLACK).any():
             raise InputError(
@@ -235,5 +231,5 @@ def wait_for_photo(folder: Path, before: Listing, patience: float) -> Path | Non
         time.sleep(PHOTO_POLL)
     if now:
         name = next(iter(now))
-        raise InputError(f"{error or folder / name} (waited {patience:g} s for it; rig.photo_timeout is how long)")
+        raise InputError(f"{error or folder / name} (waited {patience:g} s for it)")
     return None

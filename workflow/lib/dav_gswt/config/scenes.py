@@ -2,17 +2,16 @@
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from dav_gswt.capture.agents import list_agents
-from dav_gswt.config.base import ConfigModel, Degrees, Name, PhotoSize, Seed, Text, key
+from dav_gswt.config.base import ConfigModel, Name, PhotoSize, Seed, Text, key
 
 if TYPE_CHECKING:
     SyntheticAgent = PhotoAgent = str
 else:
     SyntheticAgent, PhotoAgent = Literal[list_agents("synthetic")], Literal[list_agents("photos")]
 Range = Annotated[tuple[float, float], Field(description="lowest and highest", strict=False)]
-Radius = Annotated[float, Field(ge=0.05, le=20)]
 Coordinate = Annotated[float, Field(ge=-100, le=100)]
 GroundPlace = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
 
@@ -29,46 +28,24 @@ REGISTERED, RENDERED = ("register_photos",), ("render_photos",)
 class Axes(ConfigModel):
     """Ranges of a rig's axes."""
 
-    pan: Range | None = key("rotation about the vertical", None, unit="degrees")
-    tilt: Range | None = key("rotation about the horizontal", None, unit="degrees")
-    radius: Range | None = key("distance from the exemplar's centre", None, unit="mm")
+    pan: Range = key("rotation about the vertical", unit="degrees")
+    tilt: Range = key("rotation about the horizontal", unit="degrees")
+    radius: Range = key("distance from the exemplar's centre", unit="mm")
 
 
 class SerialRig(ConfigModel):
     """A motorised camera rig on a serial port (docs/rig-protocol.md), for `agent: serial`."""
 
     port: Text = key("the serial port: `/dev/ttyUSB0`, or a URL that pyserial knows (`socket://rig:4000`)")
-    baud: int = key("speed of the port", 115200, unit="bit/s", ge=300, le=4_000_000)
     inbox: Text = key("the folder into which the tethered camera's software saves photos")
     millimetres: float = key(
         "in one unit of the scene's world (`ground.json`)", unit="mm", read_by=SCORING, ge=0.001, le=1e6
     )
-    pan_zero: Degrees = key("pan at the world's azimuth 0 (its +x)", 0, unit="degrees", read_by=SCORING)
-    tilt_zero: Degrees = key("tilt at elevation 0 (the horizon)", 0, unit="degrees", read_by=SCORING)
-    limits: Axes = key("`pan`, `tilt` and `radius`: lowest and highest that the rig may be sent to", read_by=SCORING)
-    no_go: list[Axes] = key(
-        "boxes that it neither enters nor crosses; an axis left out is barred in full",
-        [],
+    limits: Axes = key(
+        "`pan`, `tilt` and `radius`: lowest and highest that the rig may be sent to; no obstacle may lie within",
         read_by=SCORING,
-        max_length=20,
     )
-    move_timeout: float = key("longest time of one move, or of homing", 120, unit="s", ge=0.1, le=3600)
-    photo_timeout: float = key("longest time until a photo is complete in `inbox`", 30, unit="s", ge=0.1, le=3600)
     dry_run: bool = key("`true`: print each move, move nothing, take nothing", True)
-
-    @field_validator("limits")
-    @classmethod
-    def _require_all_limits(cls, limits: Axes) -> Axes:
-        if missing := [axis for axis in ("pan", "tilt", "radius") if getattr(limits, axis) is None]:
-            raise ValueError(f"{missing[0]} is missing")
-        return limits
-
-    @field_validator("no_go")
-    @classmethod
-    def _require_an_axis(cls, no_go: list[Axes]) -> list[Axes]:
-        if Axes() in no_go:
-            raise ValueError("a box without any axis bars every move; give it an axis")
-        return no_go
 
 
 class Drone(ConfigModel):
@@ -78,13 +55,6 @@ class Drone(ConfigModel):
     clearance: float = key("below it the drone only climbs and sinks", 5, unit="m above ground", ge=1, le=100)
 
 
-class Feasibility(ConfigModel):
-    """Bounds of candidate poses. Poses inside the ground or hidden behind it are never asked for."""
-
-    min_height: float | None = key("above the ground", None, unit="world units", ge=0)
-    max_height: float | None = key("above the ground", None, unit="world units", gt=0)
-
-
 class OrbitPoses(ConfigModel):
     """All at the flying height from the exemplar's middle, and looking there."""
 
@@ -92,21 +62,9 @@ class OrbitPoses(ConfigModel):
 
 
 class FreePoses(ConfigModel):
-    """Any direction, distance and aim point on the exemplar."""
+    """Any direction, distance (0.4 to 1.5 flying heights for `agent: render`, else 0.4 to 1) and aim point."""
 
     kind: Literal["free"]
-    radii: Annotated[tuple[Radius, Radius], Field(strict=False)] | None = key(
-        "least and greatest distance from the aim point; if left out 0.4 to 1.5 for `agent: render`, else 0.4 to 1, "
-        "never higher than the first photos",
-        None,
-        unit="flying heights",
-    )
-
-    @model_validator(mode="after")
-    def _order_radii(self) -> "FreePoses":
-        if self.radii and self.radii[0] > self.radii[1]:
-            raise ValueError(f"radii go from high ({self.radii[0]:g}) to low ({self.radii[1]:g}); give the least first")
-        return self
 
 
 class RoutePoses(ConfigModel):
@@ -136,16 +94,6 @@ class _PhotographedScene(_Scene):
     poses: CandidatePoses | None = key(
         "which poses these are; if left out `{kind: orbit}`", None, read_by=POSE_READERS, agents=POSED
     )
-    min_elevation: float = key(
-        "lowest elevation of candidates and of test views",
-        30,
-        unit="degrees",
-        read_by=(*RENDERED, *POSE_READERS),
-        agents=POSED,
-        ge=5,
-        le=85,
-    )
-    feasibility: Feasibility | None = key("bounds of candidate poses", None, read_by=SCORING, agents=POSED)
 
 
 def _materials(default: str):
@@ -179,6 +127,15 @@ class SyntheticScene(_PhotographedScene):
         "hemisphere above `min_elevation`; `paper`, 36 on a circle at 45 degrees and the others as `cap`",
         "ring",
         read_by=RENDERED,
+    )
+    min_elevation: float = key(
+        "lowest elevation of candidates and of test views",
+        30,
+        unit="degrees",
+        read_by=(*RENDERED, *POSE_READERS),
+        agents=("render",),
+        ge=5,
+        le=85,
     )
     oblique: int = key("further test views around the exemplar at 45 degrees", 0, read_by=RENDERED, ge=0, le=200)
     walkers: int = key(
@@ -231,30 +188,10 @@ class PhotoScene(_PhotographedScene):
         False,
         read_by=("split_views", *FITTING),
     )
-    sfm: Literal["quick", "careful"] = key(
-        "`quick`: 4096 features a photo, 12 partners; `careful`: 8192 and 40", "quick", read_by=REGISTERED
-    )
-    mapper: Literal["incremental", "global"] = key(
-        "`global`: all photos at once, faster for hundreds", "incremental", read_by=REGISTERED
-    )
-    verdict: Literal["stop", "warn"] = key(
-        "what follows where structure from motion gives a model that several signs refuse: `stop` ends the run, `warn` "
-        "goes on with it",
-        "stop",
-        read_by=REGISTERED,
-    )
-    cameras: Literal["auto", "one", "each"] = key(
-        "`auto`: one camera for all photos of equal size and EXIF focal length; `one`: for all of equal size",
-        "auto",
-        read_by=REGISTERED,
-    )
     focal: float | None = key(
         "where EXIF has none or is wrong", None, unit="mm (35 mm equivalent)", read_by=REGISTERED, ge=4, le=2000
     )
     materials: Materials = _materials("auto")
-    masks: Text | None = key(
-        "a folder of masks named as the photos: black pixels are not ground", None, read_by=REGISTERED
-    )
     masks: Text | None = key(
         "a folder of masks named as the photos: black pixels are not ground", None, read_by=REGISTERED
     )

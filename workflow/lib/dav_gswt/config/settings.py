@@ -2,20 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import Field
 
-from dav_gswt.config.base import Auto, ConfigModel, Name, PhotoSize, Seed, Text, key
-
-Colour = Annotated[str, StringConstraints(pattern="^#[0-9a-fA-F]{6}$")]
-
-
-class Stop(ConfigModel):
-    """When rounds end before the last one; whichever comes first. Empty: never."""
-
-    photos: int | None = key("most photos in all", None, ge=3, le=100_000)
-    marginal_gain: float | None = key(
-        "least expected gain of a further photo", None, unit="dB a photo", ge=0.0001, le=100
-    )
+from dav_gswt.config.base import Auto, ConfigModel, Name, PhotoSize, Text, key
 
 
 class Flat(ConfigModel):
@@ -30,7 +19,6 @@ class Hills(ConfigModel):
     kind: Literal["hills"]
     height: float = key("nothing is higher above the plain or deeper below it", unit="tile sides", ge=0, le=100)
     wavelength: float = key("from one large hill to the next, about", unit="tile sides", ge=1, le=100_000)
-    seed: Seed = key("which hills", 0)
 
 
 class HeightMap(ConfigModel):
@@ -70,36 +58,15 @@ class NoiseClasses(ConfigModel):
     weight: Weight = key("of the noise among the terms", 1)
 
 
-class _RangeClasses(ConfigModel):
+class RangeClasses(ConfigModel):
+    """A material where the surface's height (tile sides) or slope (rise over run) lies in a range; rarer beyond."""
+
+    kind: Literal["height", "slope"]
     material: Text = key("name of the material")
     low: float | None = key("lower bound", None, ge=-1e6, le=1e6)
     high: float | None = key("upper bound", None, ge=-1e6, le=1e6)
     soft: float = key("by how far beyond a bound the score falls by `weight`", gt=0, le=1e6)
     weight: Weight = key("of the range; noise lies between -1 and 1", 1)
-
-
-class HeightClasses(_RangeClasses):
-    """A material where the surface's height, in tile sides, lies in a range; it gets rarer beyond."""
-
-    kind: Literal["height"]
-
-
-class SlopeClasses(_RangeClasses):
-    """A material where the surface's slope, rise over run, lies in a range; it gets rarer beyond."""
-
-    kind: Literal["slope"]
-
-
-class PictureClasses(ConfigModel):
-    """Materials by the colours of a picture."""
-
-    kind: Literal["image"]
-    file: Text = key("picture of plain colours, at most 4096 pixels a side")
-    width: float = key(
-        "of the whole picture; its middle lies at the world's origin", unit="world units", ge=0.001, le=1e7
-    )
-    colours: dict[Text, Colour] = key("name of a material: its colour in the picture, as `#rrggbb`", min_length=1)
-    weight: Weight = key("of the picture; noise lies between -1 and 1", 1)
 
 
 class PaintedClasses(ConfigModel):
@@ -109,34 +76,17 @@ class PaintedClasses(ConfigModel):
     file: Text = key("file that the page's “Save” has saved")
 
 
-ClassTerm = Annotated[
-    NoiseClasses | HeightClasses | SlopeClasses | PictureClasses | PaintedClasses, Field(discriminator="kind")
-]
+ClassTerm = Annotated[NoiseClasses | RangeClasses | PaintedClasses, Field(discriminator="kind")]
 
 
 class Stills(ConfigModel):
-    """Size of the stills, and of the frames of a flight."""
+    """Size of the stills."""
 
     width: int = key("of a still", 1920, unit="pixels", ge=16, le=8192)
     height: int = key("of a still", 1080, unit="pixels", ge=16, le=8192)
 
 
-class Flight(ConfigModel):
-    """A walk straight on, rendered frame by frame. Empty: none."""
-
-    frames: int | None = key("number of frames", None, ge=2, le=100_000)
-    length: float | None = key("of the walk", None, unit="tile sides", gt=0, le=100_000)
-    height: float | None = key("of the eye above the surface", None, unit="eye floors", ge=0.5, le=100)
-
-    @model_validator(mode="after")
-    def _require_all_or_none(self) -> "Flight":
-        missing = [name for name in ("frames", "length", "height") if getattr(self, name) is None]
-        if 0 < len(missing) < 3:
-            raise ValueError(f"{missing[0]} is missing; a flight needs frames, length and height")
-        return self
-
-
-EVALUATING = ("evaluate_round", "evaluate_inpainted")  # metrics.json records what its field was fitted with
+EVALUATING = ("evaluate_round",)  # metrics.json records what its field was fitted with
 FITTING = ("fit_coarse", "evaluate_coarse", "update_field", "fit_chosen_photos", *EVALUATING)
 
 

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import dav_gswt.export.terrain_files
 
-ANY_AXES = ("y-down", "y-up", "z-up")
-
 
 @dataclass(frozen=True)
 class Exporter:
@@ -20,7 +18,7 @@ class Exporter:
 
     Attributes:
         write: writes a `terrain_files.ExportJob`; returns the number of Gaussians in the files, or None: the job's.
-        axes: keys of `axes.AXES` that the format can have; the first is the usual one.
+        axes: of its coordinates, as terrain.json states them: a key of `axes.AXES`.
         bytes: most that a Gaussian takes.
         gaussians: most that a file can hold; None: any number.
         all_levels: whether the files have all levels, whatever level is requested.
@@ -28,7 +26,7 @@ class Exporter:
     """
 
     write: Callable[["dav_gswt.export.terrain_files.ExportJob"], int | None]
-    axes: tuple[str, ...]
+    axes: str
     bytes: int
     gaussians: int | None
     all_levels: bool
@@ -41,7 +39,7 @@ EXPORTERS: dict[str, Exporter] = {}
 def exporter(
     name: str,
     *,
-    axes: tuple[str, ...],
+    axes: str,
     bytes: int,
     gaussians: int | None = None,
     all_levels: bool = False,
@@ -62,68 +60,39 @@ def _check_npx() -> None:
     find_npx()
 
 
-def _check_usd() -> None:
-    from dav_gswt.export.usd import find_package
-
-    find_package()
-
-
-@exporter("ply", axes=ANY_AXES, bytes=68)
+@exporter("ply", axes="y-down", bytes=68)
 def export_ply(job: "dav_gswt.export.terrain_files.ExportJob") -> None:
     """The standard 3DGS PLY."""
     from dav_gswt.export.splat_files import write_ply
 
-    write_ply(job.spool, job.path(".ply"), job.rotation)
+    write_ply(job.spool, job.path(".ply"))
 
 
-@exporter("spz", axes=("y-up", "z-up", "y-down"), bytes=20, gaussians=10_000_000)
+@exporter("spz", axes="y-up", bytes=20, gaussians=10_000_000)
 def export_spz(job: "dav_gswt.export.terrain_files.ExportJob") -> None:
     """SPZ version 3."""
     from dav_gswt.export.splat_files import write_spz
 
-    write_spz(job.spool, job.path(".spz"), job.rotation)
+    write_spz(job.spool, job.path(".spz"))
 
 
-@exporter("glb", axes=("y-up", "z-up", "y-down"), bytes=60, gaussians=(2**32 - 65_536) // 60)
+@exporter("glb", axes="y-up", bytes=60, gaussians=(2**32 - 65_536) // 60)
 def export_glb(job: "dav_gswt.export.terrain_files.ExportJob") -> None:
     """Binary glTF with KHR_gaussian_splatting; lengths in the file have 32 bits."""
     from dav_gswt.export.glb import write_splats
 
-    write_splats(job.spool, job.path(".glb"), dict(job.facts), job.rotation)
+    write_splats(job.spool, job.path(".glb"), dict(job.facts))
 
 
-@exporter("sog", axes=ANY_AXES, bytes=68, check=_check_npx)
+@exporter("sog", axes="y-down", bytes=68, check=_check_npx)
 def export_sog(job: "dav_gswt.export.terrain_files.ExportJob") -> None:
     """SOG in one file, made from a PLY."""
     from dav_gswt.export.splat_files import write_sog
 
-    write_sog([job.spool], job.path(".sog"), job.rotation)
+    write_sog(job.spool, job.path(".sog"))
 
 
-@exporter("streamed_sog", axes=ANY_AXES, bytes=2 * 68, all_levels=True, check=_check_npx)
-def export_streamed_sog(job: "dav_gswt.export.terrain_files.ExportJob") -> int:
-    """SOG of all levels, in chunks about as wide as a tile."""
-    from contextlib import ExitStack
-
-    from dav_gswt.export.splat_files import write_sog
-
-    folder = job.path("_sog")
-    folder.mkdir()
-    with ExitStack() as stack:
-        spools = [stack.enter_context(job.place(job.area, level)) for level in range(len(job.terrain.switches))]
-        write_sog(spools, folder / "lod-meta.json", job.rotation, job.terrain.side)
-    return sum(map(len, spools))
-
-
-@exporter("usd", axes=("z-up", "y-up"), bytes=56, check=_check_usd)
-def export_usd(job: "dav_gswt.export.terrain_files.ExportJob") -> None:
-    """OpenUSD."""
-    from dav_gswt.export.usd import write_usd
-
-    write_usd(job.spool, job.path(".usdc"), job.facts, job.metres_per_unit or 1.0, job.rotation)
-
-
-@exporter("3dtiles", axes=("z-up",), bytes=2 * 19, all_levels=True)
+@exporter("3dtiles", axes="z-up", bytes=2 * 19, all_levels=True)
 def export_3dtiles(job: "dav_gswt.export.terrain_files.ExportJob") -> int:
     """3D Tiles of all levels, compressed: CesiumJS draws them."""
     from dav_gswt.export.tiles_3d import write_tileset
@@ -131,7 +100,7 @@ def export_3dtiles(job: "dav_gswt.export.terrain_files.ExportJob") -> int:
     return write_tileset(job, job.path("_3dtiles"), compressed=True)
 
 
-@exporter("3dtiles_plain", axes=("z-up",), bytes=2 * 60, all_levels=True)
+@exporter("3dtiles_plain", axes="z-up", bytes=2 * 60, all_levels=True)
 def export_3dtiles_plain(job: "dav_gswt.export.terrain_files.ExportJob") -> int:
     """3D Tiles of all levels without compression: three.js draws them."""
     from dav_gswt.export.tiles_3d import write_tileset

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 from numpy import ndarray as Array
 from scipy.special import expit
 
@@ -104,14 +104,8 @@ class GlbWriter:
                     raise ValueError(f"{written} bytes where {size} were announced")
 
 
-def write_splats(
-    spool: Spool,
-    path: Path | str,
-    extras: dict[str, Any],
-    rotation: Float[Array, "3 3"] = Y_UP,
-    compressed: bool = False,
-) -> None:
-    """Write Gaussians as one primitive. extras: of its node. rotation: rows of `axes.AXES`.
+def write_splats(spool: Spool, path: Path | str, extras: dict[str, Any], compressed: bool = False) -> None:
+    """Write Gaussians as one primitive, y up. extras: of its node.
 
     Raises: ValueError: compressed: none, or more than an SPZ holds.
     """
@@ -131,7 +125,7 @@ def write_splats(
     glb = GlbWriter(used | nodes | {"meshes": [{"name": "terrain", "primitives": [primitive]}]})
     if compressed:
         packed = io.BytesIO()
-        pack_spz(spool, packed, rotation, 2)
+        pack_spz(spool, packed, 2)
         packed.write(bytes(-packed.tell() % 4))  # readers stop at the end of the gzip
         glb.add_view([np.frombuffer(packed.getbuffer(), np.uint8)], packed.tell())
 
@@ -139,9 +133,9 @@ def write_splats(
         attributes[name] = glb.add(None if compressed else parts, len(spool), width, kind, **more)
 
     scales = (np.exp(v.astype(float)).astype(np.float32) for v in spool.read("log_scales"))
-    quats = (turn_quats(v, rotation)[:, [1, 2, 3, 0]] for v in spool.read("quats"))
-    points = (turn_points(v, rotation) for v in spool.read("means"))
-    add("POSITION", points, 3, bounds=_find_bounds(spool, rotation))
+    quats = (turn_quats(v, Y_UP)[:, [1, 2, 3, 0]] for v in spool.read("quats"))
+    points = (turn_points(v, Y_UP) for v in spool.read("means"))
+    add("POSITION", points, 3, bounds=_find_bounds(spool))
     add("COLOR_0", _read_fallback(spool), 4, "|u1", normalized=True)
     add(f"{EXTENSION}:SCALE", scales, 3)
     add(f"{EXTENSION}:ROTATION", quats, 4)
@@ -155,9 +149,9 @@ def _to_opacity(logits: Float32[Array, "n 1"]) -> Float32[Array, "n 1"]:
     return expit(logits.astype(float)).astype(np.float32)
 
 
-def _find_bounds(spool: Spool, rotation: Float[Array, "3 3"]) -> Bounds:
+def _find_bounds(spool: Spool) -> Bounds:
     """The smallest and the largest of each coordinate, as it is stored."""
-    ends = [(p.min(0), p.max(0)) for p in (turn_points(v, rotation) for v in spool.read("means"))]
+    ends = [(p.min(0), p.max(0)) for p in (turn_points(v, Y_UP) for v in spool.read("means"))]
     return np.min([low for low, _ in ends], 0).tolist(), np.max([high for _, high in ends], 0).tolist()
 
 

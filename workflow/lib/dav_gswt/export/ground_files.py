@@ -1,6 +1,6 @@
-"""The ground of a finite terrain for simulators and engines: a mesh, height maps, a MuJoCo model, objects' hulls.
+"""The ground of a finite terrain for simulators and engines: a mesh, a height map, a MuJoCo model, objects' hulls.
 
-The frame is that of `exports/terrain`, z up. Height maps have the northern row first. MuJoCo's height field:
+The frame is that of `exports/terrain`, z up. The height map has the northern row first. MuJoCo's height field:
 https://mujoco.readthedocs.io/en/stable/XMLreference.html#asset-hfield.
 """
 
@@ -10,7 +10,6 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-import tifffile
 from jaxtyping import Float
 from numpy import ndarray as Array
 
@@ -27,15 +26,15 @@ from dav_gswt.export.ground_surface import (
     measure_tiles,
 )
 from dav_gswt.export.height_mesh import simplify_heights
-from dav_gswt.export.terrain_files import choose_area, find_metres, find_origin, resolve_lengths
+from dav_gswt.export.terrain_files import choose_area, find_origin
 from dav_gswt.files import atomic_file, atomic_folder, write_json
-from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.images import image_files
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.finite import Area, require_plane
 from dav_gswt.tiles.build import TileSet
 
 WHITE = 65535
+MESH_ERROR = 0.25  # ground cells: most that the collision mesh is off the height field
 FLOOR = 0.5  # thickness of MuJoCo's ground below the lowest point, in tile sides: nothing thin falls through
 
 Mesh = tuple[str, Array, Array, dict[str, Any]]  # name, vertices, triangles, extras
@@ -45,21 +44,17 @@ def export_ground(
     terrain: EndlessTerrain,
     manifest: Manifest,
     sets: Sequence[TileSet],
-    reference: Georeference | None,
     settings: Mapping[str, Any],
     out: Path | str,
 ) -> None:
-    """Write ground.{glb,png,tif,hfield,xml,json} and objects.glb of the area of the config's `export` to a folder.
+    """Write ground.{glb,png,hfield,xml,json} and objects.glb of the area of the config's `export` to a folder.
 
-    If the area has a radius, this is the rectangle about it: a height field has four corners.
-
-    Args:   sets: the tiles of all materials. reference: place on earth, if it is known.
-    Raises: InputError: a planet, an area whose height field has too many points, metres for a terrain without a scale.
+    sets: the tiles of all materials. Raises: InputError: a planet, or an area whose height field has too many points.
     """
-    area = check_ground(terrain, manifest, sets, reference, settings)
+    area = check_ground(terrain, sets, settings)
     origin = find_origin(terrain, area)
-    surface = collect_surface(terrain, measure_tiles(sets, settings["surface"] == "visible"), area)
-    error = settings["mesh_error"] * surface.cell
+    surface = collect_surface(terrain, measure_tiles(sets), area)
+    error = MESH_ERROR * surface.cell
     points, triangles = simplify_heights(surface.heights, surface.block, error)
     row, column = points.T
     x, y = surface.west + column * surface.step, surface.south + row * surface.step
@@ -70,7 +65,6 @@ def export_ground(
         "cells": {"west": area.west, "south": area.south, "columns": area.columns, "rows": area.rows},
         "origin": origin.tolist(),
         "ground_cell": surface.cell,
-        "surface": settings["surface"],
         "mesh": {"error": error, "vertices": len(points), "triangles": len(triangles)},
         "objects": len(hulls),
     }
@@ -80,21 +74,15 @@ def export_ground(
         write_meshes([("ground", vertices, triangles, extras)], folder / "ground.glb")
         if hulls:
             write_meshes([(h.name, h.vertices, h.triangles, convex) for h in hulls], folder / "objects.glb")
-        facts["heights"] = _write_images(surface, folder, origin)
+        facts["heights"] = _write_heights(surface, folder, origin)
         _write_mujoco(surface, hulls, origin, folder)
         write_json(folder / "ground.json", facts)
 
 
-def check_ground(
-    terrain: EndlessTerrain,
-    manifest: Manifest,
-    sets: Sequence[TileSet],
-    reference: Georeference | None,
-    settings: Mapping[str, Any],
-) -> Area:
+def check_ground(terrain: EndlessTerrain, sets: Sequence[TileSet], settings: Mapping[str, Any]) -> Area:
     """The cells that `export_ground` takes, before any work. Raises: InputError: as there."""
     require_plane(terrain)
-    area, _ = choose_area(resolve_lengths(settings, terrain.side, find_metres(manifest, reference)))
+    area = choose_area(settings)
     check_points(area, choose_steps(sets))
     return area
 
@@ -111,25 +99,13 @@ def write_meshes(meshes: Sequence[Mesh], path: Path | str) -> None:
     glb.write(path)
 
 
-def _write_images(surface: GroundSurface, folder: Path, origin: Float[Array, "3"]) -> dict[str, Any]:
-    """Write ground.png, 16 bits from the lowest to the highest point, and ground.tif, floats.
-
-    Returns: what their pixels mean, for ground.json.
-    """
+def _write_heights(surface: GroundSurface, folder: Path, origin: Float[Array, "3"]) -> dict[str, Any]:
+    """Write ground.png, 16 bits from the lowest to the highest point. Returns: what ground.json says of it."""
     above = surface.heights[::-1]
     low, high = float(above.min()), float(above.max())
     span = max(high - low, 1e-9)
     levels = np.rint((above.astype(float) - low) * (WHITE / span)).astype(np.uint16)
     image_files.write_grey16(folder / "ground.png", levels)
-    with atomic_file(folder / "ground.tif") as part:
-        tifffile.imwrite(
-            part,
-            np.ascontiguousarray(above, np.float32),
-            photometric="minisblack",
-            rowsperstrip=64,
-            metadata=None,
-            software="DAV-GSWT",
-        )
     rows, columns = above.shape
     north_west = [surface.west - origin[0], surface.south + (rows - 1) * surface.step - origin[1]]
     return {

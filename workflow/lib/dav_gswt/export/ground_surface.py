@@ -68,15 +68,14 @@ class GroundSurface:
     heights: Float32[Array, "rows columns"]
 
 
-def measure_tiles(sets: Sequence[TileSet], whole: bool = False) -> TileSurfaces:
+def measure_tiles(sets: Sequence[TileSet]) -> TileSurfaces:
     """The ground surfaces of the tile sets of all materials: their discs of the ground layer, seen from above.
 
-    A tile without such discs, as those of fields of other programs, is taken whole. whole: so is every tile, with the
-    stones and plants that are no objects.
+    A tile without such discs, as those of fields of other programs, is taken whole.
     """
     side, steps = sets[0].side, choose_steps(sets)
     heights = [
-        _look_down(_surround(each, tile, whole), side, steps)
+        _look_down(_surround(each, tile), side, steps)
         for each in progress(sets, "measure the tiles' ground")
         for tile in range(len(each.fields[0]))
     ]
@@ -92,14 +91,14 @@ def _find_spacing(sets: Sequence[TileSet]) -> float:
     return min(each.spacing for each in sets)
 
 
-def _surround(tiles: TileSet, tile: int, whole: bool) -> GaussianField:
+def _surround(tiles: TileSet, tile: int) -> GaussianField:
     """The ground of a tile and of neighbours whose borders fit: what is seen at its own border is theirs, too."""
     torus = arrange_torus(tile // EDGES)
     (row,), (column,) = np.nonzero(torus[1:-1, 1:-1] == tile)
     parts = []
     for (north, east), number in np.ndenumerate(torus[row : row + 3, column : column + 3]):
         field, by = tiles.fields[0][number], np.array([east - 1, north - 1, 0]) * tiles.side
-        shown = np.ones(len(field), bool) if whole or not field.ground.any() else field.ground
+        shown = np.ones(len(field), bool) if not field.ground.any() else field.ground
         means = field.means + by
         near = (np.abs(means[:, :2] - 0.5 * tiles.side) < (0.5 + AROUND) * tiles.side).all(1)
         parts.append(replace(field, means=means.astype(np.float32))[shown & near])
@@ -121,10 +120,8 @@ def check_points(area: Area, steps: int) -> None:
     """Raises: InputError: an area's height field would have more than MAX_POINTS points."""
     count = (area.columns * steps + 1) * (area.rows * steps + 1)
     if count > MAX_POINTS:
-        size = f"{describe_area(replace(area, disc=None))} a height field of {count} points"
-        raise InputError(
-            f"export: ground: {size}, at most {MAX_POINTS} are written; {suggest_size(area, count, MAX_POINTS)}"
-        )
+        size = f"{describe_area(area)} a height field of {count} points"
+        raise InputError(f"export: ground: {size}, at most {MAX_POINTS} are written; {suggest_size(count, MAX_POINTS)}")
 
 
 def collect_surface(terrain: EndlessTerrain, tiles: TileSurfaces, area: Area) -> GroundSurface:

@@ -1,17 +1,15 @@
-"""The photos of a round as a model that other programs train on: COLMAP's sparse/0, nerfstudio's transforms.json.
+"""The photos of a round as a model that other programs train on: COLMAP's sparse/0.
 
 The photos are those that the round's field was made of. The world frame and the unit are those of field.ply, and
 cameras are pinholes, so a field trained elsewhere comes out where ours is. Photos that only test have a folder of
 their own, `test`, of the same form: a program that is given the folder never sees them.
 """
 
-import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from plyfile import PlyData, PlyElement
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, require_file_name
@@ -21,9 +19,7 @@ from dav_gswt.photos.capture_record import TakenPhoto
 from dav_gswt.photos.colmap_model import ColmapModel, colour_points, triangulate_model, write_colmap_model
 from dav_gswt.photos.view_split import ViewSplit
 
-OPENGL = np.array([1.0, -1.0, -1.0])  # nerfstudio's camera looks along -z with y up
 TEST = "test"  # the folder of the photos that only test
-POINTS = "sparse_pc.ply"  # as nerfstudio calls it
 
 
 def write_photo_models(out: Path | str, images: Path | str, known: ColmapModel, split: ViewSplit, taken: list) -> None:
@@ -68,18 +64,12 @@ def _same(one: Camera, other: Camera) -> bool:
 
 
 def _write_model(folder: Path, model: ColmapModel, photos: list[TakenPhoto]) -> None:
-    """images/, sparse/0, transforms.json and its points of one list of photos."""
+    """images/ and sparse/0 of one list of photos."""
     for part in ("images", "sparse/0"):
         (folder / part).mkdir(parents=True)
     for photo in photos:
         _copy_picture(photo, folder / "images")
     write_colmap_model(model, folder / "sparse/0")
-    columns = [*model.points.T, *np.rint(model.colours.T * 255)]
-    kinds = [*((axis, "<f4") for axis in "xyz"), *((channel, "u1") for channel in ("red", "green", "blue"))]
-    rows = np.rec.fromarrays(columns, dtype=kinds)
-    PlyData([PlyElement.describe(np.asarray(rows), "vertex")], byte_order="<").write(str(folder / POINTS))
-    text = json.dumps(describe_transforms(model), indent=1, allow_nan=False) + "\n"
-    (folder / "transforms.json").write_text(text, encoding="utf-8")
 
 
 def _copy_picture(photo: TakenPhoto, folder: Path) -> None:
@@ -95,20 +85,3 @@ def _copy_picture(photo: TakenPhoto, folder: Path) -> None:
             f"{photo.camera.height}; make the photos again"
         )
     shutil.copyfile(photo.source, folder / name)
-
-
-def describe_transforms(model: ColmapModel) -> dict:
-    """transforms.json of a model: camera to world in OpenGL's axes, a lens for each frame.
-
-    The world is not moved: `applied_transform` is the identity. Source: nerfstudio's data conventions.
-    """
-    frames = []
-    for i, (name, camera) in enumerate(zip(model.names, model.cameras, strict=True)):
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = camera.rotation.T * OPENGL, camera.centre
-        lens = {"fl_x": camera.fx, "fl_y": camera.fy, "cx": camera.cx, "cy": camera.cy}
-        lens |= {"w": camera.width, "h": camera.height}
-        where = {"file_path": f"images/{name}", "transform_matrix": pose.tolist(), "colmap_im_id": i + 1}
-        frames.append(where | lens)
-    whole = {"camera_model": "PINHOLE", "applied_transform": np.eye(4)[:3].tolist(), "ply_file_path": POINTS}
-    return whole | {"frames": frames}

@@ -17,7 +17,7 @@ from numpy import ndarray as Array
 from scipy.special import expit
 
 from dav_gswt.errors import InputError
-from dav_gswt.export.axes import turn_points, turn_quats
+from dav_gswt.export.axes import Y_DOWN, Y_UP, turn_points, turn_quats
 from dav_gswt.export.spool import Spool
 from dav_gswt.files import atomic_file
 
@@ -29,19 +29,18 @@ POSITION_BITS, MAX_FRACTION = 23, 16  # of a coordinate without its sign; most o
 FINER = 64  # steps of a position in a mean standard deviation, where the file's extent leaves room for it
 COLOUR_SCALE, SCALE_STEPS, SMALLEST_LOG_SCALE = 0.15, 16, -10.0
 PACKAGE = "@playcanvas/splat-transform@2.7.1"
-CHUNK = 32  # thousand Gaussians of a streamed set that are loaded at once
 
 
-def write_ply(spool: Spool, path: Path | str, rotation: Float[Array, "3 3"]) -> None:
-    """Write the standard 3DGS PLY, all columns float32. rotation: rows of `axes.AXES`."""
+def write_ply(spool: Spool, path: Path | str) -> None:
+    """Write the standard 3DGS PLY, y down, all columns float32."""
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(spool)}"]
     lines += [*(f"property float {name}" for name in PROPERTIES), "end_header"]
     columns = map(spool.read, ("means", "dc", "opacity_logits", "log_scales", "quats"))
     with atomic_file(path) as part, part.open("wb") as file:
         file.write("\n".join(lines).encode() + b"\n")
         for points, dc, opacities, scales, quats in zip(*columns, strict=True):
-            means = turn_points(points, rotation)
-            parts = [means, np.zeros_like(means), dc, opacities, scales, turn_quats(quats, rotation)]
+            means = turn_points(points, Y_DOWN)
+            parts = [means, np.zeros_like(means), dc, opacities, scales, turn_quats(quats, Y_DOWN)]
             file.write(np.concatenate(parts, axis=1, dtype="<f4").tobytes())
 
 
@@ -52,46 +51,36 @@ def find_npx() -> str:
     return npx
 
 
-def write_sog(spools: list[Spool], path: Path, rotation: Float[Array, "3 3"], chunk_width: float | None = None) -> None:
-    """Write one SOG, or a set that streams its levels (lod-meta.json and chunks), of one spool a level.
-
-    chunk_width: of a streamed set, in world units; the converter takes whole numbers.
-    Raises: InputError: no Node.js, or what the converter complains of.
-    """
-    sources = [path.with_name(f".level{level}.ply") for level in range(len(spools))]
-    words = []
-    for level, (spool, source) in enumerate(zip(spools, sources, strict=True)):
-        write_ply(spool, source, rotation)
-        words += [str(source)] if chunk_width is None else [str(source), "-l", str(level)]
-    words += [str(path), "-g", "cpu"]
-    words += [] if chunk_width is None else ["-C", str(CHUNK), "-X", str(max(1, round(chunk_width)))]
-    command = [find_npx(), "--yes", PACKAGE, "-w", "-q", *words]
+def write_sog(spool: Spool, path: Path) -> None:
+    """Write a SOG, y down. Raises: InputError: no Node.js, or what the converter complains of."""
+    source = path.with_name(".sog.ply")
+    write_ply(spool, source)
+    command = [find_npx(), "--yes", PACKAGE, "-w", "-q", str(source), str(path), "-g", "cpu"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         message = " ".join((done.stderr or done.stdout).strip().splitlines()[-3:])
         raise InputError(f"exports: {PACKAGE} failed: {message or done.returncode}")
-    for source in sources:
-        source.unlink()
+    source.unlink()
 
 
-def write_spz(spool: Spool, path: Path | str, rotation: Float[Array, "3 3"], version: int = 3) -> None:
-    """Write Gaussians. rotation: rows of `axes.AXES`. Raises: ValueError: see `pack_spz`."""
+def write_spz(spool: Spool, path: Path | str, version: int = 3) -> None:
+    """Write Gaussians, y up. Raises: ValueError: see `pack_spz`."""
     with atomic_file(path) as part, part.open("wb") as file:
-        pack_spz(spool, file, rotation, version)
+        pack_spz(spool, file, version)
 
 
-def pack_spz(spool: Spool, file: BufferedIOBase, rotation: Float[Array, "3 3"], version: int) -> None:
-    """Write an SPZ to an open file. Raises: ValueError: another version, or none or too many Gaussians."""
+def pack_spz(spool: Spool, file: BufferedIOBase, version: int) -> None:
+    """Write an SPZ, y up, to an open file. Raises: ValueError: another version, or none or too many Gaussians."""
     if version not in (2, 3) or not 0 < len(spool) <= MAX_GAUSSIANS:
         raise ValueError(f"SPZ of version {version} with {len(spool)} Gaussians is not written")
     fraction = _choose_fraction(spool)
     pack_rotations = _pack_first_three if version == 2 else _pack_smallest_three
     columns: list[tuple[str, Callable[[Array], Array]]] = [
-        ("means", lambda v: _pack_positions(turn_points(v, rotation), fraction)),
+        ("means", lambda v: _pack_positions(turn_points(v, Y_UP), fraction)),
         ("opacity_logits", lambda v: _to_bytes(255 * expit(v.astype(float)))),
         ("dc", lambda v: _to_bytes((COLOUR_SCALE * v.astype(float) + 0.5) * 255)),
         ("log_scales", lambda v: _to_bytes((v.astype(float) - SMALLEST_LOG_SCALE) * SCALE_STEPS)),
-        ("quats", lambda v: pack_rotations(turn_quats(v, rotation))),
+        ("quats", lambda v: pack_rotations(turn_quats(v, Y_UP))),
     ]
     with gzip.GzipFile("", "wb", 6, file, mtime=0) as packed:  # no name and no time: the same bytes each time
         packed.write(np.array([MAGIC, version, len(spool)], "<u4").tobytes() + bytes([0, fraction, 0, 0]))

@@ -5,11 +5,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Float32, Float64
+from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.export.axes import turn_points, turn_quats
 from dav_gswt.field import GaussianField
 from dav_gswt.raster.interface import RIM
 
@@ -57,15 +56,14 @@ class Spool:
             while len(values := np.fromfile(file, "<f4", CHUNK * width)):
                 yield values.reshape(-1, width)
 
-    def find_box(self, rotation: Float[Array, "3 3"]) -> Box:
-        """The box along a format's axes (rows of `axes.AXES`) of the Gaussians as drawn: to RIM deviations.
+    def find_box(self) -> Box:
+        """The box of the Gaussians as drawn: to RIM deviations.
 
         Raises: ValueError: there is no Gaussian.
         """
         boxes = []
         for means, scales, quats in zip(*map(self.read, ("means", "log_scales", "quats")), strict=True):
-            points = turn_points(means, rotation).astype(float)
-            axes = Rotation.from_quat(turn_quats(quats, rotation), scalar_first=True).as_matrix()
+            points, axes = means.astype(float), Rotation.from_quat(quats, scalar_first=True).as_matrix()
             reach = RIM * np.sqrt(np.einsum("nij,nj->ni", axes**2, np.exp(2 * scales.astype(float))))
             boxes.append(((points - reach).min(0), (points + reach).max(0)))
         return unite_boxes(boxes)

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 import dav_gswt
-from dav_gswt.export.axes import Z_UP
 from dav_gswt.export.glb import COMPRESSION, EXTENSION, write_splats
 from dav_gswt.export.spool import Box, unite_boxes
 from dav_gswt.export.terrain_files import ExportJob
@@ -87,7 +86,7 @@ class _TreeWriter:
         with self.job.place(area, level) as placed:
             if len(placed):
                 self.count += len(placed)
-                boxes.append(placed.find_box(Z_UP))
+                boxes.append(placed.find_box())
                 uri = f"{level}/{area.west}_{area.south}.glb"
                 extras = {"unit": self.job.facts["unit"], "level": level}
                 write_splats(placed, self.folder / uri, extras, compressed=self.compressed)
@@ -114,7 +113,7 @@ def measure_errors(terrain: EndlessTerrain) -> list[float]:
 def split_area(area: Area, edge: int) -> list[Area]:
     """Blocks of `edge` by `edge` cells from the south-western one on, row by row; the last ones may be smaller."""
     return [
-        Area(area.west + i, area.south + j, min(edge, area.columns - i), min(edge, area.rows - j), area.disc)
+        Area(area.west + i, area.south + j, min(edge, area.columns - i), min(edge, area.rows - j))
         for j in range(0, area.rows, edge)
         for i in range(0, area.columns, edge)
     ]

@@ -78,7 +78,7 @@ def look_at(eye, target, up=(0.0, 0.0, 1.0)) -> tuple[Float[Array, "3 3"], Float
     return rotation, -rotation @ eye
 
 
-def pinhole(eye, target, width: int, height: int, fov_degrees: float, up=(0.0, 0.0, 1.0)) -> Camera:
+def pinhole(eye, target, width: int, height: int, fov_degrees: float | int, up=(0.0, 0.0, 1.0)) -> Camera:
     """A pinhole camera as of `look_at`; the field of view is measured across the picture's width."""
     rotation, translation = look_at(eye, target, up)
     focal = 0.5 * width / np.tan(0.5 * np.radians(fov_degrees))

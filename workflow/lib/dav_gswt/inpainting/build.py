@@ -2,29 +2,33 @@
 
 import logging
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import gaussian_filter, map_coordinates
 
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.images.lpips_weights import Weights
-from dav_gswt.inpainting import unseen
-from dav_gswt.inpainting.view_inpainting import LEAST_ALPHA, inpaint_view
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior import conditions
 from dav_gswt.prior.conditions import ReferencePhotos
-from dav_gswt.reconstruction import evaluation, underlay
+from dav_gswt.prior.interface import Condition
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
+from dav_gswt.reconstruction import underlay
 from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.threads import one_thread
 from dav_gswt.views import feasibility
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.prior_sampling import PriorConfig
+
+if TYPE_CHECKING:
+    import dav_gswt.prior.terrain
 
 _log = logging.getLogger(__name__)
 
@@ -32,6 +36,13 @@ BLOCK = 0.4  # flying heights: side of the ground under one camera, whose pictur
 ELEVATION, RADIUS = 80.0, 0.7  # degrees, flying heights: nearly from above, so that the picture's top is defined
 FIELD_OF_VIEW = 55.0  # degrees, as of the prior's training examples
 INSET = 2.0  # pixels along the border of a picture that are not used: the prior knows little of what lies beyond
+LEAST_UNCERTAINTY = 0.5  # of a disc that no photo fitted
+TOUCHED = 0.1  # share of a pixel's blend weight from which the pixel shows something of certain Gaussians
+LOOKS = 0.5  # share of a pixel's blend weight from which the pixel looks at certain Gaussians
+CELL = 4  # pixels per side of a cell of the latent, the unit of the mask of valid pixels
+SPREAD = 0.1  # pictures: how far a colour difference at the border of unseen pixels reaches into them
+FAR_WEIGHT = 0.05  # of the ground's mean colour, which prevails far from known pixels
+LEAST_ALPHA = 0.5  # by which a colour over black is divided, at least
 
 
 @dataclass(frozen=True)
@@ -75,7 +86,7 @@ def inpaint_field(
     Returns: the field itself, if there is nothing to inpaint or the field has no ground layer.
     Raises: ValueError: see `inpaint_view`.
     """
-    cells = unseen.find_unseen_cells(field, grid)
+    cells = find_unseen_cells(field, grid)
     _log.info("%d of %d cells of the ground were seen by no photo", cells.sum(), cells.size)
     if not cells.any():
         return InpaintingResult(field, cells, cells)
@@ -87,7 +98,7 @@ def inpaint_field(
     if not done.any():
         _log.info("none of them is visible: known objects cover them all")
         return InpaintingResult(field, cells, done)
-    marked = unseen.select_gaussians(field, grid, done)
+    marked = select_gaussians(field, grid, done)
     coloured = _colour_underlay(coloured, grid, marked)
     uncertainty = np.where(marked, np.float32(1), field.uncertainty)
     result = replace(coloured, uncertainty=uncertainty, imagined=field.imagined | marked)
@@ -111,12 +122,11 @@ def _colour_cells(
             view = [(pose, camera)]
             condition = conditions.build_condition(coloured, view, scene.photos, scene.frame.flying_height, size)
             shows, shows_left = (
-                unseen.render_share(coloured, unseen.select_gaussians(field, scene.grid, some), camera)
-                for some in (cells, left)
+                render_share(coloured, select_gaussians(field, scene.grid, some), camera) for some in (cells, left)
             )
-            touched = shows_left > unseen.TOUCHED
+            touched = shows_left > TOUCHED
             picture, alpha = inpaint_view(scene.config, condition, touched, scene.ground_colour)
-            good = (shows > unseen.LOOKS) & (alpha > LEAST_ALPHA)
+            good = (shows > LOOKS) & (alpha > LEAST_ALPHA)
             coloured, left = _colour_discs(coloured, left, camera, picture, good)
     return coloured, left
 
@@ -186,33 +196,89 @@ def place_camera(
     distance = RADIUS * frame.flying_height
     camera = camera_layouts.orbit(ELEVATION, 0.0, distance, target, size, size, FIELD_OF_VIEW)
     centre = camera.centre[None]
-    if (feasibility.find_below_ground(centre, grid) | feasibility.find_inside_objects(centre, field)).any():
+    below = grid.contains(centre) & (centre[:, 2] <= grid.height_at(centre))
+    if below.any() or feasibility.find_inside_objects(centre, field).any():
         return []
     return [(pose_of_camera("virtual", camera, frame), camera)]
 
 
-def evaluate_inpainting(
-    before: GaussianField, after: GaussianField, tests: list[TrainingView], weights: Weights | None = None
-) -> dict:
-    """Metrics of the field before and after, over `all` pixels of the modelled ground and over those of `imagined`
-    (inpainted) ground alone, and the number of pixels.
+def find_unseen_cells(field: GaussianField, grid: Ground) -> Bool[Array, "rows columns"]:
+    """The cells that no photo saw: not `seen` when the ground was coloured, and still uncertain after the fit.
 
-    The pixels are the same before and after: those that look at the inpainted discs. tests: weighted, see
-    `observation.mask_to_ground`.
-    Returns: the content of metrics.json; null under `imagined` if no test photo sees such ground.
+    The grid alone would include cells that were occluded before the fit, which often removes the occluder. No cell if
+    the field has no ground layer.
     """
+    n = grid.heights.size
+    if not field.ground[:n].any():
+        return np.zeros(grid.shape, bool)
+    return ~grid.seen & (field.uncertainty[:n] > LEAST_UNCERTAINTY).reshape(grid.shape)
 
-    def mask(view: TrainingView) -> TrainingView:
-        looks = unseen.mask_pixels(before, after.imagined, view.camera)
-        return replace(view, weight=np.where(looks, view.weight, np.float32(0)))
 
-    views = {"all": tests, "imagined": [mask(view) for view in tests]}
-    metrics = {
-        part: {
-            "before": evaluation.evaluate_field(before, masked, weights=weights),
-            "after": evaluation.evaluate_field(after, masked, weights=weights),
-            "pixels": int(sum((view.weight > 0).sum() for view in masked)),
-        }
-        for part, masked in views.items()
-    }
-    return metrics | {"gaussians": {"before": len(before), "after": len(after), "imagined": int(after.imagined.sum())}}
+def select_gaussians(field: GaussianField, grid: Ground, cells: Bool[Array, "rows columns"]) -> Bool[Array, "n"]:
+    """The discs of some cells, and the discs of the underlay that lie under such cells alone."""
+    marked = np.zeros(len(field), bool)
+    marked[: cells.size] = cells.ravel()
+    rows, s = underlay.find_rows(field, grid), underlay.STRIDE
+    if rows.stop > rows.start:
+        even = np.pad(cells, [(0, -size % s) for size in cells.shape], constant_values=True)
+        blocks = even.reshape(even.shape[0] // s, s, even.shape[1] // s, s).all((1, 3))
+        marked[rows] = blocks.ravel()
+    return marked
+
+
+def render_share(field: GaussianField, marked: Bool[Array, "n"], camera: Camera) -> Float32[Array, "h w"]:
+    """The share of marked Gaussians in the blend weight of every pixel; 0 in empty pixels."""
+    render = make_rasterizer().forward(**to_raster_arrays(field, marked.astype(np.float32)[:, None]), camera=camera)
+    return np.clip(render.colour[..., 0], 0, 1)
+
+
+def inpaint_view(
+    config: PriorConfig, condition: Condition, unseen: Bool[Array, "s s"], ground: Float[Array, "3"]
+) -> tuple[Float32[Array, "s s 3"], Float32[Array, "s s"]]:
+    """Colours as if opaque, and opacity, of one view: the mean of a prior's samples after `match_colours`.
+
+    The samples have no dropout, each starts from its own noise. Their mean is less sharp than one sample, but invents
+    less (docs/research/results/prior.md has figures).
+
+    Args:    config: of the terrain prior; no other prior takes a mask of valid cells. condition: of one view. unseen:
+             pixels that show what no photo saw; cells with such a pixel are not valid. ground: mean colour of the
+             ground that photos saw.
+    Raises:  ValueError: the prior gives something that is not finite.
+    """
+    model = cast("dav_gswt.prior.terrain.TerrainPrior", config.model)
+    size = len(unseen)
+    touched = unseen.reshape(size // CELL, CELL, size // CELL, CELL).any((1, 3))
+    with one_thread():
+        known = np.logical_not(touched)[None]
+        latents = model.sample(condition, config.samples, 0.0, config.steps, config.seed, known=known, common=False)
+        rgba = model.decode(latents).rgba[0].mean(0, dtype=np.float32)
+    if not np.isfinite(rgba).all():
+        raise ValueError("the prior's picture of a view is not finite")
+    alpha, render = rgba[..., 3], condition.colour[0]
+    colour = rgba[..., :3] / np.maximum(alpha, LEAST_ALPHA)[..., None]
+    certain = ~unseen & (condition.alpha[0] > 0.9)
+    return match_colours(colour, render, certain, unseen, ground), alpha
+
+
+def match_colours(
+    picture: Float32[Array, "s s 3"],
+    render: Float32[Array, "s s 3"],
+    known: Bool[Array, "s s"],
+    unseen: Bool[Array, "s s"],
+    ground: Float[Array, "3"],
+) -> Float32[Array, "s s 3"]:
+    """Shift the colours of a picture to those of the render in known pixels, without a drift between pictures.
+
+    The shift is a Gaussian-weighted mean (SPREAD pictures wide) of the differences in known pixels; far from all of
+    them it moves the mean of the unseen pixels to the colour of the ground. known and unseen are disjoint; other pixels
+    (the sky) are in neither.
+    """
+    sigma, difference = SPREAD * len(known), (render - picture).astype(float)
+    if unseen.any():
+        far = ground - picture[unseen].mean(0, dtype=float)
+    else:
+        far = difference[known].sum(0) / max(1, known.sum())
+    near = gaussian_filter(known.astype(float), sigma, mode="nearest")
+    sums = [gaussian_filter(known * difference[..., c], sigma, mode="nearest") for c in range(3)]
+    shift = (np.stack(sums, -1) + FAR_WEIGHT * far) / (near + FAR_WEIGHT)[..., None]
+    return np.clip(picture + shift, 0, 1).astype(np.float32)

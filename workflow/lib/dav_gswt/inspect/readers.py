@@ -16,14 +16,11 @@ import numpy as np
 import pyvista as pv
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray as Array
-from scipy import ndimage
-from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
 from dav_gswt.bundle import store as bundles
 from dav_gswt.errors import InputError
-from dav_gswt.export.terrain_files import TILES_PER_ROW
 from dav_gswt.field import GaussianField, read_field
 from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera, camera_from_json
@@ -51,7 +48,7 @@ GAP = 0.2  # between two fields or tiles, in their widths
 COLOURS = ("colour", "uncertainty")
 PATCH_COLOURS = [(187, 187, 187), (68, 119, 170), (238, 102, 119), (34, 136, 51), (204, 187, 68), (102, 204, 238)]
 PATCH_COLOURS += [(170, 51, 119), (153, 102, 51), (0, 0, 0)]
-CUT_COLOUR, CUT_WIDTH = (255, 214, 10), 0.012  # least width of a cut, in tile sides
+TILES_PER_ROW = 4
 HEXAGON = np.stack([np.cos(np.arange(6) * np.pi / 3), np.sin(np.arange(6) * np.pi / 3), np.zeros(6)], -1)
 OCTAHEDRON = np.concatenate([np.eye(3), -np.eye(3)])
 SIDES = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
@@ -180,12 +177,6 @@ def compute_colours(field: GaussianField, by: str) -> UInt8[Array, "n 3"]:
     return Bar("").map(field.uncertainty) if by == "uncertainty" else to_bytes(field.base_colours)
 
 
-def _shade(named: Int[Array, "#n 3"], field: GaussianField) -> UInt8[Array, "n 3"]:
-    """Colours of a legend, lighter and darker by each Gaussian's own brightness, so that shapes are visible."""
-    grey = np.clip(field.base_colours, 0, 1).mean(1)
-    return to_bytes(named / 255 * (1 + 1.5 * (grey - np.median(grey)))[:, None])
-
-
 def add_solids(scene: Scene, field: GaussianField, colours: UInt8[Array, "n 3"]) -> None:
     """Add Gaussians at one standard deviation.
 
@@ -208,7 +199,7 @@ def add_solids(scene: Scene, field: GaussianField, colours: UInt8[Array, "n 3"])
 
 @reader("seams.json", "labels.npz")
 def read_tile_set(path: Path, *, most: int, colour: str | None = None, level: int = 0) -> Scene:
-    """A set of tiles with their cuts."""
+    """A set of tiles, with --colour patch in the colours of the patches that they are cut from."""
     seams = path.parents[1] / "seams.json" if path.name == "labels.npz" else path
     with wrap_errors(seams):
         cut = tiles.read_tiles(seams.parent / "tiles", seams)
@@ -220,7 +211,7 @@ def read_tile_set(path: Path, *, most: int, colour: str | None = None, level: in
 
 @reader("davgswt.json")
 def read_bundle(path: Path, *, most: int, colour: str | None = None, level: int = 0) -> Scene:
-    """The quantized tiles of a bundle, without cuts."""
+    """The quantized tiles of a bundle."""
     bundle = bundles.read_bundle(path.parent)
     return _arrange_tiles(path, bundle.fields(), bundle.manifest.tile_side, None, colour, level, most)
 
@@ -234,24 +225,20 @@ def _arrange_tiles(
     level: int,
     most: int,
 ) -> Scene:
-    """All tiles of a level, so that neighbours match. cut: the tile set whose cuts are drawn; None: no cuts."""
+    """All tiles of a level, so that neighbours match. cut: the tile set, if its patches are known."""
     by = choose("colour", colour, (*COLOURS, "patch") if cut else COLOURS, path)
     _choose_levels(level, len(fields), path)
     count, step = len(fields[level]), side * (1 + GAP)
     scene = Scene(str(path), [f"{count} tiles, {len(fields)} levels, {side:.4g} wide; level {level} by {by}"])
     scene.viewer, scene.box = (-0.25, -1.0, 1.3), np.zeros((2, 3))
     scene.bars = [Bar("uncertainty")] if by == "uncertainty" else []
-    if cut:
-        scene.names = dict(zip(LABELS, PATCH_COLOURS, strict=True)) if by == "patch" else {"cut": CUT_COLOUR}
+    scene.names = dict(zip(LABELS, PATCH_COLOURS, strict=True)) if by == "patch" else {}
     for tile, corner in place_tiles(count, step):
         field = thin_field(fields[level][tile], most // count)
         if len(field):
-            patches = find_patches(field, cut, tile) if cut else np.zeros(len(field), int)
             placed = replace(field, means=field.means + corner.astype(np.float32))
-            named = _shade(np.array(PATCH_COLOURS)[patches], field)
-            add_solids(scene, placed, named if by == "patch" else compute_colours(field, by))
-        if cut and by != "patch" and len(field):
-            scene.add(make_cuts(cut, tile, level).translate(corner, inplace=False), CUT_COLOUR)
+            shown = shade_patches(field, cut, tile) if cut and by == "patch" else compute_colours(field, by)
+            add_solids(scene, placed, shown)
         middle = float(np.median(field.means[:, 2])) if len(field) else 0.0
         scene.add_label(f"{tile}", corner + [0.5 * side, -0.6 * GAP * side, middle], 0.1 * side)
         scene.box[1] = np.maximum(scene.box[1], corner + side * np.array([1.0, 1.0, 0.2]))
@@ -274,19 +261,11 @@ def find_patches(field: GaussianField, cut: TileSet, tile: int) -> Int[Array, "n
     return cut.labels[tile][row, column].astype(int)
 
 
-def make_cuts(cut: TileSet, tile: int, level: int) -> pv.DataSet:
-    """The cells where a tile's labels change, a little above the ground, and widened so that they are visible."""
-    labels, field = cut.labels[tile], cut.fields[level][tile]
-    edge = np.zeros(labels.shape, bool)
-    edge[:, 1:] |= labels[:, 1:] != labels[:, :-1]
-    edge[1:] |= labels[1:] != labels[:-1]
-    edge = ndimage.binary_dilation(edge, iterations=int(CUT_WIDTH * len(labels) / 2)) if len(labels) > 200 else edge
-    ground = field.means[field.ground] if field.ground.any() else field.means
-    x, y = np.meshgrid(*[(np.arange(len(labels)) + 0.5) * cut.spacing] * 2)
-    nearest = KDTree(ground[:, :2]).query(np.stack([x, y], -1))[1]
-    heights = ground[nearest, 2].astype(float) + cut.spacing * 2**level
-    grid = Ground(0.0, 0.0, cut.spacing, 0, 0, len(labels), heights, edge)
-    return make_surface(grid, 1).extract_cells(np.flatnonzero(edge))
+def shade_patches(field: GaussianField, cut: TileSet, tile: int) -> UInt8[Array, "n 3"]:
+    """Colours of the patches, lighter and darker by each Gaussian's own brightness, so that shapes are visible."""
+    named = np.array(PATCH_COLOURS)[find_patches(field, cut, tile)]
+    grey = np.clip(field.base_colours, 0, 1).mean(1)
+    return to_bytes(named / 255 * (1 + 1.5 * (grey - np.median(grey)))[:, None])
 
 
 def make_surface(grid: Ground, step: int) -> pv.PolyData:

@@ -16,9 +16,8 @@ from dav_gswt.logs import progress
 from dav_gswt.materials import extraction, outlines, segmentation
 from dav_gswt.materials.borders import measure_bend, measure_fray
 from dav_gswt.materials.classes import GroundClasses, classify_ground
-from dav_gswt.materials.filling import box_sums, fill_cells
+from dav_gswt.materials.filling import fill_cells
 from dav_gswt.materials.maps import GroundMaps, measure_ground, read_masks
-from dav_gswt.materials.mobilesam import Segmenter
 from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import energy, layout, patches, texture
@@ -105,7 +104,6 @@ def find_materials(
     grid: Ground,
     seed: int,
     mask_files: Mapping[str, Path | str] | None = None,
-    segmenter: Segmenter | None = None,
 ) -> FoundMaterials:
     """Find the materials of a field's exemplar and the objects on them.
 
@@ -115,7 +113,6 @@ def find_materials(
 
     Args:
         mask_files: by material, or `exclude`; see `maps.read_masks`.
-        segmenter: finds the outlines of objects; None: they are cut by colour and height.
     """
     maps = measure_ground(field, grid)
     if not field.ground.any():
@@ -124,7 +121,7 @@ def find_materials(
     masks = read_masks(mask_files, maps.cells) if mask_files else None
     classes = classify_ground(maps, masks)
     free = replace(maps, known=maps.known & ~classes.excluded)
-    refined = replace(classes, footprints=outlines.refine_footprints(free, classes.footprints, segmenter))
+    refined = replace(classes, footprints=outlines.refine_footprints(free, classes.footprints))
     # what stood out beside the closer outlines is shown nowhere
     classes = replace(refined, excluded=classes.excluded | (classes.occupied & ~refined.occupied))
     sources = [_ignore_scarce(classes, k) for k in range(classes.number)]
@@ -242,7 +239,7 @@ def choose_window(own: Bool[Array, "m m"], tile_side: float) -> tuple[int, int, 
     least = min(m, ROOM * tile_side)
     sides = sorted({min(m, -(-int(max(share * m, least)) // unit) * unit) for share in WINDOWS}, reverse=True)
     for side in sides:
-        counts = box_sums(own, side)
+        counts = patches.box_sums(own, side, side)
         if counts.max() >= OWN_SHARE * side * side or side == sides[-1]:
             row, column = np.unravel_index(int(counts.argmax()), counts.shape)
             return int(row), int(column), side

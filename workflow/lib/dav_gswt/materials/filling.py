@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
 from dav_gswt.tiles.energy import CostLayer, compute_edge_costs, find_cut
-from dav_gswt.tiles.patches import divide_by_median
+from dav_gswt.tiles.patches import box_sums, divide_by_median
 
 CANDIDATES = 160  # places that are compared for a patch
 COMPARED = 256  # cells of a patch that they are compared by
@@ -74,15 +74,7 @@ def find_places(source: Bool[Array, "m m"], patch: int) -> Int[Array, "n 2"]:
     """South-western cells (row, column) of all squares of `patch` cells that lie in the source."""
     if patch > len(source):
         return np.zeros((0, 2), int)
-    return np.argwhere(box_sums(source, patch) == patch * patch)
-
-
-def box_sums(values: Array, side: int) -> Array:
-    """Sum over the square of `side` x `side` cells from each cell to the north-east that fits the map."""
-    total = np.zeros((values.shape[0] + 1, values.shape[1] + 1), np.float64 if values.dtype.kind == "f" else np.int64)
-    np.cumsum(values, 0, out=total[1:, 1:])
-    np.cumsum(total[1:, 1:], 1, out=total[1:, 1:])
-    return total[side:, side:] - total[:-side, side:] - total[side:, :-side] + total[:-side, :-side]
+    return np.argwhere(box_sums(source, patch, patch) == patch * patch)
 
 
 class _Filling:
@@ -98,7 +90,7 @@ class _Filling:
 
     def next_corner(self) -> tuple[int, int] | None:
         """Where the next patch goes: of the places on a grid that are not full, the one with most known cells."""
-        counts = box_sums(self.known, self.patch)[np.ix_(self.starts, self.starts)]
+        counts = box_sums(self.known, self.patch, self.patch)[np.ix_(self.starts, self.starts)]
         counts = np.where(counts == self.patch**2, -1, counts)
         row, column = np.unravel_index(int(counts.argmax()), counts.shape)
         return None if counts.max() < 0 else (int(self.starts[row]), int(self.starts[column]))
@@ -127,7 +119,7 @@ class _Filling:
         wanted = self.features[here[0][y, x], here[1][y, x]]
         found = self.features[drawn[:, :1] + y, drawn[:, 1:] + x]
         cost = divide_by_median(((found - wanted) ** 2).sum(-1).mean(-1)) if len(y) else np.zeros(len(drawn))
-        often = box_sums(self.shown, self.patch)[drawn[:, 0], drawn[:, 1]] / self.patch**2
+        often = box_sums(self.shown, self.patch, self.patch)[drawn[:, 0], drawn[:, 1]] / self.patch**2
         best = drawn[int(np.argmin(cost + REPEAT_COST * often))]
         return int(best[0]), int(best[1])
 

@@ -1,10 +1,9 @@
-"""Outlines of objects, refined: by a segmenter that is prompted with an object's box, or by a graph cut.
+"""Outlines of objects, refined by a graph cut.
 
 The cut separates an object from the ground around it (as GrabCut, Rother et al. 2004) by the colours
 and heights of both, with borders where the map has an edge.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,16 +21,9 @@ from scipy.ndimage import (
 from scipy.special import logsumexp
 
 from dav_gswt.materials.maps import GroundMaps, unite
-from dav_gswt.materials.mobilesam import Segmenter
 from dav_gswt.materials.objects import BORDER, Footprint
 
-Finder = Callable[[Array], Array | None]  # a footprint's cells to those of what is there, or None
-
 LEAST_AGREEMENT = 0.4  # IoU of a refined outline with the one before it: less is another thing
-GROWN = 1  # cells that a prompt is wider than the footprint, to each side
-LEAST_REST = 0.1  # of a footprint: what an outline left out may be another object
-REST_WIDTH = 1 / 6  # of the root of the footprint's area: narrower parts of such a rest do not count
-LEAST_WIDTH = 4  # cells, of such an object
 AROUND, LEAST_AROUND = 0.5, 4  # of the footprint's box, and cells: what the cut sees beside it, to each side
 CORE = 0.5  # of the depth of a footprint: deeper cells are the object for sure
 REACH = 0.5  # of that depth: ground farther from a footprint is none of the object
@@ -43,42 +35,44 @@ UNLIKELY = 10.0  # largest difference of two labels' costs
 SMOOTHING = 3.0  # cost of a border between two cells that look alike, in units of log likelihood
 
 
-def refine_footprints(
-    maps: GroundMaps, footprints: list[Footprint], segmenter: Segmenter | None = None
-) -> list[Footprint]:
+def refine_footprints(maps: GroundMaps, footprints: list[Footprint]) -> list[Footprint]:
     """The footprints in their order, each with a closer outline where one is found, else as it is.
 
     A new outline is one piece, without holes, on known ground, apart from the border and from all other
-    footprints, and has LEAST_AGREEMENT with the old one. A segmenter may find that a footprint holds
-    several objects: the others come last. segmenter: None: by graph cut.
+    footprints, and has LEAST_AGREEMENT with the old one.
     """
+    from skimage.color import rgb2lab  # here, not above: it takes half a second to load
+
     if not footprints:
         return []
-    find = _prompt_segmenter(maps, segmenter) if segmenter else _cut_objects(maps, footprints)
+    features = np.dstack([rgb2lab(maps.colour), HEIGHT_WEIGHT * maps.surface / maps.exemplar.spacing])
+    objects = unite([each.cells for each in footprints], maps.known.shape)
+    ground = maps.known & ~binary_dilation(objects, iterations=RING)  # what may be another object is no ground
     allowed = np.zeros_like(maps.known)
     inside = np.s_[BORDER : maps.cells - BORDER]
     allowed[inside, inside] = maps.known[inside, inside]
     taken, refined = np.sum([each.cells for each in footprints], axis=0, dtype=int), []
     for footprint in footprints:
         own = footprint.cells
-        new = accept_outline(own, find(own), allowed & (taken - own == 0))
+        rows, columns = find_objects(own.astype(int))[0]
+        margins = [max(LEAST_AROUND, round(AROUND * (side.stop - side.start))) for side in (rows, columns)]
+        box = tuple(
+            slice(max(0, s.start - more), s.stop + more) for s, more in zip((rows, columns), margins, strict=True)
+        )
+        new = None
+        if (cut := cut_object(features[box], own[box], ground[box])) is not None:
+            found = np.zeros_like(own)
+            found[box] = cut
+            new = accept_outline(own, found, allowed & (taken - own == 0))
         taken = taken - own + (own if new is None else new)
         refined.append(footprint if new is None else replace(footprint, cells=new))
-    rests = [rest for pair in zip(footprints, refined, strict=True) for rest in _list_rests(*pair)]
-    for rest in rests if segmenter else []:
-        new = accept_outline(rest.cells, find(rest.cells), allowed & (taken == 0))
-        if new is not None and binary_opening(new, np.ones((LEAST_WIDTH, LEAST_WIDTH), bool)).any():
-            taken = taken + new
-            refined.append(replace(rest, cells=new))
     return refined
 
 
 def accept_outline(
-    before: Bool[Array, "m m"], found: Bool[Array, "m m"] | None, allowed: Bool[Array, "m m"]
+    before: Bool[Array, "m m"], found: Bool[Array, "m m"], allowed: Bool[Array, "m m"]
 ) -> Bool[Array, "m m"] | None:
     """The piece of a new outline, without threads, that has most of the old one; None where they do not agree."""
-    if found is None:
-        return None
     pieces, _ = label(binary_opening(found & allowed, np.ones((2, 2), bool)))
     inside = np.bincount(pieces[before], minlength=1)
     inside[0] = 0
@@ -87,51 +81,6 @@ def accept_outline(
     piece = binary_fill_holes(pieces == int(inside.argmax())) & allowed
     agreement = (piece & before).sum() / (piece | before).sum()
     return piece if agreement >= LEAST_AGREEMENT else None
-
-
-def _list_rests(old: Footprint, new: Footprint) -> list[Footprint]:
-    """Pieces of a footprint that its new outline left out, where they may be other objects."""
-    area = int(old.cells.sum())
-    width = max(3, round(REST_WIDTH * area**0.5))
-    pieces, number = label(binary_opening(old.cells & ~new.cells, np.ones((width, width), bool)))
-    parts = [pieces == piece for piece in range(1, number + 1)]
-    return [replace(old, cells=part) for part in parts if part.sum() >= LEAST_REST * area]
-
-
-def _prompt_segmenter(maps: GroundMaps, segmenter: Segmenter) -> Finder:
-    """Finds what is in a footprint's box. The segmenter is shown the map with north up."""
-    find_in_box = segmenter.open_picture(maps.colour[::-1])
-
-    def find(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"] | None:
-        rows, columns = np.nonzero(cells[::-1])
-        low = np.array([columns.min(), rows.min()]) - GROWN
-        high = np.array([columns.max(), rows.max()]) + 1 + GROWN
-        mask = find_in_box(np.clip(np.concatenate([low, high]), 0, maps.cells).astype(float))
-        return None if mask is None else mask[::-1]
-
-    return find
-
-
-def _cut_objects(maps: GroundMaps, footprints: list[Footprint]) -> Finder:
-    """Cuts an object out of its surroundings; what may be another object is not taken for ground."""
-    from skimage.color import rgb2lab  # here, not above: it takes half a second to load
-
-    relief = maps.surface / maps.exemplar.spacing
-    features = np.dstack([rgb2lab(maps.colour), HEIGHT_WEIGHT * relief])
-    objects = unite([each.cells for each in footprints], maps.known.shape)
-    ground = maps.known & ~binary_dilation(objects, iterations=RING)
-
-    def find(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"] | None:
-        own, found = find_objects(cells.astype(int))[0], np.zeros_like(cells)
-        margins = [max(LEAST_AROUND, round(AROUND * (side.stop - side.start))) for side in own]
-        box = tuple(slice(max(0, s.start - more), s.stop + more) for s, more in zip(own, margins, strict=True))
-        inside = cut_object(features[box], cells[box], ground[box])
-        if inside is None:
-            return None
-        found[box] = inside
-        return found
-
-    return find
 
 
 def cut_object(

@@ -62,11 +62,6 @@ class Difference:
 Segmentation = tuple[Int[Array, "m m"], list[Bool[Array, "m m"]]]
 
 
-def segment_ground(colour: Float[Array, "m m 3"]) -> Segmentation:
-    """The segmentation of an exemplar that explains most of its variance: see `list_segmentations`."""
-    return next(list_segmentations(colour))
-
-
 def list_segmentations(colour: Float[Array, "m m 3"]) -> Iterator[Segmentation]:
     """Segmentations from every start of k-means, the one that explains most of the variance first.
 

@@ -105,47 +105,35 @@ def count_shared_points(model: ColmapModel) -> Int[Array, "images images"]:
 
 
 def triangulate_points(
-    model: ColmapModel, names: Sequence[str], photos: Path | str | None = None, at_least: int = 2
+    model: ColmapModel, names: Sequence[str], photos: Path | str
 ) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
-    """Points and their colours as structure from motion would know them from the named images alone.
-
-    The points are those of `triangulate_model`. Colours are means over the named images in the folder `photos`; without
-    it they are mid-grey, since the colours of the model come from images that may not be captured yet.
-    """
-    part = triangulate_model(model, names, at_least)
-    colours = part.colours if photos is None else colour_points(part, [Path(photos) / name for name in part.names])
-    return part.points, colours
+    """Points as of `triangulate_model`, and their mean colours over the named images in the folder `photos`."""
+    part = triangulate_model(model, names)
+    return part.points, colour_points(part, [Path(photos) / name for name in part.names])
 
 
-def triangulate_model(model: ColmapModel, names: Sequence[str], at_least: int = 2) -> ColmapModel:
+def triangulate_model(model: ColmapModel, names: Sequence[str]) -> ColmapModel:
     """The model of the named images alone, its points found anew from what these see; colours are mid-grey.
 
     A point is the one nearest to its rays in the sense of least squares, sum_i |(I - d_i d_i^T)(p - c_i)|^2 over ray
-    directions d_i and camera centres c_i, in closed form. Points seen by fewer than `at_least` of the images, off by
+    directions d_i and camera centres c_i, in closed form. Points seen by one image, off by
     more than WORST_ERROR in one of them, behind one, or under rays narrower than LEAST_ANGLE are left out.
     Cameras stay: in a replay they stand for the vehicle's own positioning.
-    Raises: InputError: a name that the model does not have. ValueError: at_least below 2, as one ray has no crossing.
+    Raises: InputError: a name that the model does not have.
     """
-    if at_least < 2:
-        raise ValueError("a point needs at least two rays")
     if unknown := sorted(set(names) - set(model.names)):
         raise InputError(f"{unknown[0]}: no such image in the model; it may not have been registered")
     part = _with_images(model, [i for i, name in enumerate(model.names) if name in set(names)])
     part = replace(part, colours=np.full(model.points.shape, 0.5, np.float32))
-    part = _with_points(part, np.bincount(part.point_of, minlength=len(part.points)) >= at_least)
-    points, spread = _intersect_rays(part)
+    part = _with_points(part, np.bincount(part.point_of, minlength=len(part.points)) >= 2)
+    points, spread = intersect_rays(part)
     part = replace(part, points=points)
     good = spread >= 1 - np.cos(np.radians(LEAST_ANGLE))
     np.logical_and.at(good, part.point_of, reprojection_errors(part) <= WORST_ERROR)
     return _with_points(part, good)
 
 
-def measure_parallax(model: ColmapModel) -> Float[Array, "n"]:
-    """1 - cos of the angle under which each point is seen: see `_intersect_rays`."""
-    return _intersect_rays(model)[1]
-
-
-def _intersect_rays(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:
+def intersect_rays(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:
     """The points nearest to their rays, and how well the rays fix them.
 
     The second is the least eigenvalue of sum_i (I - d_i d_i^T): for two rays at angle a it is 1 - cos a, 0 where all
@@ -263,6 +251,12 @@ def model_from_reconstruction(
     )
 
 
+def make_lens(camera: Camera) -> pycolmap.Camera:
+    """The lens of a camera for pycolmap."""
+    params = [camera.fx, camera.fy, camera.cx, camera.cy]
+    return pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
+
+
 def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
     """Write a COLMAP model (binary) into an existing folder; images are numbered from 1 in the model's order."""
     silence_pycolmap()
@@ -273,11 +267,9 @@ def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
         lens = (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
         if lens not in numbers:
             numbers[lens] = len(numbers) + 1
-            stored.add_camera_with_trivial_rig(
-                pycolmap.Camera(
-                    camera_id=numbers[lens], model="PINHOLE", width=lens[0], height=lens[1], params=lens[2:]
-                )
-            )
+            new = make_lens(camera)
+            new.camera_id = numbers[lens]
+            stored.add_camera_with_trivial_rig(new)
         own = np.flatnonzero(model.image_of == i)
         place[own] = np.arange(len(own))
         image = pycolmap.Image(name=name, keypoints=model.pixels[own], camera_id=numbers[lens], image_id=i + 1)

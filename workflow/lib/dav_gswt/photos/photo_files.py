@@ -115,11 +115,10 @@ def _read_numbers(tags: dict, name: str) -> list[float]:
     return numbers
 
 
-def split_name(name: str) -> tuple[str, str, str]:
-    """Path without suffix, file name, and stem. Only suffixes of pictures count, as names may have other dots."""
+def split_stem(name: str) -> str:
+    """The file name without its suffix. Only suffixes of pictures count, as names may have other dots."""
     path = PurePosixPath(name)
-    bare = path.with_suffix("") if path.suffix.lower() in image_files.SUFFIXES and path.stem else path
-    return str(bare), path.name, bare.name
+    return path.stem if path.suffix.lower() in image_files.SUFFIXES and path.stem else path.name
 
 
 def name_pictures(names: Sequence[str]) -> list[str]:
@@ -129,10 +128,10 @@ def name_pictures(names: Sequence[str]) -> list[str]:
     Blanks and # become _, so that a name is one word in every list of images.
     """
     safe = [UNSAFE.sub("_", name) for name in names]
-    stems = Counter(split_name(name)[2] for name in safe)
+    stems = Counter(split_stem(name) for name in safe)
     out, used = [], set()
     for name in safe:
-        stem = split_name(name)[2]
+        stem = split_stem(name)
         plain = stem if stems[stem] == 1 else name.replace("/", "_").replace(".", "_")
         number, free = 1, plain
         while free in used:

@@ -1,8 +1,8 @@
 """Training views: a photo with its camera at the size of a preset, and a weight per pixel for the fit."""
 
 import mmap
+import resource
 import tempfile
-import weakref
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,70 +18,39 @@ from dav_gswt.photos.capture_record import read_capture_record
 
 WHOLE = 0.99  # of a shrunk pixel that must not be masked for it to count
 IN_MEMORY = 300e6  # bytes of all photos, beyond which they lie in files (a fit holds them about four times)
-SEGMENT = 1 << 30  # bytes of a file of arrays; a larger array has a file of its own
+OPEN_FILES = 10_000  # of the process, at most; one for each array in a file
 
 
 class ArrayFile:
     """Stores arrays in unnamed files of a folder, so that photos need not fit into memory.
 
-    The files vanish when the process ends, however it ends. Stored arrays are read-only maps of
+    The files vanish with the arrays, or when the process ends. Stored arrays are read-only maps of
     them. What was read stays in memory until it is released (`release_pages`) or the system needs
-    the room. The room of an array that nothing refers to any more is used again.
+    the room.
     """
 
     def __init__(self, folder: Path | str):
         self.folder = Path(folder)
-        self._segments: list[_Segment] = []
-        self._free: dict[int, list[tuple[_Segment, int]]] = {}  # by size
+        self.folder.mkdir(parents=True, exist_ok=True)
+        now, most = resource.getrlimit(resource.RLIMIT_NOFILE)  # each map keeps its file open
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(now, min(most, OPEN_FILES)), most))
 
     def store(self, array: Array) -> Array:
         """The array's bytes on disk, as a read-only array. Raises: OSError: the disk is full."""
-        array = np.ascontiguousarray(array)
         if not array.nbytes:
             return array
-        room = -(-array.nbytes // mmap.ALLOCATIONGRANULARITY) * mmap.ALLOCATIONGRANULARITY
-        segment, offset = self._find_room(room)
-        segment.file.seek(offset)
-        segment.file.write(array.reshape(-1).view(np.uint8).data)
-        segment.file.flush()
-        root = np.frombuffer(segment.map, array.dtype, array.size, offset)  # what all views of it refer to
-        weakref.finalize(root, self._free.setdefault(room, []).append, (segment, offset))
-        return root.reshape(array.shape)
-
-    def _find_room(self, room: int) -> tuple["_Segment", int]:
-        if self._free.get(room):
-            return self._free[room].pop()
-        if not self._segments or self._segments[-1].end + room > self._segments[-1].size:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            self._segments.append(_Segment(self.folder, max(room, SEGMENT)))
-        segment = self._segments[-1]
-        segment.end += room
-        return segment, segment.end - room
-
-
-class _Segment:
-    """A file and the map of it. end: bytes in use."""
-
-    def __init__(self, folder: Path, size: int):
-        self.file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115  it lives as long as its arrays
-        self.file.truncate(size)  # takes no room before it is written
-        self.map = mmap.mmap(self.file.fileno(), size, access=mmap.ACCESS_READ)
-        self.size, self.end = size, 0
+        with tempfile.TemporaryFile(dir=self.folder) as file:
+            file.write(np.ascontiguousarray(array).data)
+            file.flush()
+            return np.asarray(np.memmap(file, array.dtype, "r", shape=array.shape))
 
 
 def release_pages(array: Array) -> None:
     """Give back the memory that reading an array of an ArrayFile took, until it is read again; nothing for others."""
     while isinstance(array.base, Array):
         array = array.base
-    file_map = array.base.obj if isinstance(array.base, memoryview) else array.base
-    if isinstance(file_map, mmap.mmap):
-        start = _address(array) - _address(np.frombuffer(file_map, np.uint8, 1))
-        whole = -(-array.nbytes // mmap.PAGESIZE) * mmap.PAGESIZE
-        file_map.madvise(mmap.MADV_DONTNEED, start, whole)
-
-
-def _address(array: Array) -> int:
-    return array.__array_interface__["data"][0]
+    if isinstance(array.base, mmap.mmap):
+        array.base.madvise(mmap.MADV_DONTNEED)
 
 
 @dataclass(frozen=True)
@@ -119,34 +88,12 @@ def one_by_one(views: Iterable[TrainingView]) -> Iterator[TrainingView]:
         view.release()
 
 
-def open_array_file(cameras: Iterable[Camera], size: int, folder: Path | str) -> ArrayFile | None:
-    """Where photos of these cameras, at most `size` pixels wide or high, lie; None: in memory, as they take little."""
-    shares = [(camera, min(1.0, size / max(camera.width, camera.height))) for camera in cameras]
-    total = sum(12 * camera.width * camera.height * share**2 for camera, share in shares)
-    return ArrayFile(folder) if total > IN_MEMORY else None
-
-
-def make_training_view(
-    name: str,
-    camera: Camera,
-    image: Float32[Array, "h w 3"],
-    size: int,
-    cover: Float32[Array, "h w"] | None = None,
-) -> TrainingView:
-    """A view at most `size` pixels wide or high; photos are never enlarged. cover: 0 where the photo is masked."""
-    width, height = image_files.fit_size(camera.width, camera.height, size)
-    if (width, height) != (camera.width, camera.height):
-        image, camera = image_files.shrink_image(image, width, height), camera.resized(width, height)
-        cover = cover if cover is None else image_files.shrink_image(cover[..., None], width, height)[..., 0]
-    weight = np.ones(image.shape[:2]) if cover is None else cover > WHOLE
-    return TrainingView(name, camera, image, weight.astype(np.float32))
-
-
 def read_training_view(
     name: str, camera: Camera, path: Path | str, size: int, arrays: ArrayFile | None = None
 ) -> TrainingView:
-    """The view of a picture file; what its alpha masks does not count. arrays: where it lies; None: in memory.
+    """The view of a picture file, at most `size` pixels wide or high; photos are never enlarged.
 
+    What its alpha masks does not count. arrays: where it lies; None: in memory.
     Raises: InputError: not readable as an image, or smaller than the camera's picture.
     """
     image, cover = image_files.read_photo_and_alpha(path)
@@ -155,8 +102,12 @@ def read_training_view(
             f"{path}: {image.shape[1]} x {image.shape[0]} pixels, its camera takes {camera.width} x {camera.height}; "
             "make the photos again"
         )
-    view = replace(make_training_view(name, camera, image, size, cover), arrays=arrays)
-    return view.with_pixels(image=view.image, weight=view.weight)
+    width, height = image_files.fit_size(camera.width, camera.height, size)
+    if (width, height) != (camera.width, camera.height):
+        image, camera = image_files.shrink_image(image, width, height), camera.resized(width, height)
+        cover = image_files.shrink_image(cover[..., None], width, height)[..., 0]
+    weight = (cover > WHOLE).astype(np.float32)
+    return TrainingView(name, camera, image, weight, arrays=arrays).with_pixels(image=image, weight=weight)
 
 
 def read_captured_views(folder: Path | str, size: int, arrays: ArrayFile | None = None) -> list[TrainingView]:
@@ -195,7 +146,9 @@ def read_training_views(
     known = read_colmap_model(model)
     cameras = [known.camera(name) for name in names]
     taken = [photo.camera for folder in captures for photo in read_capture_record(folder)]
-    arrays = None if files is None else open_array_file([*cameras, *taken], size, files)
+    sides = [image_files.fit_size(camera.width, camera.height, size) for camera in [*cameras, *taken]]
+    large = sum(12 * width * height for width, height in sides) > IN_MEMORY
+    arrays = ArrayFile(files) if files is not None and large else None
     start = [
         read_training_view(name, camera, Path(images_folder) / name, size, arrays)
         for name, camera in zip(names, cameras, strict=True)

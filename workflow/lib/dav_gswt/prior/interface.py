@@ -81,7 +81,3 @@ class Prior(Protocol):
     def decode(self, latents: Float32[Array, "*n c hz wz"]) -> DecodedViews:
         """The pictures of latents."""
         ...
-
-    def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
-        """The latents of the field's render: samples equal them where the render is what the prior expects."""
-        ...

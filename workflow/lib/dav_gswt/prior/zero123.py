@@ -88,16 +88,13 @@ class Zero123:
     name, size = "zero123", SIZE
 
     def __init__(self, networks: Zero123Networks, guidance: float = GUIDANCE, device: str = "cpu"):
-        """Raises: ValueError: a guidance below 1 or not finite."""
-        if not 1 <= guidance < float("inf"):
-            raise ValueError(f"guidance is {guidance}; it must be at least 1 (none)")
         self.networks, self.guidance, self.device = networks, guidance, device
         for network in (networks.unet, networks.vae, networks.image_encoder, networks.projection):
             network.to(device)
 
     @classmethod
     def open(cls, folder: Path | str, guidance: float = GUIDANCE, device: str = "cpu") -> "Zero123":
-        """Raises: InputError: see load_networks. ValueError: see __init__."""
+        """Raises: InputError: see load_networks."""
         return cls(load_networks(folder), guidance, device)
 
     def sample(
@@ -124,14 +121,6 @@ class Zero123:
             parts = [vae.decode(part / vae.config.scaling_factor).sample.cpu() for part in flat.split(VAE_BATCH)]
         pictures = ((torch.cat(parts) + 1) / 2).clamp(0, 1).numpy().transpose(0, 2, 3, 1)
         return DecodedViews(remove_white(pictures).reshape(*latents.shape[:-3], SIZE, SIZE, 4), None)
-
-    def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
-        """See `Prior`: the render over white, the background of its pictures."""
-        over_white = np.clip(condition.colour + (1 - condition.alpha)[..., None], 0, 1)
-        vae, parts = self.networks.vae, _to_tensor(over_white).to(self.device).split(VAE_BATCH)
-        with torch.inference_mode():
-            modes = [vae.encode(2 * part - 1).latent_dist.mode().cpu() for part in parts]
-        return (torch.cat(modes) * vae.config.scaling_factor).numpy()
 
     def _encode_condition(self, condition: Condition) -> tuple[Tensor, Tensor]:
         """The latents of the photos, and one token each."""

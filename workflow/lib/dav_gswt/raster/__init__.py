@@ -28,28 +28,16 @@ __all__ = [
 
 
 def render(
-    field: GaussianField,
-    camera: Camera,
-    background: float | tuple[float | int, ...] | Float[Array, "c"] = 0.0,
-    colours: Float[Array, "n c"] | None = None,
-    backend: str | None = None,
-    threads: int | None = None,
-    *,
-    near: float = 0.01,
-    dilation: float = 0.3,
-    antialiased: bool = False,
+    field: GaussianField, camera: Camera, background: float | tuple[float | int, ...] | Float[Array, "c"] = 0.0
 ) -> Rendering:
     """Render a field: colour = sum of w_i c_i + (1 - alpha) background, alpha = sum of w_i, depth = sum of w_i z_i.
 
-    background: one value, or one a channel. colours: any number of channels a Gaussian; by default its spherical
-    harmonics seen from the camera. backend: by default the one in use. near, dilation, antialiased: see `Rasterizer`.
-    Raises: ValueError: an unknown backend, shapes that do not fit, a value that is not finite, with its index.
+    background: one value, or one a channel.
+    Raises: ValueError: a value of the field that is not finite, with its index.
     """
-    raster = make_rasterizer(backend, near=near, dilation=dilation, antialiased=antialiased, threads=threads)
-    arrays = to_raster_arrays(field, colours)
-    seen = raster.forward(**{k: np.ascontiguousarray(a, np.float32) for k, a in arrays.items()}, camera=camera)
-    behind, channels = np.asarray(background, np.float32), seen.colour.shape[2]
-    if behind.shape not in ((), (channels,)):
-        raise ValueError(f"background must have one value or {channels}, one a channel, not {behind.size}")
-    behind = np.broadcast_to(behind, channels)
+    arrays = to_raster_arrays(field)
+    seen = make_rasterizer().forward(
+        **{k: np.ascontiguousarray(a, np.float32) for k, a in arrays.items()}, camera=camera
+    )
+    behind = np.broadcast_to(np.asarray(background, np.float32), seen.colour.shape[2])
     return Rendering(composite(seen.colour, seen.alpha, behind), seen.alpha, seen.depth)

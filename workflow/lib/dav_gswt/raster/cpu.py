@@ -63,24 +63,20 @@ class Rasterizer(interface.Rasterizer):
 
     def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, int]:
         arrays, size = vars(gaussians).values(), (camera.height, camera.width)
-        features = gaussians.features
-        rendering = Rendering(
-            np.empty((*size, gaussians.colours.shape[-1]), np.float32),
-            np.empty(size, np.float32),
-            np.empty(size, np.float32),
-            None if features is None else np.empty((*size, features.shape[1]), np.float32),
-        )
+        shapes = (*size, gaussians.colours.shape[-1]), size, size
+        rendering = Rendering(*(np.empty(shape, np.float32) for shape in shapes))
         threads = 1 if len(gaussians.means) + size[0] * size[1] < MIN_PARALLEL else self.threads
         view = _pack_camera(camera, self.near, self.dilation), *size[::-1], bool(camera.orthographic), self.antialiased
-        if not self._core.forward(*arrays, *view, *vars(rendering).values(), threads):
+        if not self._core.forward(*arrays, None, *view, *vars(rendering).values(), None, threads):
             gaussians.check_values()
         return rendering, threads
 
     def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
-        out = Gradients(**{name: self._memory.take(name, a.shape) for name, a in last.gaussians.by_name().items()})
-        parts = *vars(last.gaussians).values(), *vars(last.rendering).values(), *given.values(), *vars(out).values()
+        out = Gradients(**{name: self._memory.take(name, a.shape) for name, a in vars(last.gaussians).items()})
+        parts = vars(last.gaussians), vars(last.rendering), given, vars(out)
+        arrays = (array for part in parts for array in (*part.values(), None))  # None: features, which nothing uses
         by_camera = np.empty(6, np.float32)  # by the camera's motion, which nothing uses
-        self._core.backward(*parts, by_camera, last.state)
+        self._core.backward(*arrays, by_camera, last.state)
         return out
 
     def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
@@ -98,11 +94,6 @@ class Rasterizer(interface.Rasterizer):
     def count_pairs(self) -> int:
         """Pairs of a pixel and a splat that is blended into it, of the last forward pass."""
         return int(self._core.pairs(self._require_forward().state))
-
-    @property
-    def stage_seconds(self) -> dict[str, float]:
-        """Seconds of each stage of the last forward and the last backward pass."""
-        return self._core.seconds
 
 
 class _MemoryPool:

@@ -102,21 +102,18 @@ class Rasterizer(interface.Rasterizer):
         return total, maximum, torch.stack(mapped, 1) if mapped else zero[:, None][:, :0]
 
     def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Any]:
-        given = {name: upload(array, self.device) for name, array in gaussians.by_name().items()}
+        given = {name: upload(array, self.device) for name, array in vars(gaussians).items()}
         if not all(bool(tensor.isfinite().all()) for tensor in given.values()) or _has_zero(given["quats"]):
             gaussians.check_values()
         last = self.draw(given, camera)
-        c, picture = gaussians.colours.shape[-1], last.picture.detach()[0]
-        images = [picture[..., :c], last.alpha.detach()[0, ..., 0], picture[..., -1]]
-        if gaussians.features is not None:
-            images.append(picture[..., c:-1])
+        picture = last.picture.detach()[0]
+        images = picture[..., :-1], last.alpha.detach()[0, ..., 0], picture[..., -1]
         return Rendering(*(download(image) for image in images)), last
 
     def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
         by_channel = join_gradients(last.rendering, given).to(self.device)
-        c = last.rendering.colour.shape[2]
-        by_picture = torch.cat([by_channel[..., :c], by_channel[..., c + 2 :], by_channel[..., c + 1 : c + 2]], 2)
-        found = self.differentiate(last.state, by_picture, by_channel[..., c])
+        by_picture = torch.cat([by_channel[..., :-2], by_channel[..., -1:]], 2)
+        found = self.differentiate(last.state, by_picture, by_channel[..., -2])
         return Gradients(**{name: download(gradient) for name, gradient in found.items()})
 
     def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
@@ -126,14 +123,13 @@ class Rasterizer(interface.Rasterizer):
         return download(find_visible(last.state))
 
     def _call_gsplat(self, leaves: dict[str, Tensor], view: Float32[Tensor, "4 4"], camera: Camera):
-        """gsplat's picture (colours, features, depth), alpha and intermediate results."""
-        colours, features, degree = leaves["colours"], leaves.get("features"), None
+        """gsplat's picture (colours, depth), alpha and intermediate results."""
+        colours, degree = leaves["colours"], None
         if colours.ndim == 3:
-            if features is None and not camera.orthographic:
+            if not camera.orthographic:
                 degree = int(colours.shape[1] ** 0.5) - 1
-            else:  # gsplat takes no features beside harmonics, and would see an orthographic picture from one point
+            else:  # gsplat would see an orthographic picture from one point
                 colours = oracle.seen_from(colours, leaves["means"], camera, (view[:3, :3], view[:3, 3]))
-        values = colours if features is None else torch.cat([colours, features], 1)
         quats = leaves["quats"]
         near, far = ANY_DEPTH
         inner = [[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]]
@@ -142,7 +138,7 @@ class Rasterizer(interface.Rasterizer):
             quats / quats.detach().abs().amax(1, keepdim=True),  # gsplat squares them: 1e30 would be too much
             leaves["log_scales"].exp(),
             torch.sigmoid(leaves["opacity_logits"]),
-            values,
+            colours,
             view[None],
             torch.tensor(inner, dtype=torch.float32, device=view.device)[None],  # NumPy's numbers would make doubles
             camera.width,

@@ -29,11 +29,6 @@ class GaussianArrays:
     quats: Float32[Array, "n 4"]
     opacity_logits: Float32[Array, "n"]
     colours: Float32[Array, "n c"] | Float32[Array, "n k 3"]
-    features: Float32[Array, "n f"] | None = None
-
-    def by_name(self) -> dict[str, Array]:
-        """The arrays that are present."""
-        return {name: array for name, array in vars(self).items() if array is not None}
 
     def check_shapes(self) -> None:
         """Raises: ValueError: an array's type, shape or layout; values are not checked."""
@@ -44,12 +39,10 @@ class GaussianArrays:
         if harmonics not in (None, 1, 4, 9, 16):
             raise ValueError(f"colours has {harmonics} coefficients; 1, 4, 9 or 16 make whole degrees")
         check(self.colours, "colours", (n, harmonics, 3) if harmonics else (n, count_columns(self.colours)))
-        if self.features is not None:
-            check(self.features, "features", (n, count_columns(self.features)))
 
     def check_values(self) -> None:
         """Raises: ValueError: a value that is not finite, or a zero quaternion, with the Gaussian's index."""
-        for name, array in self.by_name().items():
+        for name, array in vars(self).items():
             if not np.isfinite(array).all():
                 bad = np.flatnonzero(~np.isfinite(array.reshape(len(array), -1)).all(1))
                 raise ValueError(f"{name} of Gaussian {bad[0]} is not finite ({len(bad)} such)")
@@ -68,13 +61,11 @@ def to_raster_arrays(
 
 @dataclass(frozen=True)
 class Rendering:
-    """Per pixel the sums over its splats, weighted by blend weight w, of colours, 1, depths and features (None without
-    features). Read-only."""
+    """Per pixel the sums over its splats, weighted by blend weight w, of colours, 1 and depths. Read-only."""
 
     colour: Float32[Array, "h w c"]
     alpha: Float32[Array, "h w"]
     depth: Float32[Array, "h w"]
-    features: Float32[Array, "h w f"] | None = None
 
 
 @dataclass(frozen=True)
@@ -86,7 +77,6 @@ class Gradients:
     quats: Float32[Array, "n 4"]
     opacity_logits: Float32[Array, "n"]
     colours: Float32[Array, "n c"] | Float32[Array, "n k 3"]
-    features: Float32[Array, "n f"] | None = None
 
 
 @dataclass(frozen=True)
@@ -108,7 +98,7 @@ class Forward:
     state: Any
 
 
-PictureGradients = dict[str, Array | None]  # of a loss by colour, alpha, depth and features, in this order; None: zero
+PictureGradients = dict[str, Array | None]  # of a loss by colour, alpha and depth, in this order; None: zero
 
 
 class Rasterizer(ABC):
@@ -145,22 +135,19 @@ class Rasterizer(ABC):
         opacity_logits: Float32[Array, "n"],
         colours: Float32[Array, "n c"] | Float32[Array, "n k 3"],
         camera: Camera,
-        features: Float32[Array, "n f"] | None = None,
     ) -> Rendering:
         """Render Gaussians over black. log_scales: natural logarithms. quats: w x y z, of any length but 0.
 
         colours: channels, or spherical harmonics (k = 1, 4, 9, 16; see `harmonics`) seen from the camera.
-        features: more channels, blended into an image of their own.
         Raises: ValueError: an array's type, shape or layout, a value that is not finite, a zero quaternion (index).
         """
         check_camera(camera)
-        gaussians = GaussianArrays(means, log_scales, quats, opacity_logits, colours, features)
+        gaussians = GaussianArrays(means, log_scales, quats, opacity_logits, colours)
         gaussians.check_shapes()
         self._last = None
         rendering, state = self._render(gaussians, camera)
         for image in vars(rendering).values():
-            if image is not None:
-                image.flags.writeable = False  # the backward pass reads them
+            image.flags.writeable = False  # the backward pass reads them
         self._last = Forward(gaussians, camera, rendering, state)
         return rendering
 
@@ -169,7 +156,6 @@ class Rasterizer(ABC):
         grad_colour: Float32[Array, "h w c"],
         grad_alpha: Float32[Array, "h w"] | None = None,
         grad_depth: Float32[Array, "h w"] | None = None,
-        grad_features: Float32[Array, "h w f"] | None = None,
     ) -> Gradients:
         """Gradients of a loss at the last forward pass, from its gradients by the images (None: zero).
 
@@ -178,13 +164,9 @@ class Rasterizer(ABC):
         """
         last = self._require_forward()
         given: PictureGradients = {"colour": grad_colour, "alpha": grad_alpha, "depth": grad_depth}
-        given["features"] = grad_features
         for name, array in given.items():
-            image = getattr(last.rendering, name)
-            if array is not None and image is None:
-                raise ValueError(f"grad_{name} is given, but forward was given no {name}")
             if array is not None:
-                check(array, f"grad_{name}", image.shape)
+                check(array, f"grad_{name}", getattr(last.rendering, name).shape)
         return self._differentiate(last, given)
 
     def contributions(self, weights: Float32[Array, "h w c"] | None = None) -> Contributions:

@@ -37,19 +37,17 @@ def forward(
     opacity_logits: Float[Tensor, "n"],
     colours: Float[Tensor, "n c"] | Float[Tensor, "n k 3"],
     camera: Camera,
-    features: Float[Tensor, "n f"] | None = None,
     near: float = 0.01,
     dilation: float = 0.3,
     antialiased: bool = False,
 ) -> tuple[Tensor, ...]:
-    """Colour, alpha, depth, and features if there are any, differentiable; see `interface.Rasterizer`."""
+    """Colour, alpha and depth, differentiable; see `interface.Rasterizer`."""
     splats = project(means, log_scales, quats, opacity_logits, colours, camera, near, dilation, antialiased)
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     weight = weights(splats, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1)).to(means))
     size = camera.height, camera.width
-    images = (weight @ splats.colours).reshape(*size, -1), weight.sum(1).reshape(size)
-    images += ((weight @ splats.depth).reshape(size),)
-    return images if features is None else (*images, (weight @ features[splats.index]).reshape(*size, -1))
+    colour = (weight @ splats.colours).reshape(*size, -1)
+    return colour, weight.sum(1).reshape(size), (weight @ splats.depth).reshape(size)
 
 
 def project(

@@ -66,10 +66,8 @@ class Rasterizer(interface.Rasterizer):
                     picture, group.corners, _blend_weights(shapes[group.rows], group.corners) @ values[group.rows]
                 )
         array = picture[: camera.height, : camera.width].numpy()
-        n = gaussians.colours.shape[-1]
-        parts = [array[..., :n], array[..., n], array[..., n + 1], array[..., n + 2 :]]
-        images = (np.ascontiguousarray(part) for part in parts[: 3 if gaussians.features is None else 4])
-        return Rendering(*images), BinnedSplats(groups, splats.index)
+        parts = array[..., :-2], array[..., -2], array[..., -1]
+        return Rendering(*(np.ascontiguousarray(part) for part in parts)), BinnedSplats(groups, splats.index)
 
     @torch.enable_grad()
     def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
@@ -116,32 +114,28 @@ class Rasterizer(interface.Rasterizer):
         return visible[:-1]
 
     def _project(self, leaves: dict[str, Tensor], camera: Camera):
-        """The splats, and two float32 tables of them that end in an empty row: centre, root and opacity; colours, 1,
-        depth and features."""
-        features = leaves.get("features")
-        given = {name: leaf for name, leaf in leaves.items() if name != "features"}
+        """The splats, and two float32 tables of them that end in an empty row: centre, root and opacity; colours, 1
+        and depth."""
         splats = oracle.project(
-            **given, camera=camera, near=self.near, dilation=self.dilation, antialiased=self.antialiased
+            **leaves, camera=camera, near=self.near, dilation=self.dilation, antialiased=self.antialiased
         )
         root = splats.roots.flatten(1)[:, [0, 1, 3]].clamp(-MAX_ROOT, MAX_ROOT)
         shapes = torch.cat([splats.centres.clamp(-MAX_CENTRE, MAX_CENTRE), root, splats.opacity[:, None]], 1)
-        values = [splats.colours, torch.ones_like(splats.depth)[:, None], splats.depth[:, None]]
-        values = torch.cat(values if features is None else [*values, features[splats.index]], 1)
+        values = torch.cat([splats.colours, torch.ones_like(splats.depth)[:, None], splats.depth[:, None]], 1)
         return splats, *(torch.nn.functional.pad(table, (0, 0, 0, 1)).float() for table in (shapes, values))
 
 
 def to_leaves(gaussians: GaussianArrays) -> dict[str, Tensor]:
-    """Gaussians as float64 tensors; features only if there are any."""
-    return {name: torch.as_tensor(array).double() for name, array in gaussians.by_name().items()}
+    """Gaussians as float64 tensors."""
+    return {name: torch.as_tensor(array).double() for name, array in vars(gaussians).items()}
 
 
 def join_gradients(rendering: Rendering, given: PictureGradients) -> Float[Tensor, "h w c"]:
     """The gradients by the images as those by the channels of one picture."""
     parts = []
     for name, image in vars(rendering).items():
-        if image is not None:
-            gradient = given[name]
-            parts.append((np.zeros_like(image) if gradient is None else gradient).reshape(*image.shape[:2], -1))
+        gradient = given[name]
+        parts.append((np.zeros_like(image) if gradient is None else gradient).reshape(*image.shape[:2], -1))
     return torch.as_tensor(np.concatenate(parts, 2))
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
-from scipy.spatial import cKDTree
 
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry.scene_frame import SceneFrame
@@ -25,8 +24,6 @@ _log = logging.getLogger(__name__)
 
 BAND = 0.1  # flying heights within which points belong to a ground with objects on it
 BLOCK = 32  # the exemplar's side is a multiple of it, in cells: six levels halve it five times
-NEIGHBOURS = 12  # of a point on the map
-MIN_EXPLAINED = 0.6  # share of the points near a height field, below which the log warns
 MUCH_WIDER = 2.0  # discs than the preset asks for, from which on the log says so
 MIN_WEIGHT = 0.05  # pixels of blend weight from which a photo counts as seeing a Gaussian
 OPAQUE = 0.5  # alpha above which a cell takes its height from a finished field
@@ -76,7 +73,13 @@ def fit_coarse_field(
     frame, views, points = given.frame, given.views, given.points
     spacing = settings.spacing * observation.pixel_size(frame, views)
     grid = ground.fit_ground(frame, points, spacing, limit_discs(settings.max_gaussians), BLOCK, given.margin)
-    _warn_of_doubtful_ground(grid, points, frame, grid.spacing / spacing)
+    if (wider := grid.spacing / spacing) > MUCH_WIDER:
+        _log.warning(
+            "the ground is so large that its discs are %.1f times as wide as the preset asks for: for a sharper "
+            "terrain give it %.1f times as many Gaussians (max_gaussians), or photos of less ground",
+            wider,
+            wider**2,
+        )
     scene = observation.observe(frame, grid, views)
     shell = objects.make_shell(scene.relief, scene.views)
     isolated = objects.make_isolated_points(grid, scene.relief, points, given.colours, BAND * frame.flying_height)
@@ -95,30 +98,6 @@ def fit_coarse_field(
     options = replace(options, name="fit coarse field")
     fit = trainer.fit_field(start, masked, settings.plan_coarse_fit(len(views)), constraints, rng, options)
     return Reconstruction(*finish_field(fit.field, grid, masked), fit.report)
-
-
-def _warn_of_doubtful_ground(grid: Ground, points: Float[Array, "n 3"], frame: SceneFrame, wider: float) -> None:
-    """wider: the discs than the preset asks for, as the ground is large for its number of Gaussians."""
-    if wider > MUCH_WIDER:
-        _log.warning(
-            "the ground is so large that its discs are %.1f times as wide as the preset asks for: for a sharper "
-            "terrain give it %.1f times as many Gaussians (max_gaussians), or photos of less ground",
-            wider,
-            wider**2,
-        )
-    inside = points[grid.contains(points)]
-    if len(inside) <= NEIGHBOURS:
-        return
-    # the fitted surface cannot tell: between few points it bends to all of them
-    near = np.asarray(cKDTree(inside[:, :2]).query(inside[:, :2], k=NEIGHBOURS + 1)[1])[:, 1:]
-    apart = np.abs(inside[:, 2] - np.median(inside[near, 2], axis=1))
-    explained = (apart < BAND * frame.flying_height).mean()
-    if explained < MIN_EXPLAINED:
-        _log.warning(
-            "a height field explains only %.0f %% of the points, so the ground may be wrong: take photos that show "
-            "open ground, from above",
-            100 * explained,
-        )
 
 
 def finish_field(fitted: GaussianField, grid: Ground, views: list[TrainingView]) -> tuple[GaussianField, Ground]:

@@ -7,9 +7,8 @@ Losses above VISIBLE_PSNR cannot be seen and do not count: a field that shows a 
 
 import logging
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import log2
-from typing import Any
 
 import numpy as np
 
@@ -30,43 +29,23 @@ VISIBLE_PSNR = 40.0  # dB: pixels differ by 2.6 of 255 grey levels
 EQUAL_PSNR = 100.0  # dB that stand for equal pictures
 
 
-@dataclass(frozen=True)
-class EarlierViews:
-    """How an update changed the PSNR (dB) of the photos before it. psnr_of_fits: after each fit of the update."""
-
-    photos: int
-    psnr_before: float | None
-    psnr_after: float | None
-    psnr_of_fits: list[float | None]
-    bound: float
-
-
-@dataclass(frozen=True)
-class NewViews:
-    """How an update changed the PSNR (dB) of its own photos. taken: whether the field was fitted to them."""
-
-    photos: int
-    taken: bool
-    psnr_before: float | None
-    psnr_after: float | None
-    views: list[dict[str, Any]]  # view, psnr_before, psnr_after
-
-
 @dataclass
 class UpdateReport(FitReport):
-    """What an update did, over all its fits. earlier_views: None without new photos."""
+    """What an update did, over all its fits.
 
-    earlier_views: EarlierViews | None = None
-    new_views: NewViews = NewViews(0, True, None, None, [])
+    earlier_photos: number of the photos before it. psnr_before, psnr_after: their mean PSNR in dB; None without any.
+    new_photos: names of its own photos. taken: whether the field is fitted to these.
+    """
 
-    @property
-    def takes_new_views(self) -> bool:
-        """Whether the field is fitted to the new photos."""
-        return self.new_views.taken
+    earlier_photos: int = 0
+    psnr_before: float | None = None
+    psnr_after: float | None = None
+    new_photos: list[str] = field(default_factory=list)
+    taken: bool = True
 
 
 def fit_with_guard(
-    field: GaussianField,
+    last: GaussianField,
     start: GaussianField,
     earlier: list[TrainingView],
     new: list[TrainingView],
@@ -78,21 +57,20 @@ def fit_with_guard(
     """Fit, and go on fitting, `retries` times at most, while the earlier photos have lost too much.
 
     Args:
-        field: From before the new photos; it is kept if the loss stays above the bound.
+        last: From before the new photos; it is kept if the loss stays above the bound.
         start: What the fit starts from.
         fit: A fit to all views. Where no earlier photo has a pixel that counts, nothing can be lost.
         second_opinion: Called if the earlier photos have lost too much: whether the new photos are right all the same.
     Returns: The field of the last fit, or the one from before, and the report.
     """
-    before, fitted = measure_psnr(field, earlier), fit(start, plan)
+    before, fitted = measure_psnr(last, earlier), fit(start, plan)
     most = allowed_loss(len(earlier), len(new))
-    fits, reached = [fitted.report], [measure_psnr(fitted.field, earlier)]
-    while mean_loss(before, reached[-1]) > most and len(fits) <= retries:
-        _log.info("the earlier photos lost %.2f dB: fitting on", mean_loss(before, reached[-1]))
+    fits, reached = [fitted.report], measure_psnr(fitted.field, earlier)
+    while (loss := mean_loss(before, reached)) > most and len(fits) <= retries:
+        _log.info("the earlier photos lost %.2f dB: fitting on", loss)
         fitted = fit(fitted.field, replace(plan, steps=fits[0].steps))
         fits.append(fitted.report)
-        reached.append(measure_psnr(fitted.field, earlier))
-    loss = mean_loss(before, reached[-1])
+        reached = measure_psnr(fitted.field, earlier)
     accepted = loss <= most or (second_opinion is not None and second_opinion())
     if not accepted:
         _log.warning(
@@ -103,11 +81,9 @@ def fit_with_guard(
             loss,
             most,
         )
-    kept = fitted.field if accepted else field
-    after = _mean(reached[-1] if accepted else before)
-    effect = EarlierViews(len(earlier), _mean(before), after, [_mean(each) for each in reached], most)
-    steps = sum(each.steps for each in fits)
-    return kept, UpdateReport(steps, len(kept), effect, _report_new_views(new, field, kept, accepted))
+    kept, after = (fitted.field, reached) if accepted else (last, before)
+    effect = len(earlier), _mean(before), _mean(after), [view.name for view in new], accepted
+    return kept, UpdateReport(sum(each.steps for each in fits), len(kept), *effect)
 
 
 def allowed_loss(earlier: int, new: int) -> float:
@@ -123,8 +99,7 @@ def mean_loss(before: list[float | None], after: list[float | None]) -> float:
 
 def list_rejected_photos(reports: Iterable[dict]) -> set[str]:
     """Names of the photos that contradicted earlier ones, by their rounds' fit.json."""
-    rejected = [report["new_views"]["views"] for report in reports if not report["new_views"]["taken"]]
-    return {row["view"] for rows in rejected for row in rows}
+    return {name for report in reports if not report["taken"] for name in report["new_photos"]}
 
 
 def measure_psnr(field: GaussianField, views: list[TrainingView]) -> list[float | None]:
@@ -141,16 +116,6 @@ def _psnr(rasterizer: raster.Rasterizer, field: GaussianField, view: TrainingVie
     level = np.clip(metrics.correct_colours(np.clip(picture, 0, 1), view.image, view.weight), 0, 1)
     found = metrics.psnr(level.astype(np.float32), view.image, view.weight)
     return EQUAL_PSNR if found is None else min(EQUAL_PSNR, float(found))
-
-
-def _report_new_views(new: list[TrainingView], field: GaussianField, kept: GaussianField, accepted: bool) -> NewViews:
-    """PSNR of the new photos before (an honest test: no fit has seen them) and after the update."""
-    before = measure_psnr(field, new)
-    after = measure_psnr(kept, new) if accepted else before
-    rows = [
-        {"view": view.name, "psnr_before": b, "psnr_after": a} for view, b, a in zip(new, before, after, strict=True)
-    ]
-    return NewViews(len(new), accepted, _mean(before), _mean(after), rows)
 
 
 def _mean(values: list[float | None]) -> float | None:

@@ -94,7 +94,7 @@ def update_field(given: UpdateInput, settings: FitSettings, rng: np.random.Gener
     n = len(given.earlier)
     plan = settings.plan_update(n, len(new))
     kept, report = fit_with_guard(field, start.field, start.views[:n], start.views[n:], plan, fit)
-    if not report.takes_new_views:
+    if not report.taken:
         return Reconstruction(field, grid, report)
     return Reconstruction(*finish_field(kept, start.grid, start.views), report)
 
@@ -121,12 +121,12 @@ def update_from_scratch(
 
     def is_update_accepted() -> bool:
         report = update_field(given, settings, rng.spawn(1)[0]).report
-        return isinstance(report, UpdateReport) and report.takes_new_views
+        return isinstance(report, UpdateReport) and report.taken
 
     seen = observation.mask_for_fit(photos, grid)
     plan = anew.plan_coarse_fit(len(photos))
     _, report = fit_with_guard(field, field, seen[:count], seen[count:], plan, fit, 0, is_update_accepted)
-    return replace(made[-1], report=report) if report.takes_new_views else Reconstruction(field, grid, report)
+    return replace(made[-1], report=report) if report.taken else Reconstruction(field, grid, report)
 
 
 @dataclass(frozen=True)

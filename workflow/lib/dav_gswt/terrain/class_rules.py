@@ -1,6 +1,5 @@
-"""Rules of classes from the config: ranges of height and slope, pictures, the noise of the bundle, painted places."""
+"""Rules of classes from the config: ranges of height and slope, the noise of the bundle, painted places."""
 
-import hashlib
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -8,23 +7,18 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from dav_gswt.bundle.land_cover import ImageTerm, NoiseTerm, ObjectOrders, RangeTerm, find_run_fault
+from dav_gswt.bundle.land_cover import NoiseTerm, ObjectOrders, RangeTerm, find_run_fault
 from dav_gswt.bundle.manifest import TileSetInfo
 from dav_gswt.errors import InputError
 from dav_gswt.files import locate_path, read_record
-from dav_gswt.images import image_files
-from dav_gswt.terrain.classes import LATTICE, Classes, Picture
+from dav_gswt.terrain.classes import LATTICE, Classes
 
 _log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=TileSetInfo)
 NOISE = ({"kind": "noise", "weight": 1.0},)  # the config's default: the noise of the bundle alone
 WINDOW, SAMPLES = 64, 20_000  # tiles from the origin, and places there, in which a material is looked for
-MAX_SIDE = 4096  # pixels along a side of a picture of materials
-NEAR = 60.0  # of 255: largest distance of a pixel's colour from that of its material
-UNKNOWN = 255  # a pixel of no material
 MAX_BYTES = 2**24  # of a painted file
 MAX_DENSITY, MAX_OFFSET = 3.0, 8.0
 MAX_CANDIDATES = 512  # objects on a tile that the page draws
@@ -51,13 +45,12 @@ class PaintFile:
     offsets: dict[str, float] = field(default_factory=dict)
 
 
-def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, dict[str, Picture]]:
-    """The manifest with the config's rule in the place of its own noise, and the pixels of the rule's pictures by file.
+def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> M:
+    """The manifest with the config's rule in the place of its own noise.
 
     A bundle of one material has no classes: the rule changes nothing, which a warning says; densities of objects that
     were set on the page count nevertheless.
-    Raises: InputError: a material that is not there, a picture that cannot be read, is too large or shows none of the
-        materials; two painted files, or nothing but one; see also `read_paint`.
+    Raises: InputError: a material that is not there; two painted files, or nothing but one; see also `read_paint`.
     """
     names = [material.name for material in manifest.materials]
     files, paint = [entry["file"] for entry in rule if entry["kind"] == "painted"], None
@@ -71,28 +64,24 @@ def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, dict[str
     rule = [entry for entry in rule if entry["kind"] != "painted"]
     if manifest.classes is None:
         warn_of_rule(rule)
-        return manifest, {}
+        return manifest
     noise = next((term for term in manifest.classes.rule if isinstance(term, NoiseTerm)), None)
     if noise and paint:
         offsets = [paint.offsets.get(name, 0.0) for name in names]
         noise = replace(noise, biases=[bias + offset for bias, offset in zip(noise.biases, offsets, strict=True)])
-    terms, pictures = [], {}
+    terms = []
     for entry in rule:
         kind, weight = entry["kind"], float(entry.get("weight", 1.0))
         if kind == "noise":
             if noise is None:
                 raise InputError("classes: the bundle has no noise of its own; make the bundle again")
             terms.append(replace(noise, weight=weight))
-        elif kind == "image":
-            term, pixels = _read_picture(entry, weight, names, f"classes{len(pictures)}.bin")
-            terms.append(term)
-            pictures[term.file] = pixels
         else:  # heights of the config are in tile sides, slopes are rise over run
             unit, material = manifest.tile_side if kind == "height" else 1.0, _find_material(entry["material"], names)
             low, high = (None if entry.get(key) is None else float(entry[key]) * unit for key in ("low", "high"))
             terms.append(RangeTerm(kind, weight, material, low, high, float(entry["soft"]) * unit))
     classes = replace(manifest.classes, rule=terms, painted=paint.runs if paint else manifest.classes.painted)
-    return replace(manifest, classes=classes), pictures
+    return replace(manifest, classes=classes)
 
 
 def warn_of_missing(classes: Classes, names: Sequence[str]) -> None:
@@ -115,28 +104,6 @@ def _find_material(name: str, names: Sequence[str]) -> int:
     if name not in names:
         raise InputError(f"classes: there is no material {name!r}; the terrain has {', '.join(names)}")
     return names.index(name)
-
-
-def _read_picture(entry: dict[str, Any], weight: float, names: Sequence[str], file: str) -> tuple[ImageTerm, Picture]:
-    """A picture's pixels as numbers of materials: the nearest of the given colours; UNKNOWN if none is near."""
-    path = locate_path(entry["file"])
-    columns, rows = image_files.read_size(path)
-    if max(rows, columns) > MAX_SIDE:
-        raise InputError(f"{path}: {columns} x {rows} pixels; at most {MAX_SIDE} a side: shrink the picture")
-    numbers = [_find_material(name, names) for name in entry["colours"]]
-    colours = np.array([[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in entry["colours"].values()], float)
-    image = 255.0 * image_files.read_photo(path)[..., :3]
-    _, nearest = cKDTree(colours).query(image, distance_upper_bound=np.nextafter(NEAR, 256))
-    pixels = np.array([*numbers, UNKNOWN], np.uint8)[nearest]  # the last where no colour is near
-    rows, columns = pixels.shape  # upright
-    unknown = float((pixels == UNKNOWN).mean())
-    if unknown == 1:
-        raise InputError(f"{path}: no pixel has the colour of a material ({', '.join(entry['colours'].values())})")
-    if unknown:
-        _log.warning("%s: %.1f %% of the pixels have the colour of no material", path, 100 * unknown)
-    digest, beyond = hashlib.sha256(pixels).hexdigest(), entry.get("beyond", "mirror")
-    width = float(entry["width"])
-    return ImageTerm("image", weight, file, pixels.size, digest, rows, columns, width, beyond), pixels
 
 
 def read_paint(path: Path | str, names: Sequence[str]) -> PaintFile:

@@ -9,19 +9,17 @@ docs/formats.md has the formulas. The viewer computes the same scores; tests/gol
 Only sums, products, quotients, square roots, floor, minima and maxima of float64 are used, in the order written here.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int64, UInt8
+from jaxtyping import Bool, Float, Float32, Int64
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.land_cover import MAX_COORDINATE, ClassesEntry, ImageTerm, NoiseTerm, RangeTerm
+from dav_gswt.bundle.land_cover import MAX_COORDINATE, ClassesEntry, NoiseTerm, RangeTerm
 from dav_gswt.terrain.choice import Floats, Ints, hash_cell
-from dav_gswt.terrain.heights import FlatSurface, HeightField, gradient_noise, smoothstep, wrap_index
-
-Picture = UInt8[Array, "rows columns"]
+from dav_gswt.terrain.heights import FlatSurface, HeightField, gradient_noise, smoothstep
 
 LATTICE = 8  # points of the lattice of scores along a tile's side
 MAX_OCTAVES = 8
@@ -88,14 +86,12 @@ class Classes:
         materials: number of them.
         side: of a tile.
         heights: the surface, for terms of height and slope.
-        pictures: pixels of the terms with a picture, by file; the northern row first.
     """
 
     entry: ClassesEntry
     materials: int
     side: float
     heights: HeightField = FlatSurface()
-    pictures: Mapping[str, Picture] = field(default_factory=dict)
     _known: dict[tuple[int, int], int] = field(default_factory=dict, init=False, repr=False)
 
     def lattice_scores(self, i: Ints, j: Ints) -> Float[Array, "n m"]:
@@ -201,13 +197,10 @@ class Classes:
             undecided[..., material] = ~stays[..., material] & ~goes
         return stays, undecided
 
-    def _evaluate_term(self, term: NoiseTerm | RangeTerm | ImageTerm, i: Ints, j: Ints) -> Float[Array, "n m"]:
+    def _evaluate_term(self, term: NoiseTerm | RangeTerm, i: Ints, j: Ints) -> Float[Array, "n m"]:
         if isinstance(term, NoiseTerm):
             return np.stack([self._class_noise(term, m, i, j) for m in range(self.materials)], 1)
-        x, y = i * (self.side / LATTICE), j * (self.side / LATTICE)
-        if isinstance(term, ImageTerm):
-            return self._picture_shares(term, x, y)
-        height, slope = self.heights.at(x, y)
+        height, slope = self.heights.at(i * (self.side / LATTICE), j * (self.side / LATTICE))
         value = height if term.kind == "height" else np.sqrt(slope[:, 0] * slope[:, 0] + slope[:, 1] * slope[:, 1])
         low = -np.inf if term.low is None else term.low
         high = np.inf if term.high is None else term.high
@@ -227,19 +220,6 @@ class Classes:
             noise += GAIN**octave * gradient_noise(*place, axis, self.entry.salt)[0]
             x, y = 2 * x, 2 * y
         return noise / sum(GAIN**k for k in range(octaves)) + term.biases[material]
-
-    def _picture_shares(self, term: ImageTerm, x: Floats, y: Floats) -> Float[Array, "n m"]:
-        """Share of each material among the four pixels around places, by the distances to their centres."""
-        pixels, per_unit = self.pictures[term.file], term.columns / term.width
-        p, q = x * per_unit + 0.5 * term.columns - 0.5, 0.5 * term.rows - y * per_unit - 0.5
-        column, row = np.floor(p).astype(np.int64), np.floor(q).astype(np.int64)
-        s, t, shares = p - column, q - row, np.zeros((len(x), self.materials))
-        for b, a in np.ndindex(2, 2):
-            rows = wrap_index(row + b, term.rows, term.beyond)
-            columns = wrap_index(column + a, term.columns, term.beyond)
-            weight = (s if a else 1 - s) * (t if b else 1 - t)
-            shares += weight[:, None] * (pixels[rows, columns][:, None] == np.arange(self.materials))
-        return shares
 
 
 def _find_square(u: Floats, v: Floats):

@@ -1,6 +1,6 @@
 """The endless terrain: a set of Wang tiles with everything that is needed to render it from any eye."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -8,14 +8,14 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.land_cover import ImageTerm, ObjectOrders
+from dav_gswt.bundle.land_cover import ObjectOrders
 from dav_gswt.bundle.manifest import TileSetInfo
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField
 from dav_gswt.raster.interface import RIM
 from dav_gswt.terrain import heights
 from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_missing
-from dav_gswt.terrain.classes import Classes, Picture
+from dav_gswt.terrain.classes import Classes
 from dav_gswt.terrain.heights import FlatSurface, HeightField
 from dav_gswt.terrain.scatter import Scatter
 from dav_gswt.tiles.layout import EDGES
@@ -73,8 +73,8 @@ def terrain_from_bundle(
     Args:   surface: the config's `heights`. rule: the config's `classes`.
     Raises: InputError: see `bundle.chunks.read_chunk`, `heights.surface_from_config`, `class_rules.apply_rule`.
     """
-    manifest, pictures = apply_rule(bundle.manifest, rule)
-    terrain = terrain_from_fields(bundle.fields(), manifest, surface, _read_objects(bundle), pictures)
+    manifest = apply_rule(bundle.manifest, rule)
+    terrain = terrain_from_fields(bundle.fields(), manifest, surface, _read_objects(bundle))
     if terrain.classes is not None:
         warn_of_missing(terrain.classes, [material.name for material in manifest.materials])
     return terrain
@@ -83,15 +83,11 @@ def terrain_from_bundle(
 def terrain_from_page(bundle: Bundle) -> EndlessTerrain:
     """The terrain of a page folder; of a bundle: on level ground, with the classes of its own noise.
 
-    Raises: InputError: see `bundle.chunks.read_chunk`; a height map or a picture that is missing or damaged.
+    Raises: InputError: see `bundle.chunks.read_chunk`; a height map that is missing or damaged.
     """
-    manifest, pictures = bundle.manifest, {}
-    for term in manifest.classes.rule if manifest.classes else []:
-        if isinstance(term, ImageTerm):
-            data = heights.read_exactly(bundle.folder, term.file, term.rows * term.columns, term.sha256)
-            pictures[term.file] = np.frombuffer(data, np.uint8).reshape(term.rows, term.columns)
+    manifest = bundle.manifest
     surface = heights.read_surface(bundle.folder, manifest.heights or {"kind": "flat"}, manifest.tile_side)
-    return terrain_from_fields(bundle.fields(), manifest, surface, _read_objects(bundle), pictures)
+    return terrain_from_fields(bundle.fields(), manifest, surface, _read_objects(bundle))
 
 
 def _read_objects(bundle: Bundle) -> list[list[GaussianField]]:
@@ -104,19 +100,17 @@ def terrain_from_fields(
     manifest: TileSetInfo,
     surface: dict[str, Any] | HeightField,
     objects: Sequence[list[GaussianField]] = (),
-    pictures: Mapping[str, Picture] | None = None,
 ) -> EndlessTerrain:
     """tiles[level][tile] with the distances and classes of a manifest, on a surface.
 
     Args:   surface: or the config's `heights` that describes it. objects: objects[number][level], about their feet.
-            pictures: of the terms of classes, by file.
     Raises: InputError: as `heights.surface_from_config`, `heights.require_plain_cover`.
     """
     levels, entries, side = manifest.levels, manifest.tiles, manifest.tile_side
     largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles for f in row)
     surface = heights.surface_from_config(surface, side) if isinstance(surface, dict) else surface
     heights.require_plain_cover(surface, manifest.classes, manifest.objects)
-    classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, surface, pictures or {})
+    classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, surface)
     beyond = (RIM - 3) * largest  # the manifest's heights reach three deviations beyond the centres
     extents, things = [], manifest.objects or []
     for fields in objects:

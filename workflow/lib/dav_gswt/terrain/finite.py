@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
@@ -24,32 +24,13 @@ Placer = Callable[[], GaussianField]
 
 
 @dataclass(frozen=True)
-class Disc:
-    """The places within a radius of a point, all in tile sides."""
-
-    x: float
-    y: float
-    radius: float
-
-    def touches(self, i: Ints, j: Ints) -> Bool[Array, "n"]:
-        """Which cells lie nearer to the point than the radius, with any part of them."""
-        east, north = (np.maximum(np.maximum(cell - at, at - cell - 1), 0) for cell, at in ((i, self.x), (j, self.y)))
-        return np.hypot(east, north) < self.radius
-
-
-@dataclass(frozen=True)
 class Area:
-    """A rectangle of cells: its south-western cell, and how many there are to the east and to the north.
-
-    Attributes:
-        disc: where it is given, only the cells that it touches belong to the area.
-    """
+    """A rectangle of cells: its south-western cell, and how many there are to the east and to the north."""
 
     west: int
     south: int
     columns: int
     rows: int
-    disc: Disc | None = None
 
     def __len__(self) -> int:
         return self.columns * self.rows
@@ -82,9 +63,6 @@ def keep_level(terrain: EndlessTerrain, level: int) -> EndlessTerrain:
 def list_grid(terrain: EndlessTerrain, area: Area, eye: Vector) -> GridCells:
     """The cells of an area, row by row, with their distances from an eye."""
     i, j, tile, materials = list_cells(terrain, area.west, area.south, area.columns, area.rows)
-    if area.disc is not None:
-        inside = area.disc.touches(i, j)
-        i, j, tile, materials = i[inside], j[inside], tile[inside], materials[inside]
     return GridCells(i, j, tile, materials, np.zeros(len(i), bool), *measure_distances(terrain, i, j, eye))
 
 

@@ -152,7 +152,7 @@ class Hills(HeightField, kind="hills"):
 
     @classmethod
     def from_config(cls, entry: Mapping[str, Any], side: float) -> "Hills":
-        return cls(entry["height"] * side, entry["wavelength"] * side, salt=entry.get("seed", 0))
+        return cls(entry["height"] * side, entry["wavelength"] * side)
 
 
 @dataclass(frozen=True)
@@ -160,12 +160,11 @@ class HeightMap(HeightField, kind="image"):
     """A height map, `width` world units wide, centred on the world's origin, its first row the northern one.
 
     h is the quadratic B-spline of the pixels: once differentiable, within the range of the pixels around. Beyond the
-    map it is mirrored, or takes the pixels of the border (beyond = "clamp").
+    map it is mirrored.
     """
 
     pixels: Float32[Array, "rows columns"]
     width: float
-    beyond: str = "mirror"
 
     @property
     def low(self) -> float:
@@ -188,9 +187,9 @@ class HeightMap(HeightField, kind="image"):
         j, along, turn_y = _spline_weights(0.5 * rows - y * per_unit)
         height, slope = np.zeros(len(x)), np.zeros((len(x), 2))
         for b in range(3):
-            row = wrap_index(j + b - 1, rows, self.beyond)
+            row = _mirror_index(j + b - 1, rows)
             for a in range(3):
-                value = self.pixels[row, wrap_index(i + a - 1, columns, self.beyond)].astype(float)
+                value = self.pixels[row, _mirror_index(i + a - 1, columns)].astype(float)
                 height += value * across[a] * along[b]
                 slope[:, 0] += value * turn_x[a] * along[b]
                 slope[:, 1] -= value * across[a] * turn_y[b]  # rows go south
@@ -202,13 +201,13 @@ class HeightMap(HeightField, kind="image"):
             pixels = read_height_map(path := locate_path(entry["file"])) * np.float32(entry["height"])
         fault, bad = f"times heights.height is beyond {FARTHEST:g} units", ~(np.abs(pixels) <= FARTHEST)
         _refuse_pixels(path, bad, fault, "lower heights.height, or fill it")
-        return cls(pixels, float(entry["width"]), entry.get("beyond", "mirror"))
+        return cls(pixels, float(entry["width"]))
 
     def describe(self) -> tuple[dict[str, Any], bytes]:
         rows, columns = self.pixels.shape
         data = self.pixels.astype("<f4").tobytes()
         entry = {"kind": self.kind, "file": PIXELS, "rows": rows, "columns": columns, "width": self.width}
-        entry |= {"beyond": self.beyond, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+        entry |= {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
         return entry, data
 
     @classmethod
@@ -220,7 +219,7 @@ class HeightMap(HeightField, kind="image"):
         pixels = np.frombuffer(data, "<f4").reshape(rows, columns).astype(np.float32)
         if not np.isfinite(pixels).all():
             raise InputError(f"{folder / entry['file']}: a height is not finite; make the page again")
-        return cls(pixels, width, entry.get("beyond", "mirror"))
+        return cls(pixels, width)
 
 
 @dataclass(frozen=True)
@@ -274,10 +273,8 @@ def require_plain_cover(surface: HeightField, classes: object, objects: object) 
         )
 
 
-def wrap_index(index: Int64[Array, "*n"], n: int, beyond: str) -> Int64[Array, "*n"]:
-    """Indices of a picture's n pixels for any index: mirrored, or the border's (beyond = "clamp")."""
-    if beyond == "clamp":
-        return np.clip(index, 0, n - 1)
+def _mirror_index(index: Int64[Array, "*n"], n: int) -> Int64[Array, "*n"]:
+    """Indices of an image's n pixels for any index."""
     index = index % (2 * n)
     return np.where(index < n, index, 2 * n - 1 - index)
 

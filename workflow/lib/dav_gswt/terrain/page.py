@@ -19,27 +19,16 @@ from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.images.figures import encode_jpeg
 from dav_gswt.images.image_files import read_photo, shrink_image
 from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_rule
-from dav_gswt.terrain.classes import Picture
 from dav_gswt.terrain.heights import PIXELS, FlatSurface, HeightField, require_plain_cover
 from dav_gswt.terrain.page_story import SHEET, STORY, Story
 
-INDEX, STILL, FRONT = "index.html", "first.jpg", "front.json"
+INDEX, STILL = "index.html", "first.jpg"
 OWN_SCRIPTS = ("early.js", "worker/", "api/", "terrain_api.js")  # that are no modules of the page itself
 STILL_WIDTH = 1280  # pixels, at most
 STILL_BYTES = 90_000  # at most: it is there within a second at 1 Mbit/s
 QUALITIES = (80, 70, 60, 50, 40, 30)  # the best that fits is taken; the last one anyhow
 STORY_BUTTON = '<button id="storyButton" type="button" aria-controls="story" aria-expanded="false"'
 DEFAULT_NAME, DEFAULT_LINE = "Endless terrain", "An endless terrain made from a few photos"
-VERDICTS = {"good": "The photos fit together well.", "doubtful": "It is doubtful that the photos fit together."}
-
-
-@dataclass(frozen=True)
-class FrontTexts:
-    """front.json: what a page says of its scene. verdict: what tests said of the photos and of the field."""
-
-    name: str
-    line: str
-    verdict: str
 
 
 @dataclass(frozen=True)
@@ -52,20 +41,16 @@ class Front:
     name: str
     line: str
     still: bytes
-    verdict: str = ""
     story: Story | None = None
 
 
 def front_of_scene(scene: str, story: Story | None, still: Path | str) -> Front:
     """The front of a scene's page. still: of the place where everybody begins. Raises: as `encode_still`."""
-    line, verdict = "An endless terrain made from a Gaussian field", ""
+    line = "An endless terrain made from a Gaussian field"
     if story:
         count = len(story.value["photos"])
         line = f"An endless terrain made from {count} photo{'s' * (count > 1)}"
-        tested = [one["psnr"] for one in story.value["rounds"] if one["psnr"] is not None]
-        psnr = f"Photos that were not used are predicted to {tested[-1]:.1f} dB." if tested else ""
-        verdict = " ".join(filter(None, (VERDICTS.get(story.value["grade"] or ""), psnr)))
-    return Front(name_of_scene(scene), line, encode_still(still), verdict, story)
+    return Front(name_of_scene(scene), line, encode_still(still), story)
 
 
 def name_of_scene(scene: str) -> str:
@@ -104,8 +89,8 @@ def write_page(
     All files under `viewer_dir` are copied, and the chunks that the manifest names.
 
     Args:   surface: of the terrain (default: level ground), stored in the page's manifest as `heights`. rule: the
-            config's `classes`, stored as those of the page's manifest, its pictures beside it. front: name of the
-            scene, line about it, first still and story (default: the viewer's own texts, no still, no story).
+            config's `classes`, stored as those of the page's manifest. front: name of the scene, line about it, first
+            still and story (default: the viewer's own texts, no still, no story).
     Raises: InputError: the manifest is missing or of another version, a chunk is missing or lies outside of the bundle;
             the viewer is incomplete; see also `class_rules.apply_rule`, `heights.require_plain_cover`.
     """
@@ -118,10 +103,8 @@ def write_page(
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
     copies += [(bundle / name, name) for name in _list_chunks(bundle, value)]
     heights, pixels = (surface or FlatSurface()).describe()
-    pictures: dict[str, Picture] = {}
     if "classes" in value or any(entry["kind"] == "painted" for entry in rule):
-        made, pictures = apply_rule(Manifest.from_dict(value), rule)
-        changed = made.to_dict()
+        changed = apply_rule(Manifest.from_dict(value), rule).to_dict()
         value |= {key: changed[key] for key in ("classes", "objects") if key in changed}
     else:
         warn_of_rule(rule)
@@ -135,11 +118,8 @@ def write_page(
         (part / INDEX).write_text(fill_front(index, front, modules), encoding="utf-8")
         if pixels:
             (part / PIXELS).write_bytes(pixels)
-        for name, picture in pictures.items():
-            (part / name).write_bytes(picture.tobytes())
         if front:
             (part / STILL).write_bytes(front.still)
-            write_json(part / FRONT, {"name": front.name, "line": front.line, "verdict": front.verdict})
         if front and front.story:
             write_json(part / STORY, front.story.value)
             (part / SHEET).write_bytes(front.story.sheet)

@@ -71,14 +71,6 @@ def list_shots(terrain: EndlessTerrain, floor: float) -> list[Shot]:
     return [replace(shot, height=high) if shot.pitch == 90 else shot for shot in SHOTS]
 
 
-def walk_shots(frames: int, length: float, height: float) -> list[Shot]:
-    """Shots of a straight walk from the walker's place: `length` in tiles, `height` in eye floors above the surface."""
-    walker = SHOTS[0]
-    yaw = np.radians(walker.yaw)
-    way = np.linspace(0, length, frames)[:, None] * [np.cos(yaw), np.sin(yaw)] + walker.at
-    return [replace(walker, name=f"{k:04d}", at=tuple(at), height=float(height)) for k, at in enumerate(way.tolist())]
-
-
 def shot_camera(shot: Shot, terrain: EndlessTerrain, floor: float, width: int, height: int) -> Camera:
     """The camera of a shot, with a horizontal field of view of 60 degrees. floor: lowest height of the eye."""
     if isinstance(sphere := terrain.heights, Sphere):

@@ -201,7 +201,7 @@ def cut_tiles(
     shifts = np.stack([layout.label_shifts(plan, found.places, tile) for tile in range(len(found.labels))])
     soft = poisson_blending.make_soft_maps(colour, height)
     corrections = options.corrected * poisson_blending.solve_corrections(plan, found, shifts, soft)
-    fields, raised = _compose_tiles(binned, plan, found.labels, shifts, corrections)
+    fields = _compose_tiles(binned, plan, found.labels, shifts, corrections)
     report = {
         "places": {name: places.tolist() for name, places in vars(found.places).items()},
         "strip_energy": [strip.seam.energy for strip in found.strips],
@@ -210,10 +210,7 @@ def cut_tiles(
         "tile_gamma": [centre.gamma for centre in found.centres],
         "layout": plan.to_dict(),
         "texture": scale * exemplar.spacing,
-        "raised": raised.tolist(),
-        "energy": seam_energy.describe() | ({"semantics": semantic.description} if semantic else {}),
-        "trend": {"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
-        "correction": np.abs(corrections).max((0, 1, 2)).tolist(),
+        "energy": options.kind,
     }
     means = _average_uncertainty(uncertainty, found.labels, shifts)
     return TileSet(plan.side * exemplar.spacing, exemplar.spacing, fields, found.labels, shifts, means, report)
@@ -245,18 +242,18 @@ def _average_uncertainty(uncertainty: Array, labels: Array, shifts: Array) -> Fl
 
 def _compose_tiles(
     binned: list[compose.BinnedLevel], plan: Layout, labels: Array, shifts: Array, corrections: Array
-) -> tuple[list[list[GaussianField]], Float[Array, "tiles"]]:
-    """fields[level][tile] of all levels, and by how much each tile was raised."""
+) -> list[list[GaussianField]]:
+    """fields[level][tile] of all levels."""
     spacing = binned[0].exemplar.spacing
     tiles = [
         [_compose_level(level, labels[tile], shifts[tile], corrections[tile]) for level in binned]
         for tile in progress(range(len(labels)), "compose tiles")
     ]
-    tiles, raised = compose.equalise_heights(tiles, plan.side * spacing)
+    tiles = compose.equalise_heights(tiles, plan.side * spacing)
     for number in range(len(binned), plan.levels):  # cells wider than a block are merged from the tile's own
         cell = 2 ** (number - 1)
         tiles = [[*tile, compose.merge_cells(tile[-1], plan.side // cell, cell * spacing)] for tile in tiles]
-    return [list(level) for level in zip(*tiles, strict=True)], raised
+    return [list(level) for level in zip(*tiles, strict=True)]
 
 
 def _plan_layout(options: TilingOptions, scale: float, exemplar: Exemplar, fitted: int) -> Layout:

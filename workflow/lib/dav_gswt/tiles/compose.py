@@ -125,23 +125,20 @@ def bump(points: Float[Array, "n d"], side: float) -> Float[Array, "n"]:
     return s[:, 0] * s[:, 1]
 
 
-def equalise_heights(
-    tiles: list[list[GaussianField]], side: float
-) -> tuple[list[list[GaussianField]], Float[Array, "tiles"]]:
+def equalise_heights(tiles: list[list[GaussianField]], side: float) -> list[list[GaussianField]]:
     """Give all tiles the same mean height at the finest level; tiles[t][l] is level l of tile t.
 
     A rigid shift would tear borders apart, so a tile is raised by A_t bump(x, y) in all its levels alike; A_t makes
-    the mean over its finest Gaussians that of all tiles. Returns the tiles and the A_t.
+    the mean over its finest Gaussians that of all tiles.
     """
     heights = [float(levels[0].means[:, 2].astype(float).mean()) for levels in tiles]
     goal = float(np.mean(heights))
-    raised, amounts = [], []
+    raised = []
     for levels, mean in zip(tiles, heights, strict=True):
         share = bump(levels[0].means, side).mean()
         amount = (goal - mean) / share if share > 0 else 0.0
         raised.append([_raise_tile(field, amount, side) for field in levels])
-        amounts.append(amount)
-    return raised, np.array(amounts)
+    return raised
 
 
 def _raise_tile(field: GaussianField, amount: float, side: float) -> GaussianField:

@@ -13,7 +13,7 @@ through a shrub would be cheap. W is symmetric in the patches, finite, not negat
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import maxflow
 import numpy as np
@@ -109,15 +109,6 @@ class SeamEnergy:
     colours: CostLayer
     semantics: CostLayer | None
     occluders: CostLayer | None = None
-
-    def describe(self) -> dict[str, Any]:
-        """What seams are priced by, as JSON: scales of the layers, and weights."""
-        layers = {"colour": self.colours, "semantics": self.semantics}
-        scales = {name: vars(layer.unit) for name, layer in layers.items() if layer is not None}
-        standing = {"standing": OCCLUDER_WEIGHT} if self.occluders is not None else {}
-        weight = {"gamma": 0.5} if self.kind == "semantic-nogamma" else {"slope": self.slope}
-        weights = standing | ({} if self.semantics is None else weight)
-        return {"kind": self.kind, "scales": scales, "eps": EPS} | weights
 
     def gamma(self, uncertainty: float) -> float:
         """Weight of colour in the seams of a patch of this mean uncertainty in [0, 1].

@@ -58,12 +58,16 @@ def draw_candidates(layout: Layout, size: tuple[int, int], count: int, rng: np.r
 
 def patch_means(values: Float[Array, "m m"], places: Int[Array, "n 2"], size: tuple[int, int]) -> Float[Array, "n"]:
     """Mean of a map over a patch of `size` at each place."""
-    total = np.zeros((values.shape[0] + 1, values.shape[1] + 1))
-    total[1:, 1:] = values.cumsum(0).cumsum(1)
-    x, y = places.T
     width, height = size
-    box = total[y + height, x + width] - total[y, x + width] - total[y + height, x] + total[y, x]
-    return box / (width * height)
+    return box_sums(values, height, width)[places[:, 1], places[:, 0]] / (width * height)
+
+
+def box_sums(values: Array, rows: int, columns: int) -> Array:
+    """Sum over the box of `rows` x `columns` cells from each cell to the north-east that fits the map."""
+    total = np.zeros((values.shape[0] + 1, values.shape[1] + 1), np.float64 if values.dtype.kind == "f" else np.int64)
+    np.cumsum(values, 0, out=total[1:, 1:])
+    np.cumsum(total[1:, 1:], 1, out=total[1:, 1:])
+    return total[rows:, columns:] - total[:-rows, columns:] - total[rows:, :-columns] + total[:-rows, :-columns]
 
 
 def keep_certain(guide: GuidanceMaps, places: Int[Array, "n 2"], size: tuple[int, int]) -> Int[Array, "m 2"]:

@@ -8,7 +8,6 @@ segments are only names: other numbers for the same segments change nothing.
 import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Float32, Int, Integer
@@ -40,13 +39,12 @@ class SemanticSource:
 
 @dataclass(frozen=True)
 class SemanticLayer:
-    """An `energy.CostLayer`. distance: between two segments' features. description: what they are made of, as JSON."""
+    """An `energy.CostLayer`. distance: between two segments' features."""
 
     segments: Int[Array, "m m"]
     distance: Float32[Array, "s s"]
     slope: Float[Array, "m m 2"]
     unit: LayerScales
-    description: dict[str, Any]
 
     def distances(self, first: Cells, second: Cells) -> Float[Array, "..."]:
         return self.distance[self.segments[first], self.segments[second]].astype(float)
@@ -58,20 +56,18 @@ def make_semantic_layer(colour: Float[Array, "m m 3"], source: SemanticSource) -
     Raises: InputError: see `sam2.load_model`.
     """
     segments = segment_superpixels(colour, max(MIN_WIDTH, len(colour) / SUPERPIXELS**0.5))
-    description: dict[str, Any] = {"alexnet": source.alexnet is not None, "segments": "slic"}
     if source.sam2 is not None:
         from dav_gswt.tiles import sam2
 
         with one_thread():
             masks = sam2.predict_masks(sam2.load_model(source.sam2), colour)
         segments = overlay_masks(segments, masks)
-        description |= {"segments": "sam2 and slic", "masks": len(masks)}
     if source.alexnet is None:
         _log.info(
             "the config's `lpips` is none: cuts know colours and superpixels only; set it to `installed` or to a path "
             "(docs/reference/config.md)"
         )
-    return describe_segments(segments, colour, source.alexnet, description)
+    return describe_segments(segments, colour, source.alexnet)
 
 
 def segment_superpixels(colour: Float[Array, "m m 3"], side: float) -> Int[Array, "m m"]:
@@ -93,10 +89,7 @@ def overlay_masks(segments: Integer[Array, "m m"], masks: list[Array]) -> Int[Ar
 
 
 def describe_segments(
-    segments: Integer[Array, "m m"],
-    colour: Float[Array, "m m 3"],
-    alexnet: lpips_weights.Weights | None,
-    description: dict[str, Any],
+    segments: Integer[Array, "m m"], colour: Float[Array, "m m 3"], alexnet: lpips_weights.Weights | None
 ) -> SemanticLayer:
     """Describe an exemplar that has been segmented; the segments may have any numbers.
 
@@ -110,7 +103,7 @@ def describe_segments(
     slope = np.stack([_feature_gradient(index.T, distance).T, _feature_gradient(index, distance)], -1)
     share = count / count.sum()
     spread = float(np.sqrt(share @ distance.astype(float) ** 2 @ share))
-    return SemanticLayer(index, distance, slope, make_scales(spread, slope), description | {"count": len(count)})
+    return SemanticLayer(index, distance, slope, make_scales(spread, slope))
 
 
 def _subtract_kind(distance: Float[Array, "s s"], index: Int[Array, "m m"]) -> Float[Array, "s s"]:

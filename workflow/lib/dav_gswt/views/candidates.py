@@ -26,6 +26,7 @@ Candidates = list[tuple[Pose, Camera]]
 
 FREE_RADII = (0.4, 1.5)  # flying heights
 REACHED_RADII = (0.4, 1.0)  # flying heights, for devices and people: never higher than the first photos were taken
+LOWEST = 30.0  # degrees of elevation, of candidates of photographed scenes
 HEADINGS = 4  # at each stop of a route
 ANY_FIELD = 60.0  # degrees, of a camera that gets another lens
 
@@ -39,7 +40,7 @@ def list_remaining(
     lens of most pictures, the one that further photos are localised with.
     """
     if scene["agent"] == "render":
-        listed = list_rendered(scene, frame)
+        listed = list_poses(scene, frame, synthetic.lens(scene["size"]))
     else:
         known = read_colmap_model(model_folder)
         at = dict(zip(known.names, known.cameras, strict=True))
@@ -51,16 +52,11 @@ def list_remaining(
     return [(pose, camera) for pose, camera in listed if pose.name not in used]
 
 
-def list_rendered(scene: dict, frame: SceneFrame) -> Candidates:
-    """List the poses at which a synthetic scene may be rendered."""
-    return list_poses(scene, frame, synthetic.lens(scene["size"]))
-
-
 def list_poses(scene: dict, frame: SceneFrame, lens: Camera) -> Candidates:
     """List the poses that a scene's `poses` describes; an orbit where it says nothing.
 
-    scene: its keys `agent`, `candidates` (number), `min_elevation` (degrees) and `poses` are used. lens: a camera whose
-    lens and picture all have.
+    scene: its keys `agent`, `candidates` (number), `poses`, and of synthetic scenes `min_elevation` (degrees) are used.
+    lens: a camera whose lens and picture all have.
     Raises: InputError: a route without length.
     """
     poses = scene.get("poses", {"kind": "orbit"})
@@ -73,11 +69,10 @@ def list_poses(scene: dict, frame: SceneFrame, lens: Camera) -> Candidates:
 
 def _stand_around(scene: dict, poses: dict, frame: SceneFrame, lens: Camera) -> list[Camera]:
     """Cameras all around, each looking at its own aim point (free) or all at the middle (orbit)."""
-    count, lowest = scene["candidates"], scene["min_elevation"]
+    count, lowest = scene["candidates"], scene.get("min_elevation", LOWEST)
     radii, aims = (1.0, 1.0), 0.0
     if poses["kind"] == "free":
-        usual = FREE_RADII if scene["agent"] == "render" else REACHED_RADII
-        radii, aims = poses.get("radii", usual), poses.get("aims", 1.0)
+        radii, aims = FREE_RADII if scene["agent"] == "render" else REACHED_RADII, 1.0
     low, high = (frame.flying_height * radius for radius in radii)
     placed = camera_layouts.spread_free(count, lowest, (low, high), aims * frame.exemplar.side)
     return [

@@ -114,7 +114,7 @@ def compute_gain(
 
 
 class DirectionalCoverage:
-    """Gain of candidates in directional coverage, updated with every choice; implements `policies.InformationGain`."""
+    """Gain of candidates in directional coverage, updated with every choice."""
 
     def __init__(
         self,

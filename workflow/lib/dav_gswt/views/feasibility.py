@@ -1,4 +1,4 @@
-"""Feasibility of poses: in the ground or an object, too near the ground, hidden, or outside of the scene's limits.
+"""Feasibility of poses: in the ground or an object, too near the ground, or hidden.
 
 The ground is the whole height field as a mesh; rays decide what is hidden. trimesh traces them by embree, or slower by
 rtree where embree has no package. embree has single precision, so all coordinates are relative to the exemplar: its
@@ -22,14 +22,13 @@ from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.uncertainty import format_names
 
 _log = logging.getLogger(__name__)
 
 MOST = 512  # vertices of the mesh along the grid's longer side
 LATTICE = 9  # test points along a side of the exemplar
 SHARE = 0.5  # of the test points in the picture that must be visible
-CLEARANCE = 0.05  # flying heights: height of objects on the ground
+CLEARANCE = 0.05  # flying heights above the ground, at least: the height of objects on it
 OFF = 1e-4  # sides of the exemplar: height above the surface at which a ray starts
 SOLID = 0.5  # opacity from which a Gaussian counts as solid
 
@@ -54,46 +53,45 @@ class _GroundMesh:
         return (places - self.middle) / self.side
 
 
-def filter_feasible(
-    candidates: Candidates, grid: Ground, limits: dict | None = None, clearance: float | None = None
-) -> Candidates:
+def filter_feasible(candidates: Candidates, field: GaussianField, grid: Ground, flying_height: float) -> Candidates:
     """Keep the feasible candidates; the number of the others is logged with the reasons.
 
     Raises: InputError: none is feasible.
     """
-    reasons = find_infeasible(candidates, grid, limits, clearance)
+    reasons = find_infeasible(candidates, field, grid, CLEARANCE * flying_height)
     if not reasons:
         return candidates
     kinds = Counter(reason.split(":")[0] for reason in reasons.values())
     summary = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
     if len(reasons) == len(candidates):
-        raise InputError(f"no photo can be taken from any of the {len(candidates)} candidate poses: {summary}")
+        raise InputError(
+            f"no photo can be taken from any of the {len(candidates)} candidate poses ({summary}): set `poses` of the "
+            "scene, or check its ground"
+        )
     _log.info("%d of %d candidate poses are left out: %s", len(reasons), len(candidates), summary)
     return [(pose, camera) for pose, camera in candidates if pose.name not in reasons]
 
 
-def find_infeasible(
-    candidates: Candidates, grid: Ground, limits: dict | None = None, clearance: float | None = None
-) -> dict[str, str]:
+def find_infeasible(candidates: Candidates, field: GaussianField, grid: Ground, clearance: float) -> dict[str, str]:
     """Find infeasible poses. Returns the reason by pose name; the text before its colon is the kind of reason.
 
-    limits: min_height and max_height above the ground, max_distance from the exemplar's middle, in world units; each
-    may be missing. clearance: least distance from the ground, in world units; if None, CLEARANCE times the median
-    distance of the candidates from the middle, which is the flying height where they lie on its hemisphere.
-    A pose is hidden if fewer than SHARE of the test points in its picture are visible, or if it shows none.
+    clearance: least height above the ground, in world units. A pose is hidden if fewer than SHARE of the test points in
+    its picture are visible, or if it shows none, and inside an object if it is within one standard deviation of a solid
+    Gaussian.
     """
     if not candidates:
         return {}
     site = _build_mesh(grid)
     cameras = [camera for _, camera in candidates]
     centres = np.stack([camera.centre for camera in cameras])
-    if clearance is None:
-        clearance = CLEARANCE * float(np.median(np.linalg.norm(centres - site.middle, axis=1)))
-    reasons = (
-        _find_hidden(site, cameras, centres)
-        | _find_outside_limits(site, centres, limits or {})
-        | _find_near(site, centres, clearance)
-    )
+    reasons = _find_hidden(site, cameras, centres)
+    above = centres[:, 2] - grid.height_at(centres)
+    reasons |= {
+        i: f"too near the ground: {above[i]:.3g} above it, {clearance:.3g} is the least"
+        for i in _indices(above < clearance)
+    }
+    reasons |= {i: f"buried: {-above[i]:.3g} below the ground" for i in _indices(above <= 0)}
+    reasons |= dict.fromkeys(_indices(find_inside_objects(centres, field)), "inside an object")
     return {candidates[i][0].name: reasons[i] for i in sorted(reasons)}
 
 
@@ -121,48 +119,6 @@ def _make_faces(rows: int, columns: int) -> Int[Array, "n 3"]:
     a = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     b, c, d = a + 1, a + columns, a + columns + 1
     return np.stack([a, b, d, a, d, c], 1).reshape(-1, 3)
-
-
-def _find_near(site: _GroundMesh, centres: Float[Array, "n 3"], clearance: float) -> dict[int, str]:
-    """Find cameras below the surface or nearer to it than the clearance."""
-    above = centres[:, 2] - site.grid.height_at(centres)
-    away = np.minimum(np.abs(above), site.side * _measure_distance(site, site.local(centres)))
-    reasons = {
-        i: f"too near the ground: {away[i]:.3g} from it, {clearance:.3g} is the least"
-        for i in _indices(away < clearance)
-    }
-    return reasons | {i: f"buried: {-above[i]:.3g} below the ground" for i in _indices(above <= 0)}
-
-
-def _measure_distance(site: _GroundMesh, places: Float[Array, "n 3"]) -> Float[Array, "n"]:
-    """Distance to the mesh: to the triangles of the four cells around the nearest vertex."""
-    rows, columns = len(site.y), len(site.x)
-    nearest = cKDTree(site.mesh.vertices).query(places)[1]
-    row, column = np.divmod(nearest, columns)
-    i = np.clip(row[:, None] + np.array([-1, -1, 0, 0]), 0, rows - 2)
-    j = np.clip(column[:, None] + np.array([-1, 0, -1, 0]), 0, columns - 2)
-    cells = i * (columns - 1) + j
-    faces = np.stack([2 * cells, 2 * cells + 1], -1).reshape(len(places), -1)
-    corners = site.mesh.vertices[site.mesh.faces[faces.ravel()]]
-    all_places = np.repeat(places, faces.shape[1], axis=0)
-    found = trimesh.triangles.closest_point(corners, all_places)
-    return np.linalg.norm(found - all_places, axis=1).reshape(faces.shape).min(1)
-
-
-def _find_outside_limits(site: _GroundMesh, centres: Float[Array, "n 3"], limits: dict) -> dict[int, str]:
-    """Find cameras outside of the limits."""
-    above = centres[:, 2] - site.grid.height_at(centres)
-    away = np.linalg.norm(centres - site.middle, axis=1)
-    rules = (
-        ("max_distance", away, 1, "too far: {:.3g} from the middle, {:g} is the most"),
-        ("max_height", above, 1, "too high: {:.3g} above the ground, {:g} is the most"),
-        ("min_height", above, -1, "too low: {:.3g} above the ground, {:g} is the least"),
-    )
-    reasons = {}
-    for key, values, sign, text in rules:
-        if key in limits:
-            reasons |= {i: text.format(values[i], limits[key]) for i in _indices(sign * values > sign * limits[key])}
-    return reasons
 
 
 def _indices(mask: Bool[Array, "n"]) -> list[int]:
@@ -211,32 +167,6 @@ def _cast_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Arra
     rise = np.einsum("ni,ni->n", normal, a - origins[hit])
     found[hit] = rise / np.where(along == 0, np.nan, along)  # a ray within its triangle's plane
     return np.nan_to_num(found, nan=0.0, posinf=np.inf)
-
-
-def drop_blocked(candidates: Candidates, field: GaussianField, grid: Ground) -> Candidates:
-    """Keep the candidates that are above the ground and not within one standard deviation of a solid Gaussian.
-
-    Raises: InputError: none is left.
-    """
-    if not candidates:
-        return candidates
-    centres = np.stack([camera.centre for _, camera in candidates])
-    below, inside = find_below_ground(centres, grid), find_inside_objects(centres, field)
-    blocked = below | inside
-    if blocked.all():
-        names = format_names(blocked, [pose.name for pose, _ in candidates])
-        raise InputError(
-            f"pose {names}: all are below the ground or inside an object; no photo can be taken there. Set `poses`, "
-            "`feasibility` or `min_elevation` of the scene, or check its ground"
-        )
-    if blocked.any():
-        _log.info("%d candidate poses are below the ground, %d inside an object: left out", below.sum(), inside.sum())
-    return [candidate for candidate, out in zip(candidates, blocked, strict=True) if not out]
-
-
-def find_below_ground(centres: Float[Array, "n 3"], grid: Ground) -> Bool[Array, "n"]:
-    """Which positions are at or below the surface; none outside the grid."""
-    return grid.contains(centres) & (centres[:, 2] <= grid.height_at(centres))
 
 
 def find_inside_objects(centres: Float[Array, "n 3"], field: GaussianField) -> Bool[Array, "n"]:

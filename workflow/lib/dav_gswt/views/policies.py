@@ -4,11 +4,10 @@ To add one, write its function here and decorate it with `@policy(name, ...)`: n
 decorator. The workflow reads this module before any job, so it imports nothing slow.
 """
 
-import heapq
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float, Float64
@@ -18,26 +17,12 @@ from dav_gswt.geometry.poses import select_farthest_poses
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty import combine_terms
 
+if TYPE_CHECKING:
+    from dav_gswt.views.coverage import DirectionalCoverage
+
 AUTO = "auto"  # in the config: what `resolve_policy` says
 HIGHEST = 0.98  # quantile of all candidates' values at which colours of figures end
 POLICY_NAME = r"[a-z0-9-]+"  # what a policy's name is made of: it stands in paths between underscores
-
-
-@runtime_checkable
-class InformationGain(Protocol):
-    """Information that photos give about a field; it grows with every choice."""
-
-    def gains(self) -> list[float]:
-        """Return the gain of every candidate."""
-        ...
-
-    def gain(self, i: int) -> float:
-        """Return what a photo from candidate i adds to the photos taken or chosen so far."""
-        ...
-
-    def take(self, i: int) -> None:
-        """Add the photo from candidate i."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -52,7 +37,7 @@ class SelectionInput:
     k: int
     rng: np.random.Generator
     lam: float = 0.0
-    information: InformationGain | None = None
+    information: "DirectionalCoverage | None" = None
 
 
 @dataclass(frozen=True)
@@ -60,9 +45,9 @@ class Policy:
     """A policy: a function that returns indices of candidates, best first, and what the workflow must know of it.
 
     name: as in the config and in paths; small letters, digits and -. chooses: which poses, in words. needs: what it
-    reads beside the places of the candidates: `prior` (scores by a prior), `field` (it gets an `InformationGain`), and
-    for that object `photos` (the photos so far) or `truth` (true pictures of candidates, an oracle). fixed_zero: of the
-    prior's settings (p_drop, lam), those that have no effect and are 0 in paths.
+    reads beside the places of the candidates: `prior` (scores by a prior), `field` (it gets a `DirectionalCoverage`),
+    and for that object `photos` (the photos so far). fixed_zero: of the prior's settings (p_drop, lam), those that have
+    no effect and are 0 in paths.
     Raises: ValueError: another character in the name.
     """
 
@@ -79,8 +64,7 @@ class Policy:
     def describe_inputs(self) -> str:
         """What the policy reads, in words."""
         unread = f" (not {', '.join(f'`{key}`' for key in self.fixed_zero)})" if self.fixed_zero else ""
-        words = {"prior": f"prior{unread}", "truth": "true pictures"}
-        return ", ".join(words.get(need, need) for need in self.needs) or "poses"
+        return ", ".join(f"prior{unread}" if need == "prior" else need for need in self.needs) or "poses"
 
 
 POLICIES: dict[str, Policy] = {}
@@ -109,11 +93,6 @@ def farthest(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 
 @policy(
-    "oracle",
-    "as `coverage`, each cell weighted by the true error at the candidates: what a perfect score would choose",
-    needs=("field", "truth"),
-)
-@policy(
     "coverage-w2",
     "as `coverage`, each cell weighted by W2 between the prior's samples",
     needs=("prior", "field"),
@@ -131,10 +110,16 @@ def farthest(scores: Scores, inputs: SelectionInput) -> list[int]:
     needs=("field",),
 )
 def cover(scores: Scores, inputs: SelectionInput) -> list[int]:
-    """Greedy choice of the largest gain; every choice lowers the gain of the others."""
+    """Greedy choice of the largest gain; every choice lowers the gain of the others. Ties by index."""
     if (information := inputs.information) is None:
         raise ValueError("a policy of coverage needs the information that photos give about the field")
-    return lazy_greedy(information.gains(), information.gain, information.take, inputs.k)
+    chosen: list[int] = []
+    for _ in range(min(inputs.k, len(scores))):
+        gains = np.array(information.gains(), float)
+        gains[chosen] = -np.inf
+        chosen.append(int(gains.argmax()))
+        information.take(chosen[-1])
+    return chosen
 
 
 @policy("all", "all candidates, whatever `k` is")
@@ -179,9 +164,8 @@ def single(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 
 POLICY_NAMES = tuple(POLICIES)
-PRIOR_POLICIES, NEEDS_FIELD, NEEDS_PHOTOS, ORACLES = (
-    tuple(name for name, each in POLICIES.items() if need in each.needs)
-    for need in ("prior", "field", "photos", "truth")
+PRIOR_POLICIES, NEEDS_FIELD, NEEDS_PHOTOS = (
+    tuple(name for name, each in POLICIES.items() if need in each.needs) for need in ("prior", "field", "photos")
 )
 ZERO_SETTINGS = {name: each.fixed_zero for name, each in POLICIES.items() if each.fixed_zero}
 
@@ -200,7 +184,7 @@ def resolve_policy(policy: str, agent: str | None) -> str:
 def uncertainty(scores: Scores, lam: float, term: str = "w2_sq") -> Float64[Array, "n"]:
     """Return u = W2² + lam LPIPS of every candidate, or another term in place of W2²."""
     lpips = scores.terms.get("lpips")
-    return combine_terms(scores.term(term), lpips, lam, scores.scales, scores.names, term)
+    return combine_terms(scores.term(term), lpips, lam, scores.scales, term)
 
 
 def candidate_values(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
@@ -220,23 +204,3 @@ def candidate_values(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n
 def top(values: Float[Array, "n"], k: int) -> list[int]:
     """The k largest; ties by index."""
     return [int(i) for i in np.argsort(-values, kind="stable")[:k]]
-
-
-def lazy_greedy(gains: Iterable[float], gain: Callable[[int], float], take: Callable[[int], None], k: int) -> list[int]:
-    """Choose the same k items as plain greedy, with fewer evaluations: gains only fall as items are chosen.
-
-    gains: of each item before any choice. gain: returns an item's current gain. take: records a choice. Ties by index.
-    Source: Minoux, Accelerated greedy algorithms for maximizing submodular set functions, 1978.
-    """
-    queue = [(-value, i) for i, value in enumerate(gains)]
-    heapq.heapify(queue)
-    chosen: list[int] = []
-    while queue and len(chosen) < k:
-        _, i = heapq.heappop(queue)
-        now = gain(i)
-        if queue and (-now, i) > queue[0]:
-            heapq.heappush(queue, (-now, i))
-            continue
-        chosen.append(i)
-        take(i)
-    return chosen

@@ -14,7 +14,6 @@ from dav_gswt.images.image_files import enlarge_map
 from dav_gswt.views.scores import Scores
 
 Part = tuple[dict[str, Array], dict[str, str]]  # of an EXR: channels and header
-EMPTY_PARTS: dict[str, Part] = {"none": ({"uncertainty": np.zeros((1, 1), np.float32)}, {"camera": "no pose was left"})}
 
 
 @dataclass(frozen=True)
@@ -27,10 +26,6 @@ class PoseMaps:
     opacity: Float32[Array, "n h w"]
     w2_sq: Float32[Array, "n hz wz"] | None
     cells: Float32[Array, "n cells"]
-
-    def exr_parts(self, scores: Scores, names: list[str]) -> dict[str, Part]:
-        """Maps of some candidates, as parts of an EXR."""
-        return {name: self.exr_part(scores, name) for name in names}
 
     def exr_part(self, scores: Scores, name: str) -> Part:
         """Maps of a candidate on the pixels of its picture; header: pose and terms."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Float64, Int
+from jaxtyping import Float32, Int
 from numpy import ndarray as Array
 
 from dav_gswt.files import locate_path
@@ -15,16 +15,11 @@ from dav_gswt.logs import progress
 from dav_gswt.prior.interface import Condition, CopyablePrior, Prior
 from dav_gswt.threads import default_threads, map_in_single_threads
 from dav_gswt.views import terms
-from dav_gswt.views.uncertainty import robust_scale, w2_sq
+from dav_gswt.views.uncertainty import w2_sq
 
 _log = logging.getLogger(__name__)
 
 BATCH = 4  # poses sampled at a time: as fast as more at once, and few enough that every thread has some
-CHEAP = 2  # denoising steps of the first of two stages
-TOP = 20  # poses whose order matters: as many as a round may take
-STAGE = 16  # poses scored in full before it is decided whether more are needed
-RATIO = 0.95  # quantile of full over cheap values that bounds the full values of other poses
-FEW = 2 * (TOP + STAGE)  # up to so many poses a single stage costs less
 
 
 @dataclass(frozen=True)
@@ -77,42 +72,26 @@ def load_prior(entry: dict) -> Prior:
     return Zero123.open(locate_path(entry["folder"]))
 
 
-# by name the terms of poses, row by row, and `maps` of w2_sq, in cells of the latents
-SampledTerms = dict[str, Array]
+SampledTerms = dict[str, Array]  # by name the terms of poses, row by row, and `maps` of w2_sq, in cells of the latents
 
 
 def sample_terms(
     prior: PriorConfig, condition: Condition, names: list[str], masks: Float32[Array, "n s s"]
-) -> tuple[SampledTerms, Int[Array, "n"]]:
-    """Compute the terms of every pose, and the denoising steps used for each.
+) -> SampledTerms:
+    """Compute the terms of every pose.
 
-    Many poses are scored in two stages (`score_in_stages`): all with CHEAP steps, then the best in full.
     masks: 1 for pixels that look at the modelled ground. w2_sq is the mean over these (0 if there are none), and LPIPS
     sees only these; maps and gradient are of the whole picture.
     Raises: ValueError: fewer than 2 samples, p_drop outside [0, 1), something not finite, naming the poses.
     """
-    n, copies = len(condition), _copy_for_threads(prior, -(-len(condition) // BATCH))
+    parts = [np.arange(len(condition))[i : i + BATCH] for i in range(0, len(condition), BATCH)]
 
-    def sample_rows(rows: Int[Array, "k"], steps: int, what: str) -> SampledTerms:
-        parts = [rows[i : i + BATCH] for i in range(0, len(rows), BATCH)]
+    def worker(own: PriorConfig) -> Callable[[Int[Array, "b"]], SampledTerms]:
+        return lambda r: _sample_batch(own, condition[r], [names[i] for i in r], masks[r])
 
-        def worker(own: PriorConfig) -> Callable[[Int[Array, "b"]], SampledTerms]:
-            return lambda r: _sample_batch(own, condition[r], [names[i] for i in r], steps, masks[r])
-
-        made = map_in_single_threads([worker(own) for own in copies], parts)
-        found = [part for _, part in zip(progress(parts, what), made, strict=True)]
-        return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
-
-    if n <= FEW or prior.steps <= CHEAP:
-        return sample_rows(np.arange(n), prior.steps, "sample poses"), np.full(n, prior.steps)
-    found, full = score_in_stages(
-        n,
-        lambda rows: sample_rows(rows, CHEAP, "sample poses"),
-        lambda rows: sample_rows(rows, prior.steps, "sample best poses"),
-    )
-    share = (n * CHEAP + int(full.sum()) * prior.steps) / (n * prior.steps)
-    _log.info("%d of %d poses were sampled in full: %.0f %% of the cost of all", full.sum(), n, 100 * share)
-    return found, np.where(full, prior.steps, CHEAP)
+    made = map_in_single_threads([worker(own) for own in _copy_for_threads(prior, len(parts))], parts)
+    found = [part for _, part in zip(progress(parts, "sample poses"), made, strict=True)]
+    return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
 
 
 def _copy_for_threads(prior: PriorConfig, batches: int) -> list[PriorConfig]:
@@ -124,65 +103,9 @@ def _copy_for_threads(prior: PriorConfig, batches: int) -> list[PriorConfig]:
 
 
 def _sample_batch(
-    prior: PriorConfig, condition: Condition, names: list[str], steps: int, masks: Float32[Array, "k s s"]
+    prior: PriorConfig, condition: Condition, names: list[str], masks: Float32[Array, "k s s"]
 ) -> SampledTerms:
-    latents = prior.model.sample(condition, prior.samples, prior.p_drop, steps, prior.seed)
+    latents = prior.model.sample(condition, prior.samples, prior.p_drop, prior.steps, prior.seed)
     maps, pictures = w2_sq(latents, names=names)[1], prior.model.decode(latents).rgba[..., :3]
-    render, plain = prior.model.encode_render(condition), prior.p_drop == 0
-    drawn = terms.Samples(condition, names, latents, maps, pictures, render, masks, prior.weights, plain)
+    drawn = terms.Samples(condition, maps, pictures, masks, prior.weights, prior.p_drop == 0)
     return terms.compute_terms(drawn) | {"maps": maps}
-
-
-def score_in_stages(
-    n: int,
-    cheap: Callable[[Int[Array, "k"]], SampledTerms],
-    full: Callable[[Int[Array, "k"]], SampledTerms],
-    top: int = TOP,
-) -> tuple[SampledTerms, Bool[Array, "n"]]:
-    """Score n poses in two stages. Returns the terms, and which poses were scored in full.
-
-    Poses are scored in full in the order of their best cheap rank, by any term and by the terms' sum, until for each of
-    these the `top` best full values exceed the bound of all remaining poses: their cheap value times the RATIO quantile
-    of full over cheap. The remaining poses keep their cheap values times the median ratio.
-    """
-    first, done = cheap(np.arange(n)), np.zeros(n, bool)
-    found = {name: values.copy() for name, values in first.items()}
-    scales = {name: robust_scale(values) for name, values in first.items() if name != "maps"}
-    before = _rankings(first, scales)
-    order = np.argsort(np.min([np.argsort(np.argsort(-v, kind="stable")) for v in before.values()], 0), kind="stable")
-    while len(rest := order[~done[order]]):
-        if done.sum() >= top and not _may_enter_top(_rankings(found, scales), before, done, top):
-            break
-        rows = np.sort(rest[: STAGE if done.any() else top + STAGE])
-        for name, values in full(rows).items():
-            found[name][rows] = values
-        done[rows] = True
-    if not done.all():
-        usual = {name: np.median(_ratios(found[name][done], first[name][done])) for name in scales}
-        for name, values in first.items():
-            ratio = usual[name] if name in usual else np.float32(usual["w2_sq"])
-            found[name][~done] = ratio * values[~done]
-    return found, done
-
-
-def _rankings(found: SampledTerms, scales: dict[str, float]) -> dict[str, Float64[Array, "n"]]:
-    """Values by which policies may rank poses; so does their sum."""
-    named = {name: found[name] for name in scales if terms.TERMS[name].ranks}
-    total = sum((values / (scales[name] or 1) for name, values in named.items()), np.zeros(len(found["maps"])))
-    return named | {"sum": total}
-
-
-def _may_enter_top(
-    now: dict[str, Float64[Array, "n"]], before: dict[str, Float64[Array, "n"]], done: Bool[Array, "n"], top: int
-) -> bool:
-    """Whether a pose scored only cheaply may belong to the best `top` by any ranking."""
-    for name, full in now.items():
-        bound = before[name][~done] * np.quantile(_ratios(full[done], before[name][done]), RATIO)
-        if (bound > np.sort(full[done])[-top]).any():
-            return True
-    return False
-
-
-def _ratios(full: Float[Array, "k"], cheap: Float[Array, "k"]) -> Float64[Array, "_"]:
-    there = cheap > 0
-    return full[there] / cheap[there] if there.any() else np.ones(1)

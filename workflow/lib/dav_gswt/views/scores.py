@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float64, Int
+from jaxtyping import Float64
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError, summarize_error
@@ -25,14 +25,12 @@ PLACE = "elevation", "azimuth", "radius"
 class Scores:
     """Scores of n candidates.
 
-    terms: the available ones of `terms.TERMS`. scales: divisor of each term, fixed in the first round. steps: denoising
-    steps behind the prior terms of a candidate; 0 without a prior.
+    terms: the available ones of `terms.TERMS`. scales: divisor of each term, fixed in the first round.
     """
 
     poses: list[Pose]
     terms: dict[str, Float64[Array, "n"]]
     scales: Scales
-    steps: Int[Array, "n"]
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -57,7 +55,7 @@ def _list_terms() -> dict:
 def list_columns() -> tuple[str, ...]:
     """The columns of scores.csv."""
     names = _list_terms()
-    return ("pose", *PLACE, *names, "steps", *(f"{name}_scale" for name in names))
+    return ("pose", *PLACE, *names, *(f"{name}_scale" for name in names))
 
 
 def write_scores(path: Path | str, scores: Scores) -> None:
@@ -66,8 +64,7 @@ def write_scores(path: Path | str, scores: Scores) -> None:
         table = csv.DictWriter(file, list_columns())
         table.writeheader()
         for i, pose in enumerate(scores.poses):
-            row = {"pose": pose.name, "steps": int(scores.steps[i])}
-            row |= {k: repr(getattr(pose, k)) for k in PLACE}
+            row = {"pose": pose.name} | {k: repr(getattr(pose, k)) for k in PLACE}
             row |= {name: repr(float(values[i])) for name, values in scores.terms.items()}
             row |= {f"{name}_scale": repr(scores.scales.by_term[name]) for name in scores.terms}
             table.writerow(row)
@@ -82,7 +79,6 @@ def read_scores(path: Path | str) -> Scores:
         known = [name for name in _list_terms() if rows and rows[0][name]]
         terms = {name: np.array([float(r[name]) for r in rows]) for name in known}
         scales = Scales({name: float(rows[0][f"{name}_scale"]) for name in known})
-        steps = np.array([int(r["steps"]) for r in rows], int)
         if not np.isfinite([(p.elevation, p.azimuth, p.radius) for p in poses]).all():
             raise ValueError("a pose is not finite")
     except (KeyError, TypeError, ValueError, OverflowError, OSError, csv.Error) as error:
@@ -90,7 +86,7 @@ def read_scores(path: Path | str) -> Scores:
     bad = sorted({i for values in terms.values() for i in np.flatnonzero(~np.isfinite(values))})
     if bad:
         raise InputError(f"{path}: the scores of {', '.join(poses[i].name for i in bad[:5])} are not finite")
-    return Scores(poses, terms, scales, steps)
+    return Scores(poses, terms, scales)
 
 
 @dataclass(frozen=True)

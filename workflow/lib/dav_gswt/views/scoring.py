@@ -25,7 +25,7 @@ from dav_gswt.views.pose_maps import Part, PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import FrozenScales, Scores
 from dav_gswt.views.terms import Renders, compute_terms
-from dav_gswt.views.uncertainty import Quantiles, Scales, normalise
+from dav_gswt.views.uncertainty import Quantiles, Scales, normalise, require_finite
 
 WIDTH = 96  # pixels along the longer side of a picture for scoring
 PHOTO_WIDTH = 384  # pixels across a captured photo that conditions a prior, before cropping and shrinking
@@ -45,19 +45,16 @@ class ScoringResult:
     gaussians: Float32[Array, "gaussians"]
 
     def describe(self) -> dict:
-        """Summary for scores.json: number of candidates, available terms, and poses by denoising steps."""
-        steps, count = np.unique(self.scores.steps, return_counts=True)
-        by_steps = {str(s): int(n) for s, n in zip(steps, count, strict=True)}
-        return {"candidates": len(self.scores), "terms": list(self.scores.terms), "poses_by_steps": by_steps}
+        """Summary for scores.json: number of candidates, and available terms."""
+        return {"candidates": len(self.scores), "terms": list(self.scores.terms)}
 
 
 def make_exr_parts(result: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
     """Maps for display as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
     above = render_top_view(replace(field, uncertainty=result.gaussians), grid).uncertainty[::-1]
+    parts = {"above": ({"uncertainty": above}, {"camera": "straight above"})}
     names = [result.scores.names[i] for i in select_farthest_poses(result.scores.poses, SHOWN)]
-    return {"above": ({"uncertainty": above}, {"camera": "straight above"})} | result.maps.exr_parts(
-        result.scores, names
-    )
+    return parts | {name: result.maps.exr_part(result.scores, name) for name in names}
 
 
 def scoring_camera(camera: Camera) -> Camera:
@@ -80,17 +77,19 @@ def score_poses(
     taken: the photos so far. prior: None for geometric terms only. frozen: of the first round; None in the first round.
     """
     renders = _render_candidates(field, grid, candidates, [scoring_camera(v.camera) for v in taken])
-    terms, steps, w2_sq = compute_terms(renders), np.zeros(len(candidates), int), None
+    terms, w2_sq = compute_terms(renders), None
     poses, names = [pose for pose, _ in candidates], [pose.name for pose, _ in candidates]
     if prior is not None and candidates:
         condition, masks = build_conditions(field, grid, candidates, taken, frame, prior.model.size)
-        sampled, steps = prior_sampling.sample_terms(prior, condition, names, masks)
+        sampled = prior_sampling.sample_terms(prior, condition, names, masks)
         w2_sq = sampled.pop("maps")
         terms |= {name: values.astype(np.float64) for name, values in sampled.items()}
-    frozen = frozen or _freeze_scales(terms, w2_sq, names)
+    for name, values in terms.items():
+        require_finite(values, name, names)
+    frozen = frozen or _freeze_scales(terms, w2_sq)
     maps = PoseMaps(names, _stack_maps(renders.uncertainty), w2_sq, renders.seen.pixels)
     gaussians = _gaussian_uncertainty(field, candidates, w2_sq, frozen)
-    return ScoringResult(Scores(poses, terms, frozen.scales, steps), maps, frozen, gaussians)
+    return ScoringResult(Scores(poses, terms, frozen.scales), maps, frozen, gaussians)
 
 
 def build_conditions(
@@ -140,11 +139,9 @@ def ground_mask(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
     return mask_outside_ground(blank, *grid.judged).weight
 
 
-def _freeze_scales(
-    terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"] | None, names: list[str]
-) -> FrozenScales:
+def _freeze_scales(terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"] | None) -> FrozenScales:
     pixels = None if w2_sq is None or not w2_sq.size else Quantiles.from_values(w2_sq.ravel())
-    return FrozenScales(Scales.from_terms(terms, names), pixels)
+    return FrozenScales(Scales.from_terms(terms), pixels)
 
 
 def _gaussian_uncertainty(

@@ -16,34 +16,24 @@ _log = logging.getLogger(__name__)
 class PoseSelection:
     """The poses that a round requests, in the order of choice.
 
-    k: poses of a full round. stopped: reason why no pose is requested, else None. expected: predicted gain as a JSON
-    value, see `stopping.Decision.expected_gain`. chosen_with: the preset whose round it was, where this is a copy.
+    k: poses of a full round. chosen_with: the preset whose round it was, where this is a copy.
     """
 
     policy: str
     k: int
     poses: list[Pose]
-    stopped: str | None = None
-    expected: dict | None = None
     chosen_with: str | None = None
-
-    def describe_outcome(self) -> dict:
-        """Why no pose is requested and the predicted gain, as metrics.json holds them."""
-        return {"stopped": self.stopped, "expected": self.expected}
-
-
-def poses_per_round(policy: str, k: int, candidates: int) -> int:
-    """Return k, or the number of candidates for the policy `all`, which takes them in one round."""
-    return candidates if policy == "all" else k
 
 
 def select_poses(policy: str, scores: Scores, inputs: SelectionInput) -> list[Pose]:
-    """Return the poses that a policy chooses, at most k. Of fewer candidates all are taken, with a warning."""
+    """Return the poses that a policy chooses: k, or for `all` all. Of fewer than k all are taken, with a warning."""
     if not len(scores):
         _log.warning("no candidate pose is left: no photo is taken, the field stays as it is")
         return []
     if inputs.k > len(scores):
         _log.warning("%d poses were asked for; all candidates that are left are taken: %d", inputs.k, len(scores))
+        inputs = replace(inputs, k=len(scores))
+    if policy == "all":
         inputs = replace(inputs, k=len(scores))
     return [scores.poses[i] for i in POLICIES[policy].choose(scores, inputs)[: inputs.k]]
 

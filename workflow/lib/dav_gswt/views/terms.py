@@ -1,8 +1,8 @@
 """Score terms: functions that say how much a photo from each candidate pose would tell.
 
-To add one, write its function here and decorate it with `@term(name, ...)`: columns of scores.csv, scales and the
-two-stage scoring follow from the decorator. A term without a prior is computed from `Renders` of all candidates; a term
-with a prior from `Samples` of some of them, and may be None where the prior's settings leave it out.
+To add one, write its function here and decorate it with `@term(name, ...)`: columns of scores.csv and scales follow
+from the decorator. A term without a prior is computed from `Renders` of all candidates; a term with a prior from
+`Samples` of some of them, and may be None where the prior's settings leave it out.
 """
 
 from collections.abc import Callable
@@ -38,17 +38,13 @@ class Renders:
 class Samples:
     """What a prior draws at n candidates.
 
-    maps: w2_sq of the latents by pixel. render: latents of the field's renders. masks: 1 for the pixels of a picture
-    that look at the modelled ground. weights: of LPIPS, None without. plain: no dropout and common noise, so that all
-    samples of a pose are one.
+    maps: w2_sq of the latents by pixel. masks: 1 for the pixels of a picture that look at the modelled ground. weights:
+    of LPIPS, None without. plain: no dropout and common noise, so that all samples of a pose are one.
     """
 
     condition: Condition
-    names: list[str]
-    latents: Float32[Array, "n m c h w"]
     maps: Float32[Array, "n h w"]
     pictures: Float32[Array, "n m s s 3"]
-    render: Float32[Array, "n c h w"]
     masks: Float32[Array, "n s s"]
     weights: Weights | None
     plain: bool
@@ -56,22 +52,21 @@ class Samples:
 
 @dataclass(frozen=True)
 class Term:
-    """A term. ranks: some policy ranks by it. requires: what a user must set to get it; empty: nothing."""
+    """A term. requires: what a user must set to get it; empty: nothing."""
 
     compute: Callable[[Any], Float64[Array, "n"] | None]
     source: type
-    ranks: bool
     requires: str
 
 
 TERMS: dict[str, Term] = {}
 
 
-def term(name: str, source: type = Samples, ranks: bool = False, requires: str = "a prior (docs/prior.md)") -> Callable:
+def term(name: str, source: type = Samples, requires: str = "a prior (docs/prior.md)") -> Callable:
     """Register a function as a term; see `Term`."""
 
     def register(function: Callable) -> Callable:
-        TERMS[name] = Term(function, source, ranks, requires)
+        TERMS[name] = Term(function, source, requires)
         return function
 
     return register
@@ -96,13 +91,13 @@ def coverage(given: Renders) -> Float64[Array, "n"]:
     return np.array(DirectionalCoverage(given.cells, given.taken, given.seen).gains(), float)
 
 
-@term("w2_sq", ranks=True)
+@term("w2_sq")
 def disagreement(given: Samples) -> Float64[Array, "n"]:
     """Squared W2 of the samples' latents, mean over the cells that look at the modelled ground."""
     return weighted_mean(given.maps, given.masks)
 
 
-@term("lpips", ranks=True)
+@term("lpips")
 def perceptual_disagreement(given: Samples) -> Float64[Array, "n"] | None:
     """Mean LPIPS between the pairs of samples, where they look at the modelled ground."""
     if given.weights is None:
@@ -115,12 +110,11 @@ def perceptual_disagreement(given: Samples) -> Float64[Array, "n"] | None:
 @term("gradient")
 def texture(given: Samples) -> Float64[Array, "n"]:
     """Image gradient of the mean picture, a part of the paper's u_img."""
-    return image_gradient(given.pictures, names=given.names)
+    return image_gradient(given.pictures)
 
 
 @term(
     "single",
-    ranks=True,
     requires="a prior without dropout (p_drop 0), and the config's `lpips` as `installed` or a path "
     "(docs/reference/config.md)",
 )
@@ -132,12 +126,6 @@ def single(given: Samples) -> Float64[Array, "n"] | None:
 
     one, render = ((2 * p - 1) * given.masks[..., None] for p in (given.pictures[:, 0], given.condition.colour))
     return lpips.distance(one, render, given.weights)
-
-
-@term("residual")
-def residual(given: Samples) -> Float64[Array, "n"]:
-    """Squared distance of the samples' mean from the latents of the render."""
-    return weighted_mean(((given.latents.mean(1) - given.render) ** 2).sum(1), given.masks)
 
 
 def weighted_mean(maps: Float32[Array, "n h w"], masks: Float32[Array, "n s s"]) -> Float64[Array, "n"]:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Float64
+from jaxtyping import Float, Float32, Float64
 from numpy import ndarray as Array
 from scipy.special import expit
 
@@ -19,22 +19,13 @@ NAMED = 5  # poses named in a message
 LUMINANCE = 0.2126, 0.7152, 0.0722  # of Rec. 709's red, green and blue
 
 
-def reject_poses(bad: Bool[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
-    """Raises: ValueError: any pose is bad; the message names the poses, or their indices without names."""
-    if bad.any():
-        raise ValueError(f"{what} of pose {format_names(bad, names)}")
-
-
-def format_names(bad: Bool[Array, "n"], names: Sequence[str] | None = None) -> str:
-    """Format the first bad poses by name, or by index without names, and the number of others."""
-    found = [names[i] if names is not None else str(i) for i in np.flatnonzero(bad).tolist()]
-    more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
-    return ", ".join(found[:NAMED]) + more
-
-
 def require_finite(values: Float[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
-    """Raises: ValueError: a value that is NaN or infinite, naming the poses."""
-    reject_poses(~np.isfinite(values), f"not finite: {what}", names)
+    """Raises: ValueError: a value that is NaN or infinite, naming the poses, or their indices without names."""
+    bad = np.flatnonzero(~np.isfinite(values)).tolist()
+    if bad:
+        found = [names[i] if names is not None else str(i) for i in bad[:NAMED]]
+        more = f" and {len(bad) - NAMED} more" if len(bad) > NAMED else ""
+        raise ValueError(f"not finite: {what} of pose {', '.join(found)}{more}")
 
 
 def w2_sq(
@@ -50,8 +41,7 @@ def w2_sq(
 
     Args:   variances: of each latent; None: each is a point (deviations 0). names: of the poses, for errors.
     Returns: the mean over pixels, and the map, both in squared latent units; exactly 0 where all samples agree.
-    Raises: ValueError: m < 2 (no pair), a value that is not finite or whose square is not, a variance below 0, naming
-            the poses.
+    Raises: ValueError: m < 2 (no pair), or a value that is not finite or whose square is not, naming the poses.
     Source: DAV-GSWT, Eq. (w2_pixel), in a form that float32 holds.
     """
     if (m := means.shape[1]) < 2:
@@ -59,7 +49,6 @@ def w2_sq(
     with np.errstate(over="ignore", invalid="ignore"):  # rejected below
         maps = _twice_the_variance(means)
         if variances is not None:
-            reject_poses(np.any(variances < 0, axis=(1, 2, 3, 4)), "variance below 0", names)
             maps = maps + _twice_the_variance(np.sqrt(variances, dtype=np.float64))
         scores = maps.mean((1, 2), dtype=np.float64)
     require_finite(scores, "the latents, or their squared distance,", names)
@@ -73,20 +62,17 @@ def _twice_the_variance(samples: Float[Array, "b m c h w"]) -> Float[Array, "b h
     return np.einsum("bmchw,bmchw->bhw", apart, apart) * samples.dtype.type(2 / (samples.shape[1] - 1))
 
 
-def image_gradient(pictures: Float32[Array, "n m h w 3"], names: Sequence[str] | None = None) -> Float64[Array, "n"]:
+def image_gradient(pictures: Float32[Array, "n m h w 3"]) -> Float64[Array, "n"]:
     """Mean over pixels of the gradient's 2-norm, of the mean of the m pictures decoded at each pose; per pixel step.
 
     Returns: 0 for a constant picture; a times as much for pictures times a.
-    Raises: ValueError: no picture, a side under 2 pixels, a value that is not finite, naming the poses.
+    Raises: ValueError: no picture, or a side under 2 pixels.
     Source: DAV-GSWT, Eq. (uncert_img), its first term.
     """
     _, m, h, w, _ = pictures.shape
     if m < 1 or min(h, w) < 2:
         raise ValueError(f"a gradient needs at least one picture of 2 x 2 pixels, not {m} of {w} x {h}")
-    with np.errstate(invalid="ignore"):  # rejected below
-        found = gradient_map(pictures.mean(1, dtype=np.float64) @ np.array(LUMINANCE)).mean((1, 2))
-    require_finite(found, "the decoded pictures", names)
-    return found
+    return gradient_map(pictures.mean(1, dtype=np.float64) @ np.array(LUMINANCE)).mean((1, 2))
 
 
 def gradient_map(values: Float64[Array, "n h w"]) -> Float64[Array, "n h w"]:
@@ -111,13 +97,8 @@ class Scales:
             raise ValueError(f"the scale of {', '.join(bad)} is not a number of at least 0")
 
     @staticmethod
-    def from_terms(terms: Mapping[str, Float[Array, "n"]], names: Sequence[str] | None = None) -> "Scales":
-        """Compute robust scales of the terms of all candidates. A term that is 0 everywhere is logged.
-
-        Raises: ValueError: a value that is not finite, naming the poses.
-        """
-        for name, values in terms.items():
-            require_finite(values, name, names)
+    def from_terms(terms: Mapping[str, Float[Array, "n"]]) -> "Scales":
+        """Compute robust scales of the terms of all candidates. A term that is 0 everywhere is logged."""
         scales = Scales({name: robust_scale(values) for name, values in terms.items()})
         for name in (n for n, scale in scales.by_term.items() if scale == 0):
             _log.warning("%s is 0 at every candidate: the term has no weight", name)
@@ -158,7 +139,6 @@ def combine_terms(
     lpips: Float[Array, "n"] | None,
     lam: float,
     scales: Scales,
-    names: Sequence[str] | None = None,
     name: str = "w2_sq",
 ) -> Float64[Array, "n"]:
     """u = W2² + lam LPIPS, each over its frozen scale (`w2_sq`, `lpips`). lpips: None where its weights are missing.
@@ -166,14 +146,14 @@ def combine_terms(
     lam = 0 ranks by W2, a large lam by LPIPS; the units of the latent space do not matter. Without LPIPS its term is
     left out, with a warning if lam > 0. name: `gradient` for u_img, an ablation, with the picture's gradient in place
     of W2; the appendix's aggregate of both is their sum.
-    Raises: ValueError: lam below 0 or not finite; a term without scale; a value that is not finite, naming the poses.
+    Raises: ValueError: lam below 0 or not finite, or a term without scale.
     Source: DAV-GSWT, Eq. (uncert_latent), Eq. (uncert_img).
     """
     if not 0 <= lam < np.inf:
         raise ValueError(f"lam must be a number of at least 0, not {lam}")
-    total = _divide_by_scale(name, first, scales, names)
+    total = _divide_by_scale(name, first, scales)
     if lpips is not None:
-        return total + lam * _divide_by_scale("lpips", lpips, scales, names)
+        return total + lam * _divide_by_scale("lpips", lpips, scales)
     if lam > 0:
         _log.warning(
             "the scores lack LPIPS, its term is left out: the uncertainty is %s alone; "
@@ -183,24 +163,18 @@ def combine_terms(
     return total
 
 
-def _divide_by_scale(name: str, values: Float[Array, "n"], scales: Scales, names) -> Float64[Array, "n"]:
+def _divide_by_scale(name: str, values: Float[Array, "n"], scales: Scales) -> Float64[Array, "n"]:
     if name not in scales.by_term:
         raise ValueError(f"{name} has no frozen scale")
-    require_finite(values, name, names)
     scale = scales.by_term[name]
     return values.astype(np.float64) / scale if scale > 0 else np.zeros(len(values))
 
 
-def normalise(
-    u: Float[Array, "..."], quantiles: Quantiles, names: Sequence[str] | None = None
-) -> Float32[Array, "..."]:
+def normalise(u: Float[Array, "..."], quantiles: Quantiles) -> Float32[Array, "..."]:
     """Map u linearly to [0, 1], 0 at the low quantile and below, 1 at the high one and above.
 
     If both quantiles are equal, values above them become 1, the others 0.
-    Raises: ValueError: a value that is not finite, naming the poses (the first axis).
     """
-    finite = np.isfinite(u).reshape(u.shape[0] if u.ndim else 1, -1)
-    reject_poses(~np.all(finite, axis=1), "not finite: the uncertainty", names)
     wide = u.astype(np.float64)
     span = quantiles.high - quantiles.low
     share = (wide - quantiles.low) / span if span > 0 else wide > quantiles.high

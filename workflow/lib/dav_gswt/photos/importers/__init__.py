@@ -35,8 +35,8 @@ _log = logging.getLogger(__name__)
 def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> Registration:
     """The photos of a folder with the cameras of a model.
 
-    A photo belongs to the image of the same name: the path below the folder, else the file name,
-    else the stem. It may be a scaled copy. The points are those of the model if it says which image
+    A photo belongs to the image of the same name: the path below the folder, else the stem. It may
+    be a scaled copy. The points are those of the model if it says which image
     sees them. Otherwise they are triangulated from features under the given cameras.
     Raises: InputError: not a model, damaged, one that is not read, or fewer than three photos have a camera in it.
     """

@@ -8,7 +8,6 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
@@ -48,10 +47,8 @@ class ImportedModel:
     """The images of a model. If the file has observations, image image_of[k] sees point point_of[k]
     at pixels[k].
 
-    colours: sRGB in [0, 1]. reasons: of images that the file has, but that cannot be used with the
-    others.
-    about: the place of the world's origin, if the world is known to be in metres east, north and
-    up.
+    colours: sRGB in [0, 1]. about: the place of the world's origin, if the world is known to be in
+    metres east, north and up.
     """
 
     shots: tuple[ImportedImage, ...]
@@ -60,7 +57,6 @@ class ImportedModel:
     point_of: Int[Array, "m"] = field(default_factory=lambda: np.zeros(0, int))
     image_of: Int[Array, "m"] = field(default_factory=lambda: np.zeros(0, int))
     pixels: Float[Array, "m 2"] = field(default_factory=lambda: np.zeros((0, 2)))
-    reasons: Mapping[str, str] = field(default_factory=dict)
     about: Georeference | None = None
 
 

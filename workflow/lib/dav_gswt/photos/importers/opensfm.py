@@ -41,14 +41,12 @@ def import_opensfm(path: Path, values: list, photos: Path) -> ImportedModel:
     for i, part in enumerate(values):
         check_entry(part, "shots", dict, f"{path}: reconstruction {i}")
     best = max(range(len(values)), key=lambda i: len(values[i]["shots"]))
-    others = {}
     for i, part in enumerate(values):
         if i != best:
             _log.warning(
                 "%s: reconstruction %d with %d images is left out: it does not hang together with the largest, of %d",
                 *(path, i, len(part["shots"]), len(values[best]["shots"])),
             )
-            others |= dict.fromkeys(part["shots"], "it is in another, smaller reconstruction of the file")
     chosen = values[best]
     cameras = {
         key: _lens(camera, f"{path}: camera {key[:80]!r}")
@@ -56,7 +54,7 @@ def import_opensfm(path: Path, values: list, photos: Path) -> ImportedModel:
     }
     shots = tuple(_read_shot(name, shot, cameras, photos, path) for name, shot in chosen["shots"].items())
     check_distinct([s.name for s in shots], str(path))
-    return ImportedModel(shots, reasons=others, about=_read_georeference(chosen, path))
+    return ImportedModel(shots, about=_read_georeference(chosen, path))
 
 
 def _read_georeference(chosen: dict, path: Path) -> Georeference | None:

@@ -1,6 +1,6 @@
 """Matching of the photos in a folder with the images of an imported model, by their names."""
 
-import os
+import re
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -15,9 +15,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.importers import lens_models
 from dav_gswt.photos.importers.checks import ImportedModel
 from dav_gswt.photos.importers.lens_models import fit_camera_to_photo
-from dav_gswt.photos.photo_files import name_pictures, split_name
-
-MOST_FILES = 200_000  # looked through for photos
+from dav_gswt.photos.photo_files import name_pictures, split_stem
 
 
 @dataclass(frozen=True)
@@ -38,37 +36,28 @@ class MatchedPhoto:
 
 
 class PhotoFolder:
-    """The photos below a folder, by their path relative to it, by file name and by stem."""
+    """The photos below a folder, by their path relative to it."""
 
     def __init__(self, folder: Path):
         if not folder.is_dir():
             raise InputError(f"{folder}: there is no such folder of photos")
         self.folder = folder
-        self.photos: dict[str, Path] = {}
-        looked = 0
-        for root, folders, files in os.walk(folder):
-            folders[:] = sorted(f for f in folders if not f.startswith("."))
-            looked += len(files)
-            if looked > MOST_FILES:
-                raise InputError(f"{folder}: more than {MOST_FILES} files; give the folder of the photos alone")
-            for file in sorted(files):
-                if not file.startswith(".") and Path(file).suffix.lower() in image_files.SUFFIXES:
-                    self.photos[(Path(root) / file).relative_to(folder).as_posix()] = Path(root) / file
+        files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+        found = (path for path in files if path.suffix.lower() in image_files.SUFFIXES)
+        names = {path.relative_to(folder).as_posix(): path for path in found}
+        self.photos = {name: path for name, path in names.items() if not re.search(r"(^|/)\.", name)}
         if not self.photos:
             raise InputError(f"{folder}: no photos in this folder; put .jpg, .png or .tif files into it")
-        self._tables: list[dict[str, list[str]]] = [defaultdict(list) for _ in range(3)]
+        self._stems: dict[str, list[str]] = defaultdict(list)
         for name in self.photos:
-            for table, label in zip(self._tables, split_name(name), strict=True):
-                table[label].append(name)
+            self._stems[split_stem(name)].append(name)
 
     def find(self, name: str) -> str | None:
-        """The photo of that name: the same path, else without suffix, else the one of this file name, or stem."""
+        """The photo of that name: the same path, else the only one with that stem."""
         if name in self.photos:
             return name
-        for table, label in zip(self._tables, split_name(name), strict=True):
-            if len(found := table.get(label, [])) == 1:
-                return found[0]
-        return None
+        found = self._stems.get(split_stem(name), [])
+        return found[0] if len(found) == 1 else None
 
     def stored_size(self, name: str) -> tuple[int, int] | None:
         """Width and height of a photo as stored, without EXIF's orientation; None where there is no such photo."""
@@ -95,10 +84,9 @@ def match_photos_to_images(
         else:
             owners[found] = i
     homes = {PurePosixPath(name).parent for name in owners}
-    reasons = {found: reason for name, reason in given.reasons.items() if (found := folder.find(name))}
     for name in folder.photos:
         if name not in owners and PurePosixPath(name).parent in homes:
-            left_out.append((name, reasons.get(name, "the model has no camera for it")))
+            left_out.append((name, "the model has no camera for it"))
     out = []
     names = sorted(owners)
     for name, key in zip(names, name_pictures(names), strict=True):

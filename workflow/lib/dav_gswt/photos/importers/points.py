@@ -13,7 +13,6 @@ import numpy as np
 import pycolmap
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
-from scipy.spatial import cKDTree
 
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
@@ -21,12 +20,8 @@ from dav_gswt.photos.importers import lens_models
 from dav_gswt.photos.importers.checks import ImportedModel
 from dav_gswt.photos.importers.lens_models import camera_key, shrink_camera, unproject_pixels
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto
-from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_image_pairs
-from dav_gswt.photos.sfm.registration import SfmOptions
-
-ALL_PAIRS = 60  # photos up to which each is matched with every other
-NEAREST = 20  # photos with which each is matched otherwise
-WIDEST = 90.0  # degrees between two viewing directions, beyond which features do not match
+from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
+from dav_gswt.photos.sfm.registration import NEIGHBOURS, SfmOptions
 
 
 @dataclass(frozen=True)
@@ -95,31 +90,12 @@ def triangulate_features(placed: Sequence[MatchedPhoto], options: SfmOptions) ->
             photo = image_files.read_photo(placed[i].path)
             image_files.write_png(folder / names[i], image_files.shrink_image(photo, camera.width, camera.height))
         extract_features(folder, database, options.size, options.features, options.threads)
-        pairs = [(names[i], names[j]) for i, j in find_near_pairs(placed)]
-        match_image_pairs(pairs, database, options.threads, options.seed)
+        match_photos(len(names), database, NEIGHBOURS, options.threads, options.seed)
         choice = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=options.seed)
         choice.triangulation.random_seed = choice.mapper.random_seed = options.seed
         choice.mapper.num_threads = 1
         found = pycolmap.triangulate_points(known, database, folder, folder, options=choice)
         return _read_observations(found, len(placed), middle)
-
-
-def find_near_pairs(placed: Sequence[MatchedPhoto]) -> list[tuple[int, int]]:
-    """Pairs of photos to match, the lower number first: all, or those near each other that look the same way.
-
-    Beyond ALL_PAIRS photos each is paired with the NEAREST ones whose viewing direction differs by less than WIDEST.
-    """
-    n = len(placed)
-    if n <= ALL_PAIRS:
-        return [(i, j) for i in range(n) for j in range(i + 1, n)]
-    centres = np.array([-p.rotation.T @ p.translation for p in placed])
-    forward = np.array([p.rotation[2] for p in placed])
-    order = np.asarray(cKDTree(centres).query(centres, min(n, 8 * NEAREST + 1))[1])
-    pairs = set()
-    for i in range(n):
-        alike = [int(j) for j in order[i] if j != i and forward[i] @ forward[j] > np.cos(np.radians(WIDEST))]
-        pairs |= {(min(i, j), max(i, j)) for j in alike[:NEAREST]}
-    return sorted(pairs)
 
 
 def _enter_images(placed: Sequence[MatchedPhoto], middle: Array, database: Path, size: int) -> pycolmap.Reconstruction:

@@ -15,7 +15,6 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.photos.colmap_model import bundle_adjust_with_priors
-from dav_gswt.photos.ground_frame import make_upright_rotation
 from dav_gswt.photos.photo_files import read_gps_position
 
 _log = logging.getLogger(__name__)
@@ -69,13 +68,11 @@ def measure_spread(at: Float[Array, "n 3"]) -> tuple[float, bool]:
     return float(np.linalg.norm(centred[:, :2])), bool(across >= LEAST_WIDTH * ACROSS)
 
 
-def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]], up: Float[Array, "3"]) -> bool:
+def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]) -> bool:
     """Bring a reconstruction into the frame of the positions, in place, and adjust it with them as priors.
 
-    Positions on one line do not say where up is: then the ground is taken as level, and nothing is adjusted.
-    at: the positions by the images' names. up: the ground's normal on the cameras' side, in the frame of `best`.
-    Returns whether the positions agree with the photos; if not, or where those that found a place lie within the error
-    of receivers, nothing is changed.
+    at: the positions by the images' names. Returns whether the positions agree with the photos; if not, or if they lie
+    on one line or within the error of receivers, nothing is changed.
     """
     numbers = [i for i in best.reg_image_ids() if np.isfinite(at[best.images[i].name]).all()]
     if len(numbers) < 3:
@@ -83,33 +80,19 @@ def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]
     centres = np.stack([best.images[i].projection_center() for i in numbers])
     positions = np.stack([at[best.images[i].name] for i in numbers])
     spread, says_up = measure_spread(positions)
-    if spread < LEAST_SPREAD * ACROSS:
-        _log.warning("the GPS positions of the photos that found a place lie within %.0f m: unused", spread)
+    if spread < LEAST_SPREAD * ACROSS or not says_up:
+        where = "on one line" if not says_up else f"within {spread:.0f} m"
+        _log.warning("the GPS positions of the photos that found a place lie %s: unused", where)
         return False
-    scale, turn, shift, off = fit_similarity(centres, positions) if says_up else _fit_level(centres, positions, up)
+    scale, turn, shift, off = fit_similarity(centres, positions)
     if off > WORST * ACROSS:
         _log.warning("the photos' GPS positions are %.0f m off where the photos themselves place them: unused", off)
         return False
     best.transform(pycolmap.Sim3d(scale, pycolmap.Rotation3d(turn), shift))
-    if says_up:
-        bundle_adjust_with_priors(best, [make_pose_prior(best.images[i], at[best.images[i].name]) for i in numbers])
-    else:
-        _log.info("GPS: the photos were taken along a line, or nearly; so the ground is taken as level")
+    priors = [_make_pose_prior(best.images[i], at[best.images[i].name]) for i in numbers]
+    bundle_adjust_with_priors(best, priors)
     _log.info("GPS: the photos lie in metres, %.1f m from their positions (median)", off)
     return True
-
-
-def _fit_level(
-    a: Float[Array, "n 3"], b: Float[Array, "n 3"], up: Float[Array, "3"]
-) -> tuple[float, Float[Array, "3 3"], Float[Array, "3"], float]:
-    """As `fit_similarity`, with `up` turned to z; the distance is that along the ground."""
-    upright = make_upright_rotation(up, np.eye(3)[np.abs(up).argmin()])
-    level = a @ upright.T
-    scale, yaw, shift, off = fit_similarity(level[:, :2], b[:, :2])
-    turn = np.eye(3)
-    turn[:2, :2] = yaw
-    rise = float(np.median(b[:, 2] - scale * level[:, 2]))
-    return scale, turn @ upright, np.array([*shift, rise]), off
 
 
 def fit_similarity(
@@ -134,7 +117,7 @@ def fit_similarity(
     return scale, turn, shift, float(np.median(off))
 
 
-def make_pose_prior(image: pycolmap.Image, at: Float[Array, "3"]) -> pycolmap.PosePrior:
+def _make_pose_prior(image: pycolmap.Image, at: Float[Array, "3"]) -> pycolmap.PosePrior:
     """A GPS position (metres east, north and up) as bundle adjustment takes it, with the error of a receiver."""
     prior = pycolmap.PosePrior(corr_data_id=image.data_id, position=at)
     prior.position_covariance = np.diag([ACROSS**2, ACROSS**2, UP**2])

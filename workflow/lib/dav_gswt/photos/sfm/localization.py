@@ -14,7 +14,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
+from dav_gswt.photos.colmap_model import ColmapModel, make_lens, read_colmap_model
 from dav_gswt.photos.lenses import find_main_camera, undistort_scene_photo
 from dav_gswt.photos.sfm.features import (
     compare_descriptions,
@@ -64,7 +64,7 @@ def localize_photos(photos: Path, paths: list[Path], seed: int = 0) -> list[Came
             image_files.write_png(folder / names[-1], picture)
         with closing(pycolmap.Database.open(database)) as store:
             for name, camera in zip(names, [*known.cameras, *[pinhole] * (len(names) - old)], strict=True):
-                enter_image(store, name, *enter_camera(store, _make_lens(camera)))
+                enter_image(store, name, *enter_camera(store, make_lens(camera)))
         extract_features(folder, database, max(pinhole.width, pinhole.height), FEATURES, 1)
         with closing(pycolmap.Database.open(database)) as store:
             found = [store.read_descriptors(i + 1).data for i in range(len(names))]
@@ -75,11 +75,6 @@ def localize_photos(photos: Path, paths: list[Path], seed: int = 0) -> list[Came
         with closing(pycolmap.Database.open(database)) as store:
             seen = [_match_features_to_points(i, known, store) for i in range(old)]
             return [_estimate_pose(i, seen, known, pinhole, store, seed) if i else None for i in numbers]
-
-
-def _make_lens(camera: Camera) -> pycolmap.Camera:
-    params = [camera.fx, camera.fy, camera.cx, camera.cy]
-    return pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
 
 
 def _match_features_to_points(index: int, known: ColmapModel, store: pycolmap.Database) -> dict[int, int]:
@@ -108,7 +103,7 @@ def _estimate_pose(
     own = store.read_keypoints(number)[:, :2].astype(float)
     options = pycolmap.AbsolutePoseEstimationOptions()
     options.ransac.max_error, options.ransac.random_seed = WORST, seed
-    lens = _make_lens(pinhole)
+    lens = make_lens(pinhole)
     found = pycolmap.estimate_and_refine_absolute_pose(own[rows], known.points[columns], lens, options)
     if not found or found["num_inliers"] < max(LEAST, LEAST_SHARE * len(rows)):
         return None

@@ -10,7 +10,6 @@ the adjusted one is used.
 
 import logging
 from collections import defaultdict
-from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,8 +26,8 @@ from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import bundle_adjust, model_from_reconstruction
 from dav_gswt.photos.ground_frame import fit_plane
 from dav_gswt.photos.sfm.features import run_cancellable
-from dav_gswt.photos.sfm.gps import GpsPositions, make_pose_prior
-from dav_gswt.photos.sfm.verdict import COVERAGE, LEAST_INLIERS, SfmEvidence, find_groups, judge_model
+from dav_gswt.photos.sfm.gps import GpsPositions
+from dav_gswt.photos.sfm.verdict import COVERAGE, LEAST_INLIERS, SfmEvidence, judge_model
 
 _log = logging.getLogger(__name__)
 
@@ -40,24 +39,16 @@ LEAST_OBLIQUE, LEAST_SHARE = 3, 0.15  # oblique views that fix it: a number, and
 HELD = 0.03  # an adjusted focal length this close to EXIF's confirms it
 LENSES = 0.35, 6.0  # focal length in longer sides of the picture: a fisheye's to a long telescope's
 
-Mapper = Literal["incremental", "global"]
-
 
 @dataclass(frozen=True)
 class Approach:
-    """A way of mapping. hold_focal: EXIF's focal length stays, whatever photos say. use_gps: positions are priors."""
+    """A way of mapping. hold_focal: EXIF's focal length stays, whatever photos say."""
 
-    mapper: Mapper
+    mapper: Literal["incremental", "global"]
     hold_focal: bool = False
-    use_gps: bool = False
 
     def __str__(self) -> str:
-        held = ", EXIF's focal length held" if self.hold_focal else ""
-        return f"{self.mapper} mapping{', GPS as priors' if self.use_gps else ''}{held}"
-
-    @property
-    def other_mapper(self) -> Mapper:
-        return "incremental" if self.mapper == "global" else "global"
+        return f"{self.mapper} mapping{', EXIF focal length held' if self.hold_focal else ''}"
 
 
 @dataclass(frozen=True)
@@ -108,7 +99,7 @@ class SfmSolution:
     unsure: int = 0
 
 
-def find_solution(scene: SfmScene, mapper: Mapper, seed: int) -> SfmSolution:
+def find_solution(scene: SfmScene, seed: int) -> SfmSolution:
     """Map the photos, in several ways if the first one fails, if signs contradict its model, or if
     it leaves out many photos that match others. The best by the signs is taken, then by the number
     of placed photos.
@@ -136,9 +127,8 @@ def find_solution(scene: SfmScene, mapper: Mapper, seed: int) -> SfmSolution:
         grade = ("good", "doubtful", "refused").index(solution.verdict.grade)
         return grade, refused, len(objections), -solution.best.num_reg_images()
 
-    first = Approach(mapper)
-    failure = attempt(first)
-    for approach in _list_other_ways(first, solved[0] if solved else None, scene):
+    failure = attempt(Approach("incremental"))
+    for approach in _list_other_ways(solved[0] if solved else None, scene):
         _log.info("try %s", approach)
         attempt(approach)
     if failure and not solved:
@@ -148,34 +138,27 @@ def find_solution(scene: SfmScene, mapper: Mapper, seed: int) -> SfmSolution:
     return replace(best, verdict=replace(best.verdict, tried=tuple(tried)))
 
 
-def _list_other_ways(first: Approach, solution: SfmSolution | None, scene: SfmScene) -> list[Approach]:
+def _list_other_ways(solution: SfmSolution | None, scene: SfmScene) -> list[Approach]:
     """Other ways of mapping that may give a better model than the first did. solution: None if it gave no model."""
-    gps = scene.positions is not None
     if solution is None:
-        matches = any(inliers >= LEAST_INLIERS for *_, inliers in _read_pairs(scene.database))
-        return list_alternatives(first, bool(scene.held), gps) if matches else []
-    against = [sign.reason for sign in solution.verdict.objections if sign.name not in COVERAGE]
-    if against:
+        if not any(inliers >= LEAST_INLIERS for *_, inliers in _read_pairs(scene.database)):
+            return []
+        freed = bool(scene.held)
+    elif against := [sign.reason for sign in solution.verdict.objections if sign.name not in COVERAGE]:
         _log.info("the model may be wrong: %s", against[0])
         ratio = solution.focal.ratio
-        return list_alternatives(first, ratio is not None and not np.isclose(ratio, 1, rtol=1e-9), gps)
-    if solution.unsure and solution.unsure >= UNSURE * len(scene.photos):
+        freed = ratio is not None and not np.isclose(ratio, 1, rtol=1e-9)  # EXIF's focal length was given up
+    elif solution.unsure and solution.unsure >= UNSURE * len(scene.photos):
         _log.info("photos without a place, though they match others: %d", solution.unsure)
-        return [Approach(first.other_mapper)]
-    return []
-
-
-def list_alternatives(first: Approach, freed: bool, gps: bool) -> list[Approach]:
-    """Other ways for photos whose model may be wrong. freed: EXIF's focal length was given up. gps: with positions."""
-    out = [Approach(first.mapper, hold_focal=True)] if freed else []
-    out += [Approach("incremental", hold_focal=True, use_gps=True)] if gps else []
-    return [*out, Approach(first.other_mapper, hold_focal=True)]
+        return [Approach("global")]
+    else:
+        return []
+    return [Approach("incremental", hold_focal=True)] * freed + [Approach("global", hold_focal=True)]
 
 
 def _solve(approach: Approach, scene: SfmScene, seed: int) -> SfmSolution:
     """Map in one way. Raises: InputError: too few photos found a place, or a focal length that no lens has."""
     photos, gps = scene.photos, scene.gps
-    _write_pose_priors(scene.database, gps if approach.use_gps else {})
     found = _run_mapping(approach, scene, seed)
     best = max(found, key=lambda r: (r.num_reg_images(), r.num_points3D()), default=None)
     pairs = _read_pairs(scene.database)
@@ -194,7 +177,6 @@ def _solve(approach: Approach, scene: SfmScene, seed: int) -> SfmSolution:
         images=len(photos),
         focal_ratio=settled.free / settled.exif if settled.free and settled.exif else None,
         positions=np.stack([gps[name] for name in model.names]) if gps else None,
-        groups=find_groups([photo.path.name for photo in photos], pairs, [i - 1 for i in best.reg_image_ids()]),
     )
     verdict = judge_model(model, evidence, np.random.default_rng(seed))
     return SfmSolution(best, left_out, settled, verdict, unsure)
@@ -225,18 +207,6 @@ def explain_left_out(
     return tuple(out), sum(count >= LEAST_INLIERS for count in most.values())
 
 
-def _write_pose_priors(database: Path, at: Mapping[str, Float[Array, "3"]]) -> None:
-    """Enter GPS positions into a database, in place of those that it has.
-
-    at: metres east, north and up by the images' names; NaN where unknown.
-    """
-    with closing(pycolmap.Database.open(database)) as store:
-        store.clear_pose_priors()
-        for image in store.read_all_images():
-            if image.name in at and np.isfinite(at[image.name]).all():
-                store.write_pose_prior(make_pose_prior(image, at[image.name]))
-
-
 def _run_mapping(approach: Approach, scene: SfmScene, seed: int) -> list[pycolmap.Reconstruction]:
     """The models that the photos give, of any number of photos.
 
@@ -251,7 +221,6 @@ def _run_mapping(approach: Approach, scene: SfmScene, seed: int) -> list[pycolma
     choice = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed, max_num_models=3)
     choice.mapper.num_threads = 1
     choice.mapper.random_seed = choice.triangulation.random_seed = seed
-    choice.use_prior_position = choice.use_robust_loss_on_prior_position = approach.use_gps
     if held and not mixed:
         choice.ba_refine_focal_length = choice.mapper.abs_pose_refine_focal_length = False
     if mixed:

@@ -10,7 +10,6 @@ import tempfile
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pycolmap
@@ -21,13 +20,12 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import FocalLength, SfmVerdict
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import ColmapModel, measure_parallax, model_from_reconstruction
-from dav_gswt.photos.ground_frame import fit_plane
+from dav_gswt.photos.colmap_model import ColmapModel, intersect_rays, model_from_reconstruction
 from dav_gswt.photos.lenses import undistort_photo
 from dav_gswt.photos.photo_files import convert_equivalent, name_pictures, read_focal_length
 from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
 from dav_gswt.photos.sfm.gps import GpsPositions, align_to_gps, read_gps_positions
-from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS, Mapper, SfmPhoto, SfmScene, SfmSolution, find_solution
+from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS, SfmPhoto, SfmScene, SfmSolution, find_solution
 from dav_gswt.photos.sfm.verdict import require_trust
 from dav_gswt.threads import map_ahead
 
@@ -35,43 +33,24 @@ _log = logging.getLogger(__name__)
 
 GUESS = 1.2  # focal length in longer sides, where EXIF has none; then it is refined
 LEAST_ANGLE = 2.0  # degrees, median over the points of the widest angle under which photos see them
-PRESETS = {
-    "quick": {"features": 4096, "neighbours": 12},
-    "careful": {"features": 8192, "neighbours": 40, "size": 2048},
-}
+NEIGHBOURS = 12  # photos that each is matched with
 
 
 @dataclass(frozen=True)
 class SfmOptions:
     """How structure from motion is run.
 
-    size: longer side at which features are searched, pixels. features: most of them in a photo.
-    neighbours: photos that each is matched with. mapper: incremental (one photo after the other) or
-    global (all at once).
-    cameras: auto (one for all photos of equal size and EXIF focal length), one (for all of equal size), or each (photo
-    its own). focal: 35 mm equivalent where EXIF has none or is wrong. side: longer side of the undistorted pictures,
-    pixels (photos are never enlarged). verdict: stop or warn where the model is refused. threads: for features and
-    matches; changes no result.
+    side: longer side of the undistorted pictures, pixels (photos are never enlarged). focal: 35 mm
+    equivalent where EXIF has none or is wrong. size: longer side at which features are searched.
+    features: most of them in a photo. threads: for features and matches; changes no result.
     """
 
+    side: int = 1024
+    focal: float | None = None
     size: int = 1024
     features: int = 4096
-    neighbours: int = 12
-    mapper: Mapper = "incremental"
-    cameras: str = "auto"
-    focal: float | None = None
-    side: int = 1024
-    verdict: str = "stop"
     threads: int = 1
     seed: int = 0
-
-
-def choose_sfm_options(scene: dict, threads: int) -> SfmOptions:
-    """The options that a scene's entry of the config asks for."""
-    given: dict[str, Any] = {"size": 1024} | PRESETS[scene.get("sfm", "quick")]
-    given |= {key: scene[key] for key in ("mapper", "cameras", "focal", "verdict") if key in scene}
-    given["size"] = min(given["size"], max(1024, scene["size"]))
-    return SfmOptions(**given, side=scene["size"], threads=threads)
 
 
 @dataclass(frozen=True)
@@ -113,11 +92,11 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
         database = Path(scratch) / "database.db"
         _write_shrunk_photos(photos, Path(scratch), options.threads)
         with closing(pycolmap.Database.open(database)) as store:
-            held = _enter_images(photos, store, options)
+            held = _enter_images(photos, store)
         extract_features(Path(scratch), database, options.size, options.features, options.threads)
-        match_photos(len(photos), database, options.neighbours, options.threads, options.seed)
+        match_photos(len(photos), database, NEIGHBOURS, options.threads, options.seed)
         scene = SfmScene(folder, photos, held, positions, database)
-        solution = find_solution(scene, options.mapper, options.seed)
+        solution = find_solution(scene, options.seed)
     for name, reason in solution.left_out:
         _log.warning("%s is left out: %s", name, reason)
     _log.info("focal length: %s", solution.focal.decision)
@@ -128,20 +107,12 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
         _log.warning("structure from motion is %s: %s", sign.grade, sign.reason)
     for text in verdict.tried[1:]:
         _log.info("tried: %s", text)
-    if options.verdict == "stop":
-        require_trust(verdict)
-    if positions and not align_to_gps(solution.best, scene.gps, _find_up(solution.best, options.seed)):
+    require_trust(verdict)
+    if positions and not align_to_gps(solution.best, scene.gps):
         positions = None
     made = _finish_registration(photos, solution, options, positions)
-    require_parallax(measure_parallax(made.model))
+    require_parallax(intersect_rays(made.model)[1])
     return made
-
-
-def _find_up(best: pycolmap.Reconstruction, seed: int) -> Float[Array, "3"]:
-    """The normal of the points' plane, on the cameras' side."""
-    normal, offset, _ = fit_plane(np.array([p.xyz for p in best.points3D.values()]), np.random.default_rng(seed))
-    heights = np.stack([best.images[i].projection_center() for i in best.reg_image_ids()]) @ normal - offset
-    return normal if np.median(heights) >= 0 else -normal
 
 
 def require_parallax(spread: Float[Array, "n"]) -> None:
@@ -170,11 +141,14 @@ def _describe_photo(path: Path, key: str, options: SfmOptions) -> SfmPhoto:
     return SfmPhoto(path, key, full, width, height, pixels and pixels * width / full[0])
 
 
-def _enter_images(photos: list[SfmPhoto], store: pycolmap.Database, options: SfmOptions) -> dict[int, float]:
-    """Enter cameras and images, numbered in the photos' order; returns EXIF's focal length of those that have one."""
+def _enter_images(photos: list[SfmPhoto], store: pycolmap.Database) -> dict[int, float]:
+    """Enter images, numbered in the photos' order, and a camera for each size and focal length of EXIF.
+
+    Returns EXIF's focal length of the cameras that have one.
+    """
     cameras, held = {}, {}
-    for i, photo in enumerate(photos):
-        lens = {"auto": (photo.full, photo.focal), "one": photo.full, "each": i}[options.cameras]
+    for photo in photos:
+        lens = photo.full, photo.focal
         if lens not in cameras:
             focal = photo.focal or GUESS * max(photo.width, photo.height)
             camera = pycolmap.Camera.create_from_model_name(1, "SIMPLE_RADIAL", focal, photo.width, photo.height)

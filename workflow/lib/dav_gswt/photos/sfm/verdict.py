@@ -4,14 +4,12 @@ Every photo can be registered in a model that is nonsense, and no single number 
 two signs, one of them refused, or three doubts refuse the model.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from dav_gswt.errors import InputError
@@ -36,7 +34,6 @@ THRESHOLDS = {
     "track length": Threshold(1 / 2.6, 1 / 2.2, "1 / photos a point; points by chance have two, others three or more"),
     "GPS": Threshold(0.5, 0.7, "of the flight's extent; receivers that lag have 0.35, positions by chance 0.8"),
     "ground": Threshold(30.0, 50.0, "degrees between the ground's normal and the vertical; slopes stay below 30"),
-    "climb": Threshold(15.0, 30.0, "degrees; over ground that stands upright a level flight climbs by 45"),
     "tilt": Threshold(75.0, 85.0, "degrees off the vertical, median; ground seen so flat fills no square"),
     "focal length": Threshold(1.25, 1.6, "times EXIF's or its inverse; from above, free estimates end up to 1.15 off"),
     "roughness": Threshold(0.04, 0.1, "of the distance, between points side by side in a photo; fog has no surface"),
@@ -44,12 +41,9 @@ THRESHOLDS = {
     "placed": Threshold(0.5, 0.9, "of the photos that found no place; then the set is not what was meant"),
 }  # fmt: skip
 FAR = 10 * ACROSS  # metres: no receiver is so wrong, however long the flight
-COVERAGE = ("placed", "groups")  # signs about what is missing: they contradict nothing
-FLAT, WIDE = 0.35, 0.2  # singular values of camera positions: third over second, second over first, of a flight plane
-ACROSS_FLIGHT = 30.0  # degrees between the views and the normal of their flight plane, within which they look down
+COVERAGE = ("placed",)  # signs about what is missing: they contradict nothing
 NEIGHBOURS = 6  # points beside a point in a photo
 LEAST_INLIERS = 30  # matches that hold two photos together; mapping needs as many
-LEAST_GROUP = 3  # photos
 FEW = 5  # photos; in smaller sets tracks are short anyway
 
 
@@ -59,14 +53,13 @@ class SfmEvidence:
 
     error: mean reprojection error at the size of features, pixels. images: of the set. focal_ratio: the freely adjusted
     focal length over EXIF's. positions: by GPS, of the model's images, metres east, north and up; NaN where a photo has
-    none. groups: names of photos that hang together, see `find_groups`.
+    none.
     """
 
     error: float
     images: int
     focal_ratio: float | None = None
     positions: Float[Array, "n 3"] | None = None
-    groups: tuple[tuple[str, ...], ...] = ()
 
 
 def judge_model(model: ColmapModel, evidence: SfmEvidence, rng: np.random.Generator) -> SfmVerdict:
@@ -79,7 +72,7 @@ def judge_model(model: ColmapModel, evidence: SfmEvidence, rng: np.random.Genera
         length = len(model.pixels) / len(model.points)
         signs.append(_grade("track length", 1 / length, f"a point is seen by {length:.1f} photos on average"))
     turn, gps = _judge_gps(model, evidence.positions, normal)
-    signs += [gps, *_judge_directions(model, normal, turn), _judge_climb(model, evidence.positions, normal)]
+    signs += [gps, *_judge_directions(model, normal, turn)]
     if ratio := evidence.focal_ratio:
         reason = f"the photos alone say {ratio:.2f} times the focal length of EXIF"
         signs.append(_grade("focal length", max(ratio, 1 / ratio), reason))
@@ -89,10 +82,6 @@ def judge_model(model: ColmapModel, evidence: SfmEvidence, rng: np.random.Genera
     signs.append(_grade("relief", relief, f"points lie {relief:.2f} flying heights off their plane"))
     placed, images = len(model.names), evidence.images
     signs.append(_grade("placed", 1 - placed / images, f"{placed} of {images} photos found a place"))
-    if (groups := evidence.groups)[1:]:
-        said = " | ".join(f"{group[0]} ... {group[-1]}" for group in groups)
-        reason = f"groups ({said}) that share no ground: only one of them can be used"
-        signs.append(SfmSign("groups", "doubtful", f"your photos fall into {len(groups)} {reason}"))
     known = tuple(sign for sign in signs if sign)
     return SfmVerdict(combine_grades(known), known)
 
@@ -105,23 +94,6 @@ def combine_grades(signs: Iterable[SfmSign]) -> Grade:
     if len(against) >= 3 or (refused and len(against) >= 2) or any(THRESHOLDS[sign.name].alone for sign in refused):
         return "refused"
     return "doubtful" if bad else "good"
-
-
-def find_groups(
-    names: list[str], pairs: Iterable[tuple[int, int, int]], placed: Sequence[int] = ()
-) -> tuple[tuple[str, ...], ...]:
-    """Groups of photos that matches hold together, the largest first; those of fewer than three photos are left out.
-
-    pairs: indices of two photos, and how many matches of theirs one rigid scene explains. placed: those of one model,
-    which are one group whatever their matches.
-    """
-    edges = [(i, j) for i, j, inliers in pairs if inliers >= LEAST_INLIERS]
-    edges += [(placed[0], i) for i in placed[1:]]
-    rows, columns = zip(*edges, strict=True) if edges else ((), ())
-    graph = coo_array((np.ones(len(edges)), (rows, columns)), shape=(len(names), len(names)))
-    count, label = connected_components(graph, directed=False)
-    groups = [tuple(np.array(names, object)[label == k]) for k in range(count)]
-    return tuple(sorted((g for g in groups if len(g) >= LEAST_GROUP), key=lambda g: (-len(g), g[0])))
 
 
 def _grade(name: str, value: float, reason: str) -> SfmSign:
@@ -161,55 +133,15 @@ def _judge_gps(
     return (turn if off <= WORST * ACROSS and says_up else None), sign
 
 
-def _judge_directions(
-    model: ColmapModel, normal: Float[Array, "3"], turn: Float[Array, "3 3"] | None
-) -> list[SfmSign | None]:
-    """The ground's normal against the vertical as GPS or the flight itself says it; and how flat the ground is seen."""
+def _judge_directions(model: ColmapModel, normal: Float[Array, "3"], turn: Float[Array, "3 3"] | None) -> list[SfmSign]:
+    """How flat the ground is seen, and its normal against the vertical where GPS says it."""
     forward = np.stack([camera.forward for camera in model.cameras])
     tilt = float(np.median(_measure_angles(forward, normal)))
-    seen = _grade("tilt", tilt, f"photos look {tilt:.0f} degrees off the ground's vertical (median)")
+    signs = [_grade("tilt", tilt, f"photos look {tilt:.0f} degrees off the ground's vertical (median)")]
     if turn is not None:
         angle = float(_measure_angles(turn[2][None], normal)[0])
-        return [_grade("ground", angle, f"the ground lies {angle:.0f} degrees from level, as GPS says it"), seen]
-    across = _find_flight_normal(model)
-    if across is None:
-        return [None, seen]
-    angle = float(_measure_angles(across[None], normal)[0])
-    reason = (
-        f"the photos look straight down from their flight, which lies {angle:.0f} degrees from parallel to the ground"
-    )
-    return [_grade("ground", angle, reason), seen]
-
-
-def _judge_climb(
-    model: ColmapModel, positions: Float[Array, "n 3"] | None, normal: Float[Array, "3"]
-) -> SfmSign | None:
-    """How much steeper the flight is over the model's ground than by GPS, each in its own frame."""
-    known = np.isfinite(positions).all(1) if positions is not None else np.zeros(0, bool)
-    if positions is None or known.sum() < 4:
-        return None
-    centres = np.stack([camera.centre for camera in model.cameras])[known]
-    by_model, by_gps = _measure_climb(centres, normal), _measure_climb(positions[known], np.array([0.0, 0.0, 1.0]))
-    reason = f"the flight climbs by {by_model:.0f} degrees over the ground, by GPS {by_gps:.0f}"
-    return _grade("climb", by_model - by_gps, reason)
-
-
-def _measure_climb(at: Float[Array, "n 3"], up: Float[Array, "3"]) -> float:
-    """Degrees: the spread of positions upwards against that across."""
-    centred = at - at.mean(0)
-    upwards = centred @ up
-    across = np.sqrt(max((centred**2).sum() - (upwards**2).sum(), 0.0))
-    return float(np.degrees(np.arctan2(np.linalg.norm(upwards), across)))
-
-
-def _find_flight_normal(model: ColmapModel) -> Float[Array, "3"] | None:
-    """The normal of the plane that the cameras flew in; None where they did not, or did not look across it."""
-    centres = np.stack([camera.centre for camera in model.cameras])
-    _, size, axes = np.linalg.svd(centres - centres.mean(0))
-    if len(centres) < 4 or size[1] < WIDE * size[0] or size[2] > FLAT * size[1]:
-        return None
-    forward = np.stack([camera.forward for camera in model.cameras])
-    return axes[2] if np.median(_measure_angles(forward, axes[2])) <= ACROSS_FLIGHT else None
+        signs.append(_grade("ground", angle, f"the ground lies {angle:.0f} degrees from level, as GPS says it"))
+    return signs
 
 
 def _measure_angles(lines: Float[Array, "n 3"], line: Float[Array, "3"]) -> Float[Array, "n"]:
@@ -244,6 +176,5 @@ def require_trust(verdict: SfmVerdict) -> None:
     tried = f" (tried: {'; '.join(verdict.tried)})" if len(verdict.tried) > 1 else ""
     raise InputError(
         f"the photos do not fit together to one scene: {reasons}{tried}. Take photos that overlap more and show "
-        "texture, give the scene's `focal` if EXIF is wrong, remove GPS from the photos if it is wrong, or try "
-        "`sfm: careful`; with `verdict: warn` the run goes on"
+        "texture, give the scene's `focal` if EXIF is wrong, or remove GPS from the photos if it is wrong"
     )

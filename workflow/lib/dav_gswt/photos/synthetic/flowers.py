@@ -1,8 +1,6 @@
 """The flowers family: a field of wild and garden flowers in patches, on turf and bare soil."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator
 
 import numpy as np
 from jaxtyping import Float, Float32
@@ -10,8 +8,8 @@ from numpy import ndarray as Array
 
 from dav_gswt.photos.synthetic import land, noise, plants
 from dav_gswt.photos.synthetic.land import CELLS, PERIOD, FadingRaster, Hills, Land, Light, PlantGroup
-from dav_gswt.photos.synthetic.meshes import Mesh
 from dav_gswt.photos.synthetic.noise import smoothstep
+from dav_gswt.photos.synthetic.plants import Flower
 
 TEXELS = 2048  # a side of the period: 7.8 mm a texel
 SOIL = np.array([0.135, 0.092, 0.06])
@@ -27,38 +25,22 @@ HILLS = Hills(
 )
 GRASS = 0.075  # metres, length of the grass between the flowers
 FLOWERS = 1300.0  # flowering plants on 100 square metres
+STEMS = 9  # of a plant, at most
 NEAR, MIDDLE, FAR = 9.0, 28.0, 60.0  # metres: single plants to NEAR, then swathes of many
 TURFS = ((0.5, 0.0, 9.0, 480, 4), (1.4, 9.0, 34.0, 1300, 3))  # mats: across, from, to, blades, kinds
 SWATHES = ((1.4, NEAR, MIDDLE, 26, 2), (2.8, MIDDLE, FAR, 60, 1))  # across, from, to, plants, kinds
 
 
-@dataclass(frozen=True)
-class Sort:
-    """A sort of plant. make: one plant. heights: metres. share: of all plants. spread: share of the ground that its
-    patches hold. longest: wavelength of the patches in metres."""
-
-    make: Callable[[np.random.Generator], Mesh]
-    heights: tuple[float, float]
-    share: float
-    spread: float
-    longest: float
-
-
-def _bush_sort(kind: plants.Kind, share: float, spread: float, longest: float) -> Sort:
-    return Sort(partial(plants.make_bush, kind=kind), kind.flower.heights, share, spread, longest)
-
-
+WHITE, YOLK, DARK = (0.82, 0.81, 0.77), (0.68, 0.43, 0.03), (0.045, 0.03, 0.04)
+# the flower, its share of all plants, the share of the ground that its patches hold, and their wavelength in metres
 SORTS = (
-    _bush_sort(plants.POPPY, 0.15, 0.34, 4.5),
-    _bush_sort(plants.CORNFLOWER, 0.13, 0.28, 4.0),
-    _bush_sort(plants.OXEYE, 0.17, 0.30, 4.0),
-    _bush_sort(plants.BUTTERCUP, 0.16, 0.28, 3.0),
-    _bush_sort(plants.COSMOS, 0.10, 0.22, 3.5),
-    _bush_sort(plants.MARIGOLD, 0.09, 0.18, 2.5),
-    _bush_sort(plants.DAISY, 0.10, 0.30, 2.5),
-    Sort(partial(plants.make_spire, colour=plants.LARKSPUR), (0.45, 0.72), 0.05, 0.16, 3.0),
-    Sort(partial(plants.make_spire, colour=plants.LUPIN), (0.42, 0.66), 0.03, 0.12, 3.0),
-    Sort(plants.make_umbel, (0.40, 0.66), 0.06, 0.30, 4.0),
+    (Flower(5, 0.088, 0.62, 0.50, 0.24, (0.66, 0.035, 0.02), DARK, (0.36, 0.60)), 0.17, 0.34, 4.5),  # poppy
+    (Flower(11, 0.054, 0.26, 0.40, 0.34, (0.10, 0.12, 0.62), (0.12, 0.05, 0.30), (0.40, 0.64)), 0.15, 0.28, 4.0),
+    (Flower(16, 0.070, 0.16, -0.06, 0.34, WHITE, YOLK, (0.34, 0.54)), 0.18, 0.30, 4.0),  # oxeye daisy
+    (Flower(5, 0.050, 0.50, 0.40, 0.26, (0.82, 0.60, 0.015), (0.62, 0.48, 0.03), (0.28, 0.50)), 0.18, 0.28, 3.0),
+    (Flower(8, 0.075, 0.36, 0.12, 0.20, (0.74, 0.17, 0.43), YOLK, (0.40, 0.62)), 0.12, 0.22, 3.5),  # cosmos
+    (Flower(19, 0.120, 0.14, 0.15, 0.32, (0.86, 0.32, 0.015), (0.50, 0.19, 0.02), (0.20, 0.32)), 0.10, 0.18, 2.5),
+    (Flower(17, 0.125, 0.12, 0.04, 0.36, WHITE, (0.72, 0.52, 0.04), (0.09, 0.16)), 0.10, 0.30, 2.5),  # daisy
 )
 
 
@@ -96,21 +78,20 @@ def _plant_groups(rng, soil: Float[Array, "n n"]) -> Iterator[PlantGroup]:
         yield PlantGroup(mats, land.lay_mats(rng, cover, (inner, outer), size))
     tufts = land.scatter_plants(rng, 1 - soil, 140.0, (0.18, 0.42), (0.7 * 24.0, 24.0))
     yield PlantGroup([plants.make_tuft(rng) for _ in range(6)], tufts)
-    for sort in SORTS:
-        yield from _flowering(rng, sort, soil)
+    for flower, share, spread, longest in SORTS:
+        where = (land.make_patches(rng, spread, longest) + 0.02) * (1 - 0.75 * soil)
+        yield from _flowering(rng, flower, FLOWERS * share, where)
 
 
-def _flowering(rng, sort: Sort, soil: Float[Array, "n n"]) -> Iterator[PlantGroup]:
+def _flowering(rng, flower: Flower, count: float, where: Float[Array, "n n"]) -> Iterator[PlantGroup]:
     """Plants of a sort: single and dense in patches near the origin, swathes beyond."""
-    kinds = [sort.make(rng) for _ in range(5)]
-    where = (land.make_patches(rng, sort.spread, sort.longest) + 0.02) * (1 - 0.75 * soil)
-    count = FLOWERS * sort.share
+    kinds = [plants.make_flower(rng, flower, STEMS) for _ in range(5)]
     end = 1.25 * NEAR
-    single = land.scatter_plants(rng, where, count, sort.heights, (0.7 * end, end))
+    single = land.scatter_plants(rng, where, count, flower.heights, (0.7 * end, end))
     yield PlantGroup(kinds, single[np.hypot(*single[:, :2].T) < NEAR])
     thick = where * (count / 100 / where.mean())
     for size, inner, outer, many, different in SWATHES:
-        heights = sort.heights[0] / size, sort.heights[1] / size
+        heights = flower.heights[0] / size, flower.heights[1] / size
         swathes = [plants.make_swathe(rng, kinds, many, heights) for _ in range(different)]
         share = thick * size**2 * np.pi / 4 / many * 0.74**2 * 1.27
         density = land.fade_out(land.interpolate(share), 0.5 * FAR, FAR)

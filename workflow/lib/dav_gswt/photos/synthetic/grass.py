@@ -1,4 +1,4 @@
-"""The grass family: tall wild grass in stands, tussocks and ears, with trodden paths where it lies flat."""
+"""The grass family: tall wild grass in stands and ears, with trodden paths where it lies flat."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from numpy import ndarray as Array
 from dav_gswt.photos.synthetic import land, noise, plants
 from dav_gswt.photos.synthetic.land import CELLS, PERIOD, FadingRaster, Hills, Land, Light, PlantGroup
 from dav_gswt.photos.synthetic.noise import smoothstep
-from dav_gswt.photos.synthetic.plants import FRESH, STRAW, TINTS, Tint
+from dav_gswt.photos.synthetic.plants import STRAW, TINTS
 
 TEXELS = 2048  # a side of the period: 7.8 mm a texel
 SOIL = np.array([0.15, 0.112, 0.07])
@@ -27,18 +27,16 @@ NEAR, MIDDLE, FAR = 8.5, 24.0, 70.0  # metres from the origin: rings of ever lar
 SIZES = (0.5, 1.4, 3.0)  # metres across stands
 KINDS = (4, 2, 1)  # stands of each tint
 BLADES = (115, 520, 1500)  # of a stand
-TRODDEN = (Tint(FRESH, 0.45), Tint(STRAW, 0.5), Tint(FRESH, 0.6))
-REACH = 26.0  # metres from the origin to the last single tussocks and ears
+REACH = 26.0  # metres from the origin to the last single ears
 
 
 @dataclass(frozen=True)
 class Sward:
-    """Rasters of the grass. stands: share that is upright, 0 to 1. tall: relative height. lean: direction of the lean,
-    x and y of a unit vector. tints: share of each of TINTS, 1 in all."""
+    """Rasters of the grass. stands: share that is upright, 0 to 1. tall: relative height. tints: share of each
+    of TINTS, 1 in all."""
 
     stands: Float[Array, "n n"]
     tall: Float[Array, "n n"]
-    lean: tuple[Float[Array, "n n"], Float[Array, "n n"]]
     tints: list[Float[Array, "n n"]]
 
 
@@ -59,12 +57,11 @@ def _draw_sward(rng) -> Sward:
     trodden = _draw_path(rng)
     lies = np.maximum(trodden, land.make_patches(rng, 0.07, 2.4))
     tall = np.clip(1.0 + 0.22 * noise.make_noise(rng, CELLS, PERIOD, 3.5, 0.5, 0.9), 0.55, 1.5)
-    turn = np.radians(35.0) + 0.9 * noise.make_noise(rng, CELLS, PERIOD, 7.0, 2.0, 1.2)
     ripe = land.make_patches(rng, 0.24, 4.5)
     blue = land.make_patches(rng, 0.22, 3.0) * (1 - ripe)
     lush = land.make_patches(rng, 0.45, 5.0) * (1 - ripe - blue)
     tints = [lush, 1 - ripe - blue - lush, blue, ripe]
-    return Sward(1 - lies, tall, (np.cos(turn), np.sin(turn)), tints)
+    return Sward(1 - lies, tall, tints)
 
 
 def _draw_path(rng) -> Float[Array, "n n"]:
@@ -96,20 +93,11 @@ def _draw_albedo(rng, sward: Sward) -> Float32[Array, "n n 3"]:
 
 
 def _plant_groups(rng, sward: Sward) -> Iterator[PlantGroup]:
-    thinning = 0.7 * REACH, REACH
     yield from _ring_groups(rng, sward)
-    for share, tint in zip(sward.tints, TINTS, strict=True):
-        where = sward.stands * share * land.make_patches(rng, 0.6, 2.5)
-        rows = land.scatter_plants(rng, where, 55.0 * share.mean(), (0.38, 0.72), thinning)
-        yield PlantGroup([plants.make_tussock(rng, tint) for _ in range(3)], rows)
-    for make_ear in plants.EARS:
-        where = sward.stands * land.make_patches(rng, 0.45, 3.5)
-        rows = land.scatter_plants(rng, where, 330.0 / len(plants.EARS), (0.48, 0.80), thinning)
-        rows[:, 2] *= np.clip(land.interpolate(sward.tall)(*rows[:, :2].T), 0.8, 1.15) * GRASS / 0.46
-        yield PlantGroup([make_ear(rng) for _ in range(5)], rows)
-    where = sward.stands * land.make_patches(rng, 0.2, 3.0)
-    rows = land.scatter_plants(rng, where, 5.0, (0.55, 0.85), thinning)
-    yield PlantGroup([plants.make_dock(rng) for _ in range(3)], rows)
+    where = sward.stands * land.make_patches(rng, 0.6, 3.5)
+    rows = land.scatter_plants(rng, where, 380.0, (0.48, 0.80), (0.7 * REACH, REACH))
+    rows[:, 2] *= np.clip(land.interpolate(sward.tall)(*rows[:, :2].T), 0.8, 1.15)
+    yield PlantGroup([plants.make_seed_grass(rng) for _ in range(8)], rows)
 
 
 def _ring_groups(rng, sward: Sward) -> Iterator[PlantGroup]:
@@ -127,14 +115,8 @@ def _ring_groups(rng, sward: Sward) -> Iterator[PlantGroup]:
         upright = kind < len(shares)
         rows[upright, 2] *= (0.45 + 0.55 * land.interpolate(sward.tall)(x, y))[upright]
         width = (0.0050 + 0.0015 * size) / size
-        length, flat = GRASS / size, 0.7 * GRASS / size
+        length = GRASS / size
         stands = [[plants.make_stand(rng, count, length, width, t) for _ in range(kinds)] for t in TINTS]
-        stands.append([plants.make_flat_grass(rng, round(1.5 * count), flat, width, t) for t in TRODDEN])
+        stands.append([plants.make_mat(rng, round(1.5 * count), 0.3 * length, 0.5) for _ in range(kinds)])
         for k, meshes in enumerate(stands):
-            yield PlantGroup(meshes, rows[kind == k], _draw_yaw(rng, sward, rows[kind == k]))
-
-
-def _draw_yaw(rng, sward: Sward, rows: Float[Array, "n 4"]) -> Float[Array, "n"]:
-    """The direction in which grass leans, radians."""
-    x, y = (land.interpolate(part)(*rows[:, :2].T) for part in sward.lean)
-    return np.arctan2(y, x) + rng.normal(0, 0.35, len(rows))
+            yield PlantGroup(meshes, rows[kind == k])

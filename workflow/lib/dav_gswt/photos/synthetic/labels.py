@@ -1,46 +1,25 @@
 """The true materials and objects of synthetic ground, and their map from above, which evaluations read.
 
-The map is a pair of files in truth/: ground_labels.exr, with the channels material and object, and ground_labels.json,
-with what their numbers mean. The product reads neither.
+The map is truth/ground_labels.exr, with the channels material and object; its header says what their numbers mean. The
+product does not read it.
 """
 
 import json
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float32, Int
 from numpy import ndarray as Array
 from scipy import ndimage
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import read_record, write_json
+from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.geometry.scene_frame import Extent, Square
 from dav_gswt.images import image_files
 
-MAP, NAMES = "ground_labels.exr", "ground_labels.json"
+MAP = "ground_labels.exr"
 CELLS = 600  # of the map along a side of the exemplar: 1 cm each
 GAP = 3  # cells: gaps between twigs and leaves up to twice as wide belong to a footprint
-REMEDY = "make the photos stage again"
-
-
-@dataclass(frozen=True)
-class LandObject:
-    """A single thing on the ground. kind: shrub or boulder. vertices: of its mesh, in the world, above the ground."""
-
-    kind: str
-    vertices: Float32[Array, "v 3"]
-
-    @cached_property
-    def centre(self) -> Float[Array, "2"]:
-        """The middle of its bounding box from above."""
-        return (self.vertices[:, :2].min(axis=0) + self.vertices[:, :2].max(axis=0)).astype(float) / 2
-
-    @cached_property
-    def radius(self) -> float:
-        """Of the circle about its centre that holds it, from above."""
-        return float(np.hypot(*(self.vertices[:, :2] - self.centre).T).max())
 
 
 @dataclass(frozen=True)
@@ -48,66 +27,37 @@ class GroundLabels:
     """What a piece of land consists of.
 
     materials: numbers by name, from 1. material: the number at every place, over a square that repeats after `period`
-    metres (as in `noise`). objects: numbered from 1 in their order.
+    metres (as in `noise`). objects: of each single thing, shrub or boulder, the vertices of its mesh above the ground.
     """
 
     materials: dict[str, int]
     material: Int[Array, "n n"]
     period: float
-    objects: tuple[LandObject, ...]
-
-
-@dataclass(frozen=True)
-class ObjectLabel:
-    """An object of a map: its number there, its kind, and the circle that holds it from above, metres."""
-
-    id: int
-    kind: str
-    x: float
-    y: float
-    radius: float
-
-
-@dataclass(frozen=True)
-class _Names:
-    """The content of NAMES."""
-
-    extent: Extent
-    materials: dict[str, int]
-    objects: tuple[ObjectLabel, ...]
+    objects: tuple[Float32[Array, "_ 3"], ...]
 
 
 @dataclass(frozen=True)
 class LabelMap:
     """The labels of a rectangle of ground from above. Rows run from south to north, columns from west to east.
 
-    material: numbers of `materials`, also below objects. object: numbers of `objects`; 0: none.
+    material: numbers of `materials`, also below objects. object: a number from 1 for each; 0: none.
     """
 
     material: Int[Array, "rows columns"]
     object: Int[Array, "rows columns"]
     extent: Extent
     materials: dict[str, int]
-    objects: tuple[ObjectLabel, ...]
-
-    def mask(self, material: str) -> Bool[Array, "rows columns"]:
-        """The cells of a material without an object. Raises: KeyError: no such material."""
-        return (self.material == self.materials[material]) & (self.object == 0)
 
 
 def draw_label_map(labels: GroundLabels, square: Square, cells: int = CELLS) -> LabelMap:
     """The map of a square, of cells x cells, each labelled by its centre. Objects that do not reach it are left out."""
     at, n = (np.arange(cells) + 0.5) * square.side / cells, len(labels.material)
     column, row = (np.floor((low + at) * n / labels.period).astype(int) % n for low in (square.west, square.south))
-    objects, named = np.zeros((cells, cells), int), []
-    for i, thing in enumerate(labels.objects, start=1):
-        covered = rasterize_footprint(thing.vertices, square, cells) & (objects == 0)
-        if covered.any():
-            objects[covered] = i
-            x, y = thing.centre.tolist()
-            named.append(ObjectLabel(i, thing.kind, x, y, thing.radius))
+    objects = np.zeros((cells, cells), int)
+    for i, vertices in enumerate(labels.objects, start=1):
+        objects[rasterize_footprint(vertices, square, cells) & (objects == 0)] = i
     extent = Extent(square.west, square.south, square.east, square.north)
-    return LabelMap(labels.material[np.ix_(row, column)], objects, extent, labels.materials, tuple(named))
+    return LabelMap(labels.material[np.ix_(row, column)], objects, extent, labels.materials)
 
 
 def rasterize_footprint(vertices: Float32[Array, "v 3"], square: Square, cells: int) -> Bool[Array, "cells cells"]:
@@ -129,28 +79,22 @@ def rasterize_footprint(vertices: Float32[Array, "v 3"], square: Square, cells: 
 
 
 def write_label_map(folder: Path | str, labels: LabelMap) -> None:
-    """Write the two files of a map. On disk the first row is the northern one, as in any image of a map."""
-    names = asdict(_Names(labels.extent, labels.materials, labels.objects))
+    """Write a map. On disk the first row is the northern one, as in any image of a map."""
     channels = {"material": labels.material[::-1], "object": labels.object[::-1]}
-    texts = {key: json.dumps(names[key]) for key in ("extent", "materials")}
-    image_files.write_exr(Path(folder) / MAP, {k: v.astype(np.float32) for k, v in channels.items()}, texts)
-    write_json(Path(folder) / NAMES, names)
+    names = {key: json.dumps(asdict(labels)[key]) for key in ("extent", "materials")}
+    image_files.write_exr(Path(folder) / MAP, {k: v.astype(np.float32) for k, v in channels.items()}, names)
 
 
 def read_label_map(folder: Path | str) -> LabelMap:
     """Read the map of a photo set from its truth/ folder.
 
-    Raises: InputError: there is none, as for families without labels, or the files are of another kind.
+    Raises: InputError: there is none, as for families without labels, or the file is of another kind.
     """
     path = Path(folder) / MAP
-    names = read_record(Path(folder) / NAMES, _Names, REMEDY)
-    channels, _ = image_files.read_exr(path)
+    channels, header = image_files.read_exr(path)
     try:
         material, objects = (np.rint(channels[name][::-1]).astype(int) for name in ("material", "object"))
-    except KeyError as error:
-        raise InputError(f"{path}: has no channel {error}; {REMEDY}") from error
-    unknown = set(np.unique(material)) - {0, *names.materials.values()}
-    unknown |= set(np.unique(objects)) - {0, *(thing.id for thing in names.objects)}
-    if unknown:
-        raise InputError(f"{path}: has labels that {NAMES} does not name ({min(unknown)}); {REMEDY}")
-    return LabelMap(material, objects, names.extent, names.materials, names.objects)
+        extent, materials = (json.loads(header[key]) for key in ("extent", "materials"))
+        return LabelMap(material, objects, Extent(**extent), materials)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: not a map of labels ({summarize_error(error)}); make the photos again") from error

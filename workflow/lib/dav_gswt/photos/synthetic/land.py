@@ -243,11 +243,10 @@ def scatter_plants(
 
 
 class PlantGroup(NamedTuple):
-    """Plants that share a choice of kinds. rows: see the module. yaw: radians; None: at random."""
+    """Plants that share a choice of kinds. rows: see the module."""
 
     kinds: list[Mesh]
     rows: Float[Array, "n 4"]
-    yaw: Float[Array, "n"] | None = None
 
 
 def place_plants(
@@ -258,14 +257,14 @@ def place_plants(
     Each plant is of a random kind of its group. A plant that follows the slope follows the slope over half its size.
     """
     plants, places = [], []
-    for kinds, rows, yaw in groups:
+    for kinds, rows in groups:
         which = len(plants) + rng.integers(0, len(kinds), len(rows))
         plants += kinds
         x, y, size, lies = rows.T
         reach = 0.5 * size + 0.01
         along_x = lies * (height(x + reach, y) - height(x - reach, y)) / (2 * reach)
         along_y = lies * (height(x, y + reach) - height(x, y - reach)) / (2 * reach)
-        turn = rng.uniform(0, 2 * np.pi, len(x)) if yaw is None else yaw
+        turn = rng.uniform(0, 2 * np.pi, len(x))
         places.append(np.column_stack([which, x, y, height(x, y), size, turn, along_x, along_y]))
     return plants, np.concatenate(places)
 

@@ -15,7 +15,7 @@ from numpy import ndarray as Array
 from scipy import ndimage
 
 from dav_gswt.photos.synthetic import desert, land, meadow, meshes, noise, plants
-from dav_gswt.photos.synthetic.labels import GroundLabels, LandObject
+from dav_gswt.photos.synthetic.labels import GroundLabels
 from dav_gswt.photos.synthetic.land import PERIOD, FadingRaster, Height, Hills, Land, Light, PlantGroup
 from dav_gswt.photos.synthetic.meshes import Mesh
 from dav_gswt.photos.synthetic.noise import smoothstep
@@ -92,10 +92,10 @@ def make_land(seed: int, exemplar: float) -> Land:
     blocks = [_lay_boulder(rng, single, height) for single in singles]
     loose = _lay_pebbles(rng, layout, free, height) + _lay_field(rng, field, height)
     things = [
-        LandObject("shrub", meshes.transform_mesh(bushes[k], row[1:4], row[4], row[5]).vertices)
+        meshes.transform_mesh(bushes[k], row[1:4], row[4], row[5]).vertices
         for k, row in zip(which, standing, strict=True)
     ]
-    things += [LandObject("boulder", _cut_off(block, height)) for block in blocks]
+    things += [_cut_off(block, height) for block in blocks]
     return Land(
         ground=land.make_ground_mesh(height),
         albedo=albedo,

@@ -1,7 +1,7 @@
 """The photo set of a synthetic scene: start and test views, and points triangulated with their exact poses."""
 
-import logging
 import tempfile
+from contextlib import closing
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -13,17 +13,13 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import ColmapModel, model_from_reconstruction, silence_pycolmap, write_colmap_model
+from dav_gswt.photos.colmap_model import ColmapModel, make_lens, model_from_reconstruction, write_colmap_model
+from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
 from dav_gswt.photos.synthetic import labels, mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 
-_log = logging.getLogger(__name__)
-
 FEATURES = 4096
-EXHAUSTIVE = 40  # views up to which every pair is matched
-NEIGHBOURS = 20  # matched with each view if there are more views
-WIDEST = 60.0  # degrees between two views that are matched
-LEAST_OVERLAP = 0.1  # share of the exemplar that both views of a pair must see
+NEIGHBOURS = 20  # views that each is matched with, if there are many
 
 
 def render_set(entry: dict, folder: Path) -> None:
@@ -62,73 +58,30 @@ def _name_views(kind: str, views: list[Camera]) -> list[tuple[str, Camera]]:
 
 
 def triangulate_points(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> ColmapModel:
-    """Triangulate points of matched SIFT features of pictures with known cameras, which are not changed.
-
-    Up to EXHAUSTIVE pictures every pair is matched, else those of `find_overlapping_pairs`.
-    """
-    silence_pycolmap()
+    """Triangulate points of matched SIFT features of pictures with known cameras, which are not changed."""
     names, cameras = (list(column) for column in zip(*shots, strict=True))
     none = np.zeros(0, int)
     known = ColmapModel(
         tuple(names), tuple(cameras), np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
     )
-    extraction = pycolmap.FeatureExtractionOptions(num_threads=1, use_gpu=False)
-    extraction.sift.max_num_features = FEATURES
-    matching = pycolmap.FeatureMatchingOptions(num_threads=1, use_gpu=False)
-    verification = pycolmap.TwoViewGeometryOptions()
-    verification.ransac.random_seed = seed
-    reader = pycolmap.ImageReaderOptions(camera_model="PINHOLE")
-    reader.camera_params = ",".join(str(v) for v in (cameras[0].fx, cameras[0].fy, cameras[0].cx, cameras[0].cy))
+    first = cameras[0]
+    lens = make_lens(first)
+    lens.has_prior_focal_length = True
     with tempfile.TemporaryDirectory(prefix="points-") as scratch:
         database, sparse = Path(scratch) / "database.db", Path(scratch) / "sparse"
         sparse.mkdir()
-        _log.info("find features of %d views", len(names))
-        pycolmap.extract_features(
-            database,
-            folder,
-            image_names=names,
-            camera_mode=pycolmap.CameraMode.SINGLE,
-            reader_options=reader,
-            extraction_options=extraction,
-            device=pycolmap.Device.cpu,
-        )
-        if len(names) <= EXHAUSTIVE:
-            pycolmap.match_exhaustive(database, matching, verification_options=verification, device=pycolmap.Device.cpu)
-        else:
-            some, every = find_overlapping_pairs(cameras), len(names) * (len(names) - 1) // 2
-            _log.info("match %d of %d pairs of views: those that see the same ground alike", len(some), every)
-            listed = Path(scratch) / "pairs.txt"
-            listed.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in some), encoding="utf-8")
-            choice = pycolmap.ImportedPairingOptions(match_list_path=listed)
-            pycolmap.match_image_pairs(database, matching, choice, verification, pycolmap.Device.cpu)
+        with closing(pycolmap.Database.open(database)) as store:
+            numbers = enter_camera(store, lens)
+            for name in names:
+                enter_image(store, name, *numbers)
+        extract_features(folder, database, max(first.width, first.height), FEATURES, 1)
+        match_photos(len(names), database, NEIGHBOURS, 1, seed)
         write_colmap_model(known, sparse)
         options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed)
         stored = pycolmap.triangulate_points(
             pycolmap.Reconstruction(str(sparse)), database, folder, sparse, options=options
         )
         return model_from_reconstruction(stored)
-
-
-def find_overlapping_pairs(cameras: list[Camera], side: float = synthetic.EXEMPLAR) -> list[tuple[int, int]]:
-    """Pairs i < j of views to match: each with its NEIGHBOURS by overlap.
-
-    Both see LEAST_OVERLAP of the exemplar, a square about the origin, or more, and the angle between them at its centre
-    is at most WIDEST. Neighbours are ranked by the shared ground times the cosine of that angle.
-    """
-    at = (np.arange(16) + 0.5) / 16 * side - side / 2
-    x, y = np.meshgrid(at, at)
-    ground = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], 1)
-    sees = np.zeros((len(cameras), len(ground)))
-    for i, camera in enumerate(cameras):
-        pixels, depth = camera.project(ground)
-        sees[i] = (depth > 0) & (pixels > 0).all(1) & (pixels < [camera.width, camera.height]).all(1)
-    towards = np.stack([camera.centre / np.linalg.norm(camera.centre) for camera in cameras])
-    shared, cosine = sees @ sees.T / len(ground), towards @ towards.T
-    score = np.where((shared >= LEAST_OVERLAP) & (cosine >= np.cos(np.radians(WIDEST))), shared * cosine, 0.0)
-    np.fill_diagonal(score, 0.0)
-    best = np.argsort(-score, axis=1, kind="stable")[:, :NEIGHBOURS]
-    pairs = {(min(i, int(j)), max(i, int(j))) for i, row in enumerate(best) for j in row if score[i, j] > 0}
-    return sorted(pairs)
 
 
 def add_cameras(found: ColmapModel, more: list[tuple[str, Camera]]) -> ColmapModel:

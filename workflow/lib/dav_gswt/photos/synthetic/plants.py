@@ -1,11 +1,10 @@
 """Plants as coloured meshes: shrubs, grasses, clover and flowers.
 
 They are about 1 high (mats, stands and swathes: about 1 across) with their root at the origin, and each face has one
-colour. Stands and trodden grass lean towards +x, so that their yaw is the direction of the lean.
+colour.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -24,12 +23,6 @@ LUSH = np.array([[0.125, 0.255, 0.06], [0.165, 0.30, 0.065], [0.10, 0.21, 0.07]]
 FRESH = np.array([[0.28, 0.37, 0.07], [0.34, 0.40, 0.10], [0.22, 0.33, 0.065]])
 BLUE = np.array([[0.18, 0.275, 0.15], [0.22, 0.31, 0.175], [0.15, 0.235, 0.115]])
 STRAW = np.array([[0.52, 0.42, 0.20], [0.45, 0.36, 0.175], [0.58, 0.49, 0.27]])
-RIPE = np.array([[0.54, 0.43, 0.24], [0.47, 0.38, 0.20], [0.60, 0.52, 0.33]])
-PURPLE = np.array([[0.34, 0.20, 0.185], [0.40, 0.255, 0.20], [0.29, 0.19, 0.155]])
-LEAF = np.array([[0.135, 0.255, 0.06], [0.18, 0.30, 0.07], [0.105, 0.21, 0.065]])
-GREY = np.array([[0.17, 0.235, 0.13], [0.21, 0.265, 0.155], [0.145, 0.21, 0.10]])
-PALE = np.array([[0.20, 0.29, 0.065], [0.25, 0.32, 0.085], [0.16, 0.25, 0.06]])
-LACE = np.array([0.76, 0.76, 0.68])
 TAPER = np.array([0.8, 1.0, 0.9, 0.6, 0.1])  # widths along a blade of tall grass
 
 
@@ -58,51 +51,12 @@ class Flower:
     heights: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Habit:
-    """The growth of a plant. stems: from the root, least and most. heads: flowers per stem. lean: of stems, degrees.
-
-    leaf: length and half the width, as shares of the plant's height. many: leaves per stem.
-    """
-
-    stems: tuple[int, int]
-    heads: int
-    lean: float
-    leaf: tuple[float, float]
-    many: int
-    green: Float[Array, "k 3"]
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of flowering bush. other: the colour towards which single plants vary."""
-
-    flower: Flower
-    habit: Habit
-    other: tuple[float, float, float] | None = None
-
-
 MEADOW_FLOWERS = (
     Flower(15, 0.105, 0.15, -0.05, 0.34, (0.80, 0.79, 0.74), (0.66, 0.42, 0.03), (0.16, 0.30)),  # oxeye daisy
     Flower(5, 0.075, 0.46, 0.35, 0.25, (0.78, 0.58, 0.02), (0.58, 0.46, 0.03), (0.16, 0.34)),  # buttercup
     Flower(11, 0.090, 0.22, 0.30, 0.30, (0.23, 0.19, 0.60), (0.14, 0.07, 0.30), (0.20, 0.34)),  # cornflower
     Flower(4, 0.125, 0.62, 0.50, 0.26, (0.64, 0.045, 0.03), (0.04, 0.03, 0.035), (0.22, 0.38)),  # poppy
 )
-WHITE, YOLK, DARK = (0.82, 0.81, 0.77), (0.68, 0.43, 0.03), (0.045, 0.03, 0.04)
-FEATHERY = Habit((4, 8), 2, 24.0, (0.20, 0.007), 12, GREY)
-LEAFY = Habit((4, 7), 2, 28.0, (0.24, 0.024), 10, LEAF)
-SLENDER = Habit((6, 10), 2, 30.0, (0.16, 0.012), 8, PALE)
-LOW = Habit((7, 12), 1, 48.0, (0.42, 0.060), 4, LEAF)
-SPIRE = Habit((2, 5), 1, 14.0, (0.22, 0.030), 14, LEAF)
-UMBEL = Habit((3, 6), 2, 20.0, (0.26, 0.014), 10, GREY)
-POPPY = Kind(Flower(5, 0.088, 0.62, 0.50, 0.24, (0.66, 0.035, 0.02), DARK, (0.36, 0.60)), FEATHERY, (0.78, 0.16, 0.05))
-CORNFLOWER = Kind(Flower(11, 0.054, 0.26, 0.40, 0.34, (0.10, 0.12, 0.62), (0.12, 0.05, 0.30), (0.40, 0.64)), FEATHERY)
-OXEYE = Kind(Flower(16, 0.070, 0.16, -0.06, 0.34, WHITE, YOLK, (0.34, 0.54)), LEAFY)
-BUTTERCUP = Kind(Flower(5, 0.050, 0.50, 0.40, 0.26, (0.82, 0.60, 0.015), (0.62, 0.48, 0.03), (0.28, 0.50)), SLENDER)
-COSMOS = Kind(Flower(8, 0.075, 0.36, 0.12, 0.20, (0.74, 0.17, 0.43), YOLK, (0.40, 0.62)), FEATHERY, (0.84, 0.55, 0.68))
-MARIGOLD = Kind(Flower(19, 0.120, 0.14, 0.15, 0.32, (0.86, 0.32, 0.015), (0.50, 0.19, 0.02), (0.20, 0.32)), LEAFY)
-DAISY = Kind(Flower(17, 0.125, 0.12, 0.04, 0.36, WHITE, (0.72, 0.52, 0.04), (0.09, 0.16)), LOW, (0.84, 0.66, 0.70))
-LARKSPUR, LUPIN = np.array([0.20, 0.11, 0.55]), np.array([0.58, 0.20, 0.42])
 
 
 def make_shrub(
@@ -184,9 +138,9 @@ def make_clover(rng: np.random.Generator) -> Mesh:
     return merge_meshes([make_rods(stems, 0.012, 0.010, green, rng), leaflets])
 
 
-def make_flower(rng: np.random.Generator, kind: Flower) -> Mesh:
-    """A plant with one to four stems, each with a few narrow leaves and a flower."""
-    count, many = int(rng.integers(1, 5)), 12
+def make_flower(rng: np.random.Generator, kind: Flower, most: int = 4) -> Mesh:
+    """A plant with one to `most` stems, each with a few narrow leaves and a flower."""
+    count, many = int(rng.integers(1, most + 1)), 12
     root = scatter_roots(rng, count, 0.03)
     stems = grow_around(rng, root, np.radians(rng.uniform(2, 24, count)), (0.7, 1.05), 6, 0.07)
     green = mix_palette(rng, GREEN)
@@ -195,51 +149,6 @@ def make_flower(rng: np.random.Generator, kind: Flower) -> Mesh:
     parts = [make_rods(stems, 0.012, 0.008, green, rng), make_leaves(rng, stems, 9, green)]
     parts.append(_make_short_grass(rng, low, [0.012, 0.026, 0.022, 0.002], dry=0.05))
     return merge_meshes([*parts, *_make_heads(rng, stems, kind, 0.8, 0.18)])
-
-
-def make_bush(rng: np.random.Generator, kind: Kind) -> Mesh:
-    """A plant with leafy stems that branch, each branch with a flower that faces up and outwards."""
-    stems, green = _grow_bush(rng, kind.habit)
-    tops = stems[:, 3:]
-    if kind.habit.heads > 1:
-        tops = np.concatenate([tops, _grow_forks(rng, stems, kind.habit.heads - 1)])
-    parts = [make_rods(stems, 0.0085, 0.0045, green, rng), make_rods(tops, 0.0045, 0.0035, green, rng)]
-    parts.append(_make_foliage(rng, stems, kind.habit, green))
-    colour = np.array(kind.flower.colour) * rng.uniform(0.9, 1.1)
-    if kind.other:
-        share = rng.uniform() ** 2
-        colour = (1 - share) * colour + share * np.array(kind.other)
-    flower = replace(kind.flower, colour=tuple(np.clip(colour, 0, 0.88)))
-    return merge_meshes([*parts, *_make_heads(rng, tops, flower, 0.9, 0.22)])
-
-
-def make_spire(rng: np.random.Generator, colour: Float[Array, "3"]) -> Mesh:
-    """A tall plant with florets around the upper half of its stems, the smaller the higher."""
-    stems, green = _grow_bush(rng, SPIRE)
-    tint = np.array(colour) * rng.uniform(0.85, 1.15)
-    parts = [make_rods(stems, 0.010, 0.004, green, rng), _make_foliage(rng, stems, SPIRE, green, until=0.55)]
-    share = np.linspace(0.48, 0.99, 44)[None].repeat(len(stems), 0)
-    centre = sample_paths(stems, share).reshape(-1, 3)
-    size = (0.048 * (1.15 - share) / 0.67 + 0.009).reshape(-1, 1)
-    turn = (np.arange(len(centre)) * 2.4 + rng.uniform(0, 0.6, len(centre)))[:, None]
-    out = np.concatenate([np.cos(turn), np.sin(turn), rng.normal(0.15, 0.2, turn.shape)], axis=1)
-    for swing in (-0.55, 0.0, 0.55):
-        lobe = normalize(out + swing * np.cross(out, [0, 0, 1.0]) + [0, 0, 0.25 * (swing == 0)]) * size
-        paths = np.stack([centre, centre + 0.55 * lobe, centre + lobe], axis=1)
-        side = normalize(np.cross(lobe, rng.normal(0, 0.4, lobe.shape) + [0, 0, 1.0]))
-        shade = tint * rng.uniform(0.75, 1.2, (len(lobe), 1))
-        parts.append(make_blades(paths, side, [0.004, 0.014, 0.006], np.stack([0.85 * shade, shade], axis=1)))
-    return merge_meshes(parts)
-
-
-def make_umbel(rng: np.random.Generator) -> Mesh:
-    """A plant with flat heads of tiny white florets on rays, as of yarrow or wild carrot."""
-    stems, green = _grow_bush(rng, UMBEL)
-    tops = np.concatenate([stems[:, 3:], _grow_forks(rng, stems, 1)])
-    parts = [make_rods(stems, 0.008, 0.004, green, rng), make_rods(tops, 0.004, 0.003, green, rng)]
-    parts.append(_make_foliage(rng, stems, UMBEL, green))
-    parts += [_make_lace(rng, top[-1], 0.085 * rng.uniform(0.6, 1.15), green) for top in tops]
-    return merge_meshes(parts)
 
 
 def make_swathe(rng: np.random.Generator, plants: list[Mesh], count: int, heights: tuple[float, float]) -> Mesh:
@@ -262,117 +171,6 @@ def make_stand(rng: np.random.Generator, count: int, length: float, width: float
     sweep = 0.16 * long[:, None, None] * (np.linspace(0, 1, 5) ** 2)[None, :, None] * np.array([1.0, 0.0, -0.35])
     paths = grow_paths(rng, root, heading, long, joints=5, bend=0.07, droop=0.12) + sweep
     return _make_grass(rng, paths, width * TAPER, tint, (0.6, 1.5))
-
-
-def make_flat_grass(rng: np.random.Generator, count: int, length: float, width: float, tint: Tint) -> Mesh:
-    """Trodden grass on a disc about 1 across: blades on top of each other, most of them towards +x."""
-    root = scatter_on_disc(rng, count, 0.06 * (0.3 * length))
-    heading = to_direction(np.radians(rng.uniform(60, 88, count)), rng.normal(0, 0.55, count))
-    paths = grow_paths(rng, root, heading, length * rng.uniform(0.5, 1.2, count), joints=5, bend=0.10, droop=0.10)
-    paths[..., 2] = np.abs(paths[..., 2]) * 0.6 + rng.uniform(0, 0.05 * length, (count, 1))
-    paths[:, 0, 2] = -0.03 * length
-    return _make_grass(rng, paths, width * TAPER, tint, (0.85, 1.1))
-
-
-def make_tussock(rng: np.random.Generator, tint: Tint) -> Mesh:
-    """A tussock: many blades from one place that rise, arch over and hang to the ground."""
-    count = int(rng.integers(260, 380))
-    root = scatter_roots(rng, count, 0.085, 0.05)
-    out = np.arctan2(root[:, 1], root[:, 0]) + rng.normal(0, 0.5, count)
-    lean = np.radians(np.abs(rng.normal(0, 24, count)) + 160 * np.hypot(root[:, 0], root[:, 1]))
-    paths = grow_paths(rng, root, to_direction(lean, out), rng.uniform(0.55, 1.3, count), 8, bend=0.06, droop=0.15)
-    return _make_grass(rng, paths, 0.0085 * np.array([0.9, 1.0, 1.0, 0.9, 0.8, 0.6, 0.4, 0.1]), tint, (0.35, 1.25))
-
-
-def make_foxtail(rng: np.random.Generator) -> Mesh:
-    """Stems with one dense, narrow, bristly spike each."""
-    stems, straw = _grow_stalks(rng, 5, 10), mix_palette(rng, RIPE)
-    spike = sample_paths(stems, np.linspace(0.84, 1.0, 4)[None].repeat(len(stems), 0))
-    bristles = _make_spikelets(rng, spike, 46, straw, (0.022, 0.04), 0.35)
-    stalks = make_rods(stems, 0.0042, 0.003, _stalk_colour(rng, straw), rng)
-    return merge_meshes([stalks, bristles, _make_low_blades(rng, FRESH)])
-
-
-def make_oat(rng: np.random.Generator) -> Mesh:
-    """Stems with loose, nodding ears whose grains hang on fine branches."""
-    stems, straw = _grow_stalks(rng, 3, 7), mix_palette(rng, RIPE)
-    branches = _grow_branches(rng, stems, 11, (0.64, 1.0), (0.08, 0.17), droop=0.42)
-    grains = _make_spikelets(rng, branches[:, -2:], 4, straw, (0.020, 0.030), 0.5)
-    fine = make_rods(branches, 0.0018, 0.0012, straw, rng)
-    stalks = make_rods(stems, 0.004, 0.0025, _stalk_colour(rng, straw), rng)
-    return merge_meshes([stalks, fine, grains, _make_low_blades(rng, FRESH)])
-
-
-def make_haze(rng: np.random.Generator) -> Mesh:
-    """Stems with a wide, fine, purplish plume."""
-    stems, purple = _grow_stalks(rng, 5, 9), mix_palette(rng, PURPLE)
-    branches = _grow_branches(rng, stems, 16, (0.66, 0.98), (0.06, 0.15), droop=-0.10)
-    grains = _make_spikelets(rng, branches, 8, purple, (0.009, 0.016), 0.7)
-    stalks = make_rods(stems, 0.0035, 0.002, _stalk_colour(rng, purple), rng)
-    return merge_meshes([stalks, make_rods(branches, 0.0010, 0.0007, purple, rng), grains, _make_low_blades(rng, LUSH)])
-
-
-EARS: tuple[Callable[[np.random.Generator], Mesh], ...] = (make_foxtail, make_oat, make_haze)
-
-
-def make_dock(rng: np.random.Generator) -> Mesh:
-    """Dock in seed: a few stiff rusty stems with seeds along their upper half, above broad leaves."""
-    stems = grow_around(rng, scatter_roots(rng, 3, 0.02), np.radians([4, 14, 11]), np.ones(3), 6, 0.04)
-    rust = np.array([0.25, 0.095, 0.045]) * rng.uniform(0.8, 1.25)
-    side = _grow_branches(rng, stems, 6, (0.4, 0.85), (0.16, 0.30), droop=-0.25)
-    tops = sample_paths(stems, np.linspace(0.45, 1.0, 5)[None].repeat(3, 0))
-    seeds = [_make_spikelets(rng, tops, 90, rust, (0.022, 0.04), 0.8)]
-    seeds.append(_make_spikelets(rng, side, 36, rust, (0.02, 0.036), 0.8))
-    lean, long = np.radians(rng.uniform(25, 65, 9)), rng.uniform(0.3, 0.55, 9)
-    out = grow_around(rng, scatter_roots(rng, 9, 0.02), lean, long, 6, 0.06, droop=0.18)
-    leaves = _make_grass(rng, out, [0.006, 0.03, 0.05, 0.045, 0.03, 0.001], Tint(LUSH, 0.15), (0.8, 1.1))
-    return merge_meshes([make_rods(stems, 0.009, 0.005, 0.8 * rust, rng), *seeds, leaves])
-
-
-def _grow_bush(rng, habit: Habit) -> tuple[Float[Array, "n 6 3"], Float[Array, "3"]]:
-    """The stems of a plant, and its green."""
-    count = int(rng.integers(*habit.stems))
-    root = scatter_roots(rng, count, 0.035)
-    tilt = np.radians(habit.lean * np.sqrt(rng.uniform(0.0, 1.0, count)))
-    return grow_around(rng, root, tilt, (0.72, 1.06), 6, 0.07), mix_palette(rng, habit.green)
-
-
-def _grow_forks(rng, stems, each: int) -> Float[Array, "n 3 3"]:
-    """Branches, `each` per stem from its upper half, that rise nearly as high."""
-    share = rng.uniform(0.45, 0.75, (len(stems), each))
-    start = sample_paths(stems, share).reshape(-1, 3)
-    heading = normalize(np.repeat(path_directions(stems)[:, -1], each, axis=0) + rng.normal(0, 0.45, (len(start), 3)))
-    return grow_paths(rng, start, heading, (0.92 - share.reshape(-1)) * rng.uniform(0.6, 1.05, len(start)), 3, 0.08)
-
-
-def _make_foliage(rng, stems, habit: Habit, green, until: float = 0.85) -> Mesh:
-    """Pointed, arching leaves along stems up to a share of them, paler at the tip."""
-    share = rng.uniform(0.02, 1.0, (len(stems), habit.many)) ** 1.3 * until
-    start = sample_paths(stems, share).reshape(-1, 3)
-    count = len(start)
-    lean = np.radians(rng.uniform(30, 85, count))
-    long = habit.leaf[0] * (1.15 - 0.6 * share.reshape(-1)) * rng.uniform(0.7, 1.2, count)
-    paths = grow_paths(rng, start, to_direction(lean, rng.uniform(0, 2 * np.pi, count)), long, 5, 0.09, droop=0.12)
-    side = normalize(np.cross(path_directions(paths)[:, 0], [0, 0, 1.0] + rng.normal(0, 0.35, (count, 3))))
-    tint = green * rng.uniform(0.7, 1.25, (count, 1)) * rng.uniform(0.93, 1.07, (count, 3))
-    shade = np.linspace(0.75, 1.15, 4)[None, :, None]
-    wide = habit.leaf[1] * np.array([0.35, 0.9, 1.0, 0.6, 0.0]) + 0.0008
-    return make_blades(paths, side, wide, np.clip(tint[:, None] * shade, 0.01, 0.95))
-
-
-def _make_lace(rng, centre, radius: float, green) -> Mesh:
-    """Florets on rays, on a shallow dome about the end of a stem."""
-    count = 60
-    r, turn = radius * np.sqrt(rng.uniform(size=count)), rng.uniform(0, 2 * np.pi, count)
-    dome = 0.25 * radius * (1 - (r / radius) ** 2) + rng.normal(0, 0.03 * radius, count)
-    at = centre + np.column_stack([r * np.cos(turn), r * np.sin(turn), dome])
-    out = to_direction(np.radians(rng.uniform(65, 95, count)), rng.uniform(0, 2 * np.pi, count)) * 0.15 * radius
-    side = normalize(np.cross(out, [0, 0, 1.0]))
-    tint = LACE * rng.uniform(0.85, 1.05, (count, 1))
-    florets = make_blades(np.stack([at - out, at + out], axis=1), side, [0.12 * radius, 0.12 * radius], tint[:, None])
-    below = np.tile(centre - [0, 0, 0.45 * radius], (14, 1))
-    rays = make_rods(np.stack([below, at[:14] - [0, 0, 0.02 * radius]], axis=1), 0.0025, 0.0015, green, rng)
-    return merge_meshes([florets, rays])
 
 
 def _make_heads(rng, stems, kind: Flower, up: float, spread: float) -> list[Mesh]:
@@ -405,51 +203,6 @@ def _make_flower_head(rng, centre, facing, kind: Flower) -> Mesh:
     faces = np.column_stack([index, (index + 1) % 8, np.full(8, 8)])
     eye = np.tile(np.array(kind.middle), (9, 1)).astype(np.float32)
     return merge_meshes([petals, Mesh(np.vstack([rim, top]).astype(np.float32), faces, eye)])
-
-
-def _grow_stalks(rng, fewest: int, most: int) -> Float[Array, "n 7 3"]:
-    """Nearly upright stems from one root."""
-    count = int(rng.integers(fewest, most))
-    lean = np.radians(rng.uniform(1, 15, count))
-    height = rng.uniform(0.78, 1.08, count)
-    return grow_around(rng, scatter_roots(rng, count, 0.05), lean, height, 7, 0.04, droop=0.03)
-
-
-def _stalk_colour(rng, ear):
-    """The colour of a stem: between its ear's and green."""
-    return 0.55 * ear + 0.45 * mix_palette(rng, FRESH)
-
-
-def _grow_branches(rng, stems, each: int, place, lengths, droop: float) -> Float[Array, "n 4 3"]:
-    """Fine branches, `each` per stem at shares `place` of it, the longer the lower."""
-    share = rng.uniform(*place, (len(stems), each))
-    start = sample_paths(stems, share).reshape(-1, 3)
-    lower = ((place[1] - share) / (place[1] - place[0])).reshape(-1)
-    turn = rng.uniform(0, 2 * np.pi, len(start))
-    long = lengths[0] + (lengths[1] - lengths[0]) * lower * rng.uniform(0.6, 1.1, len(start))
-    return grow_paths(rng, start, to_direction(np.radians(rng.uniform(25, 65, len(start))), turn), long, 4, 0.10, droop)
-
-
-def _make_spikelets(rng, twigs, each: int, colour, lengths, spread: float) -> Mesh:
-    """Rhombic husks, `each` per twig, pointing along it with a deviation of `spread`."""
-    n = len(twigs) * each
-    base = sample_paths(twigs, rng.uniform(0.0, 1.0, (len(twigs), each))).reshape(-1, 3)
-    ahead = np.repeat(path_directions(twigs)[:, -1], each, axis=0)
-    ahead = normalize(ahead + rng.normal(0, spread, (n, 3))) * rng.uniform(*lengths, (n, 1))
-    side = normalize(np.cross(ahead, rng.normal(0, 1, (n, 3))))
-    paths = np.stack([base, base + 0.45 * ahead, base + ahead], axis=1)
-    tint = colour * rng.uniform(0.7, 1.25, (n, 1)) * rng.uniform(0.94, 1.06, (n, 3))
-    wide = 0.19 * float(np.mean(lengths))
-    return make_blades(paths, side, [0.2 * wide, wide, 0.1 * wide], np.clip(tint[:, None].repeat(2, 1), 0.01, 0.95))
-
-
-def _make_low_blades(rng, green) -> Mesh:
-    """Some blades about the root of a stem."""
-    count = 14
-    heading = to_direction(np.radians(rng.uniform(8, 50, count)), draw_azimuths(rng, count))
-    root = scatter_roots(rng, count, 0.05)
-    paths = grow_paths(rng, root, heading, rng.uniform(0.3, 0.65, count), 5, 0.08, droop=0.16)
-    return _make_grass(rng, paths, [0.005, 0.006, 0.0055, 0.004, 0.001], Tint(green, 0.2), (0.5, 1.15))
 
 
 def _make_short_grass(rng, paths, width: list[float], dry: float) -> Mesh:

@@ -1,1 +1,0 @@
-"""Boundary refinement of a tile set by a prior: pictures of the seams are repaired and Gaussians refitted to them."""

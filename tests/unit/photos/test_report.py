@@ -1,0 +1,118 @@
+"""The report on a scene's photos: what it counts and advises, and that it needs nothing but itself."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import photos as synth
+from fixtures.frames import scene_frame
+
+from dav_gswt.geometry.scene_frame import FocalLength, LeftOutPhoto, SfmSign, SfmVerdict, Square
+from dav_gswt.photos.colmap_model import transform_model
+from dav_gswt.photos.photo_set import write_photo_folder
+from dav_gswt.photos.report import collect_facts, find_weaknesses, list_advice, write_report
+
+FRAME = scene_frame(
+    kind="photos",
+    unit="flying height",
+    flying_height=1.0,
+    exemplar=(-0.5, -0.5, 1.0),
+    extent=(-1.0, -1.0, 1.0, 1.0),
+    photos_per_cell=3,
+    relief=0.01,
+    images=14,
+    registered=12,
+    left_out=(LeftOutPhoto("<b>bold</b>.jpg", "it matches <i>no</i> photo & nothing else"),),
+    focal_ratio=1.0,
+    focal=FocalLength(300.0, 300.0, 303.0, 30.0, "EXIF's, which the photos confirm"),
+    reprojection_error=0.4,
+    points=3000,
+    verdict=SfmVerdict("doubtful", (SfmSign("tilt", "doubtful", "it is odd"), SfmSign("relief", "good", "flat"))),
+)
+GREY = np.full((12, 16, 3), 0.5, np.float32)
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """Twelve photos in three flight lines of four; the last sees few points, and another's are off."""
+    sparse = synth.model(synth.flight(3, 4), synth.plain(3000, 0.9, np.random.default_rng(1)))
+    last, off = sparse.image_of == 11, sparse.image_of == 4
+    keep = ~last | (np.cumsum(last) <= 25)
+    moved = sparse.pixels + np.where(off, 3.0, 0.0)[:, None] * [1, 0]
+    names = ('<img src="x">&.png', *sparse.names[1:])
+    sparse = replace(sparse, names=names, pixels=moved)
+    return replace(sparse, **{k: getattr(sparse, k)[keep] for k in ("point_of", "image_of", "pixels")})
+
+
+@pytest.fixture(scope="module")
+def made(flown, tmp_path_factory):
+    """Writes a photos/ folder; its pictures are small."""
+
+    def make(frame=FRAME, sparse=flown):
+        folder = tmp_path_factory.mktemp("made") / "photos"
+        write_photo_folder(folder, sparse, ((name, GREY) for name in sparse.names), frame)
+        return folder
+
+    return make
+
+
+def test_the_page_needs_nothing_but_itself_and_escapes_names(made, root, tmp_path):
+    for out in ("a.html", "b.html"):
+        write_report(made(), root / "workflow" / "report" / "photos.html", 'dunes "<&>"', tmp_path / out)
+    text = (tmp_path / "a.html").read_text()
+    assert text == (tmp_path / "b.html").read_text(), "equal photos give equal bytes"
+    links = re.findall(r'(?:src|href)="([^"]*)"', text)
+    assert len(links) == 13 and all(link.startswith("data:image/") for link in links)
+    assert "default-src 'none'" in text and not re.search(r"url\(|@import|<script|https?:", text)
+    assert not {"<b>", "<i>"} & set(re.findall(r"<[^>]*>", text))
+    for said in ("matches &lt;i&gt;no&lt;/i&gt;", "&lt;img src=", "&lt;b&gt;bold", "12 of 14 photos", "it is odd"):
+        assert said in text
+
+
+@pytest.mark.parametrize(
+    "points, error, shared, said",
+    [
+        (100, 2.0, 30, ()),
+        (99, 0.5, 60, ("sees only 99 points; the median is 300",)),
+        (1000, np.inf, 400, ("its points are inf px off on average",)),
+        (1000, 2.1, 29, ("its points are 2.1 px off on average", "shares at most 29 points with any other photo")),
+    ],
+)
+def test_what_makes_a_photo_weak(points, error, shared, said):
+    assert find_weaknesses(points, error, shared, 300.0) == said
+
+
+def test_advice_names_weak_photos_and_parts_that_few_photos_see(made, flown):
+    found = collect_facts(made())
+    assert [photo.name for photo in found.photos if photo.weak] == ["004.png", "011.png"]
+    said = " ".join(list_advice(found))
+    assert "doubtful: it is odd" in said and "1 of 14 photos were left out" in said and "004.png, 011.png" in said
+    assert "Photograph these parts" not in said and "focal length" not in said
+    lens = FocalLength(300.0, 300.0, 330.0, 5.0, "EXIF's")
+    south = replace(FRAME, exemplar=Square(-0.5, -0.95, 1.0), verdict=None, left_out=(), focal=lens)
+    said = list_advice(collect_facts(made(south)))
+    assert "lower left (" in said[0] and "upper" not in said[0] and "1.10 times the focal length" in said[-1]
+    small = replace(FRAME, exemplar=Square(0.0, 0.0, 0.4), reprojection_error=1.2)
+    said = " ".join(list_advice(collect_facts(made(small))))
+    assert "1.2 px off" in said and "only 0.40 flying heights wide" in said
+
+
+def test_coverage_does_not_depend_on_the_unit(made, flown):
+    """A world in metres, 40 of them a flying height: the same photos see the same places."""
+    one = collect_facts(made())
+    metres = transform_model(flown, 40.0, np.eye(3), np.zeros(3))
+    frame = replace(FRAME, unit="metre", flying_height=40.0, exemplar=Square(-20.0, -20.0, 40.0))
+    two = collect_facts(made(frame, metres))
+    assert np.array_equal(one.cover.counts, two.cover.counts)
+    assert two.cover.cell == pytest.approx(40 * one.cover.cell)
+    assert two.cover.west == pytest.approx(40 * one.cover.west)
+
+
+def test_photos_that_only_test_do_not_count(made, flown):
+    own = flown.image_of < 8
+    sparse = replace(flown, **{k: getattr(flown, k)[own] for k in ("point_of", "image_of", "pixels")})
+    frame = replace(FRAME, kind="synthetic", test=flown.names[8:], left_out=(), focal_ratio=None)
+    found = collect_facts(made(frame, sparse))
+    assert found.cover.counts.max() <= 8 and sum(photo.tests for photo in found.photos) == 4
+    assert not any(photo.weak for photo in found.photos if photo.tests)

@@ -1,1 +1,0 @@
-"""The photo report: how well the photos were registered, which were left out, which are weak."""
