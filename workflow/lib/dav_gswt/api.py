@@ -107,9 +107,9 @@ def score_poses(fitted: Reconstruction, photos: Photos, count: int = 250) -> Sco
     """
     from dav_gswt.views import candidates, feasibility, scoring
 
-    scene = {"agent": "handheld", "candidates": count, "min_elevation": 30.0}
+    scene = {"agent": "handheld", "candidates": count}
     listed = candidates.list_poses(scene, photos.frame, photos.views[0].camera)
-    free = feasibility.drop_blocked(listed, fitted.field, fitted.grid)
+    free = feasibility.filter_feasible(listed, fitted.field, fitted.grid, photos.frame.flying_height)
     return scoring.score_poses(fitted.field, fitted.grid, free, photos.views, photos.frame)
 
 
