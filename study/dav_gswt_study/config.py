@@ -3,34 +3,20 @@
 Read by the workflow before the first job, so it loads no numerics.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
 from dav_gswt.config.load import check_config, check_model
 from dav_gswt.config.model import Policy
-from dav_gswt.config.settings import Heights
-from dav_gswt.errors import InputError
-from dav_gswt_study.config_fits import Comparison, Names, PresetCosts, Seeds
-from dav_gswt_study.seams import replicates
-from dav_gswt_study.sweeps import grid
-from dav_gswt_study.tables import checks
-from dav_gswt_study.tradeoff import settings
+from dav_gswt.config.settings import Heights, Preset
+from dav_gswt_study import experiments
+
+Seeds = Annotated[list[Seed], Field(min_length=1)]
+Names = Annotated[list[Name], Field(min_length=1)]
 
 FLOOR = "floor"  # in a pair of the forced-choice study: the same place without a seam
-
-
-class PolicySettings(ConfigModel):
-    """A policy with settings of its own."""
-
-    policy: Policy = key("its name")
-    prior: Name | None = key("instead of the config's", None)
-    p_drop: float | None = key("instead of the config's", None, ge=0, lt=1)
-    lam: float | None = key("instead of the config's", None, ge=0, le=1e6)
-
-
-Policies = Annotated[list[Policy | PolicySettings], Field(min_length=1)]
 
 
 class FixedSettings(ConfigModel):
@@ -48,34 +34,15 @@ class FixedSettings(ConfigModel):
     preset: Name | None = key("an entry of `presets`", None)
 
 
-class BaseSettings(ConfigModel):
-    """Settings that comparisons start from."""
-
-    policy: Policy = key("how views are chosen")
-    prior: Name = key("an entry of `priors`")
-    p_drop: float | None = key("instead of the config's", None, ge=0, lt=1)
-    lam: float | None = key("instead of the config's", None, ge=0, le=1e6)
-    k: int | None = key("instead of the config's", None, ge=1, le=1000)
-    rounds: int = key("rounds", ge=1, le=100)
-    tau: Share = key("mean uncertainty from which a tile keeps all orders")
-    tiling: Name = key("an entry of `tilings`")
-    preset: Name = key("an entry of `presets`")
+Policies = Annotated[list[Policy | FixedSettings], Field(min_length=1)]
 
 
 class Levels(ConfigModel):
-    """`snakemake lod_table presort_table`: levels, pre-sorted orders and rounding against the finest."""
+    """The scenes of a table, and the settings that they are made with."""
 
     scenes: Names = key("whose tiles are measured")
     seeds: Seeds | None = key("of each scene; the config's if left out", None)
     fixed: FixedSettings | None = key("settings that replace the config's", None)
-
-
-class Materials(Levels):
-    """Materials and objects against true labels (family `oasis`, `materials: auto`)."""
-
-
-class Lattice(Levels):
-    """How visibly terrains repeat, from above (`snakemake materials_pages`)."""
 
 
 class Flight(ConfigModel):
@@ -166,48 +133,25 @@ class ForcedChoice(ConfigModel):
     answers: Text = key("the folder with the files that people saved; it may be missing")
 
 
-class Vary(ConfigModel):
-    """One setting and its values, or two, of which every combination is made."""
-
-    policy: Policies | None = key("policies", None)
-    prior: Names | None = key("entries of `priors`", None)
-    p_drop: list[Annotated[float, Field(ge=0, lt=1)]] | None = key("dropouts", None, min_length=1)
-    lam: list[Annotated[float, Field(ge=0, le=1e6)]] | None = key("weights of LPIPS", None, min_length=1)
-    k: list[Annotated[int, Field(ge=1, le=1000)]] | None = key("views a round", None, min_length=1)
-    rounds: list[Annotated[int, Field(ge=0, le=100)]] | None = key("rounds", None, min_length=1)
-    tau: list[Share] | None = key("thresholds", None, min_length=1)
-    tiling: Names | None = key("entries of `tilings`", None)
-
-    @model_validator(mode="after")
-    def _require_one_or_two(self) -> "Vary":
-        if not 1 <= len(self.model_fields_set) <= 2:
-            raise ValueError("one or two settings are varied")
-        return self
-
-
-class Measure(ConfigModel):
-    """What is measured, and of which seeds."""
-
-    views: list[Seed] | None = key("PSNR, SSIM, LPIPS of the test photos", None)
-    tiles: list[Seed] | None = key("uncertainty, orders, bytes of the bundle", None)
-    seams: list[Seed] | None = key("Seam-LPIPS, density", None)
-    stills: list[Seed] | None = key("seconds of three stills", None)
-
-    @model_validator(mode="after")
-    def _require_one(self) -> "Measure":
-        if not self.model_fields_set:
-            raise ValueError("nothing is measured")
-        return self
-
-
 class Sweep(ConfigModel):
     """`snakemake study/results/sweeps/<name>.png`: what one setting changes."""
 
     scenes: Names = key("scenes with photos; policies are compared fairly with `agent: replay`")
-    vary: Vary = key("the setting and its values")
+    vary: Annotated[dict[str, Annotated[list[Any], Field(min_length=1)]], Field(min_length=1, max_length=2)] = key(
+        "a key of `fixed` and its values, or two keys, of which every combination is made; of policies also tables"
+    )
     fixed: FixedSettings = key("settings that replace the config's", FixedSettings())
-    measure: Measure = key("what is measured, and of which seeds")
+    measure: Annotated[dict[Literal["views", "tiles", "seams", "stills"], Seeds], Field(min_length=1)] = key(
+        "seeds by what is measured of them: test photos, the bundle, Seam-LPIPS, seconds of three stills"
+    )
     baseline: str | None = key("the value that tables compare the others with", None)
+
+    @model_validator(mode="after")
+    def _check_values(self) -> "Sweep":
+        for name, values in self.vary.items():
+            for value in values:
+                FixedSettings.model_validate(value if isinstance(value, dict) else {name: value})
+        return self
 
 
 class Knob(ConfigModel):
@@ -227,18 +171,30 @@ class Tradeoff(ConfigModel):
 
     scene: Name = key("a scene with photos")
     seed: Seed = key("of all experiments")
-    base: BaseSettings = key("settings that knobs are turned from")
+    base: FixedSettings = key("settings that knobs are turned from")
     presets: Names = key("presets that are compared as they are")
     only: Names | None = key("the knobs that are turned; all if left out", None)
     knobs: dict[Name, Knob] = key("by name")
 
-    @model_validator(mode="after")
-    def _check_tau(self) -> "Tradeoff":
-        """Without `of` a knob is `tau`; the range of other knobs is that of the entries they change."""
-        for name, knob in self.knobs.items():
-            if knob.of is None and (name != "tau" or any(not 0 <= float(value) <= 1 for value in knob.values)):
-                raise ValueError(f"knobs.{name}: give `of`; without it a knob is tau, whose values are from 0 to 1")
-        return self
+
+class Comparison(Preset):
+    """`make compare OPENSPLAT=<program>`: other programs' fits beside ours, of the same photos."""
+
+    scene: Name = key("whose photos are fitted")
+    margin: float = key("ground fitted around the exemplar, as a share of its side", ge=0, le=100)
+    opensplat: str = key("the program, as one calls it", "opensplat")
+    gsplat_steps: int = key("steps of gsplat's trainer, on a GPU", ge=1, le=100_000)
+    seconds: float = key("that it may take", gt=0, le=100_000)
+    every: int = key("steps after which a field is compared with the test photos", ge=1, le=100_000)
+
+
+class PresetCosts(ConfigModel):
+    """`snakemake preset_costs`: what presets cost and what they are worth, with all else as the config has it."""
+
+    scenes: Names = key("scenes with photos")
+    presets: Names = key("`standard` among them, which the others' seconds are compared with")
+    size: int = key("of the test photos, whatever size is fitted", unit="pixels", ge=32, le=4096)
+    seed: Seed = key("of all experiments")
 
 
 class TableFigures(ConfigModel):
@@ -266,8 +222,8 @@ class StudyConfig(ConfigModel):
     """What the study compares."""
 
     lod: Levels | None = key("levels, orders, rounding", None)
-    materials: Materials | None = key("materials and objects against true labels", None)
-    lattice: Lattice | None = key("how visibly terrains repeat", None)
+    materials: Levels | None = key("materials and objects against true labels", None)
+    lattice: Levels | None = key("how visibly terrains repeat", None)
     gallery: GalleryPage | None = key("terrains and a walk, as pictures", None)
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
@@ -286,70 +242,7 @@ def expand_study(config: dict, study: dict) -> dict:
 
     Raises: InputError: the key, what is wrong with it, and what it may be.
     """
-    model = check_model(StudyConfig, study, "study")
-    study = model.model_dump(mode="json", exclude_none=True, by_alias=True)
-    flat = config | study
-    for table in ("lod", "materials", "lattice", "gallery", "frames", "seams", "forced_choice"):
-        _require_names(f"study.{table}.scenes", study.get(table, {}).get("scenes", []), config["scenes"], "scenes")
-    if "gallery" in study:
-        _require_names("study.gallery.walk", [study["gallery"]["walk"]], config["scenes"], "scenes")
-    if "compare" in study:
-        _require_names("study.compare.scene", [study["compare"]["scene"]], config["scenes"], "scenes")
-    if "preset_costs" in study:
-        _require_names("study.preset_costs.scenes", study["preset_costs"]["scenes"], config["scenes"], "scenes")
-        _require_names("study.preset_costs.presets", study["preset_costs"]["presets"], config["presets"], "presets")
-    if "view_benchmark" in study:
-        _check_view_benchmark(study["view_benchmark"], config)
-    if "seams" in study:
-        _check_seams(study["seams"], config["tilings"])
-    if "forced_choice" in study:
-        _check_forced_choice(study["forced_choice"], config["tilings"])
-    grid.check_sweeps(flat)
-    checks.check(flat)
-    settings.check_tradeoff(flat)
-    made = replicates.add_replicates(settings.add_entries(flat))
+    study = check_model(StudyConfig, study, "study").model_dump(mode="json", exclude_none=True, by_alias=True)
+    made = experiments.add_replicates(experiments.add_entries(config | study))
     tables = {table: made[table] for table in ("presets", "tilings", "priors")}
     return check_config(config | tables) | {"study": study}  # values of knobs are in range where the entries are
-
-
-def _require_names(where: str, names: list[str], table: dict, called: str) -> None:
-    for name in names:
-        if name not in table:
-            raise InputError(f"config: {where}: there is no {name!r}; {called} has {', '.join(table) or 'nothing'}")
-
-
-def _check_seams(seams: dict, tilings: dict) -> None:
-    _require_names(
-        "study.seams.tilings", [replicates.split_tiling(name)[0] for name in seams["tilings"]], tilings, "tilings"
-    )
-    if seams["baseline"] not in seams["tilings"]:
-        raise InputError(f"config: study.seams.baseline: {seams['baseline']} is not among study.seams.tilings")
-
-
-def _check_forced_choice(study: dict, tilings: dict) -> None:
-    """Both entries of every pair exist; only the second may be the floor."""
-    if any(pair[0] == FLOOR for pair in study["pairs"]):
-        raise InputError(f"config: study.forced_choice.pairs: {FLOOR} is the same place without a seam: name it second")
-    names = [replicates.split_tiling(name)[0] for pair in study["pairs"] for name in pair if name != FLOOR]
-    _require_names("study.forced_choice.pairs", names, tilings, f"{FLOOR} is allowed second; tilings")
-
-
-def _check_view_benchmark(benchmark: dict, config: dict) -> None:
-    """Policies can be compared where every scene starts from some of its photos and each experiment takes a round."""
-    scenes, where = config["scenes"], "config: study.view_benchmark"
-    if benchmark["baseline"] not in benchmark["policies"]:
-        raise InputError(f"{where}.baseline: {benchmark['baseline']} is not among view_benchmark.policies")
-    for i, group in enumerate(benchmark["sets"]):
-        if "preset" in group:
-            _require_names(f"study.view_benchmark.sets.{i}.preset", [group["preset"]], config["presets"], "presets")
-        for policy in group.get("policies", benchmark["policies"]):
-            if isinstance(policy, dict) and "prior" in policy:
-                _require_names("study.view_benchmark.policies", [policy["prior"]], config["priors"], "priors")
-        for name in group["scenes"]:
-            if "start" not in scenes.get(name, {}):
-                raise InputError(f"{where}.sets.{i}.scenes: {name} is no scene with `start`, photos to start from")
-            if group["photos"] < scenes[name]["start"] + max(group["k"]):
-                raise InputError(
-                    f"{where}.sets.{i}.photos: {group['photos']} leave no round of {max(group['k'])} after the "
-                    f"{scenes[name]['start']} that {name} starts from"
-                )

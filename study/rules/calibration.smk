@@ -23,8 +23,6 @@ rule calibrate_coarse:
         poses="<results>/<scored>/calibration.csv",
     log:
         "<logs>/<scored>/calibrate_coarse.log",
-    benchmark:
-        "<benchmarks>/<scored>/calibrate_coarse.tsv"
     threads: 2
     resources:
         mem_mb=per_attempt(3000),
@@ -59,8 +57,6 @@ use rule calibrate_coarse as calibrate_round with:
         poses="<results>/<round>/calibration.csv",
     log:
         "<logs>/<round>/calibrate_round.log",
-    benchmark:
-        "<benchmarks>/<round>/calibrate_round.tsv"
     wildcard_constraints:
         t=POSITIVE,
 
@@ -75,8 +71,6 @@ rule plot_calibration:
         plot="study/docs/figures/calibration.png",
     log:
         "<logs>/figures/plot_calibration.log",
-    benchmark:
-        "<benchmarks>/figures/plot_calibration.tsv"
     params:
         cells=lambda wildcards: list(calibrations().values()),
         source=code_of_study("plot_calibration"),

@@ -3,12 +3,15 @@
 from itertools import product
 
 from dav_gswt.paths import encode_number
-from dav_gswt_study.seams import replicates
-from dav_gswt_study.sweeps import grid
-from dav_gswt_study.tables.checks import sweeps_of
-from dav_gswt_study.tradeoff import settings
+from dav_gswt_study import experiments
 
-TABLES = ("timing", "lod", "sensitivity", "ablation")
+SHOWN = {  # figures of a scene in the page of results
+    "sphere": "candidates by what scores said of them, and what was chosen",
+    "evolution": "two test views after the first rounds",
+    "estimators": "test views after as many photos, chosen by each estimator",
+    "cuts": "cuts by colours and by what the ground is",
+    "uncertainty": "uncertainty of tiles, and a walk over them",
+}
 FRAMES = "study/results/tables/viewer.csv"
 FLAT = config | STUDY  # the study's tables beside the product's
 
@@ -20,7 +23,7 @@ def viewer_times(wildcards):
 
 def plain_tiling(wildcards):
     """The entry of `tilings` that a tiling is made of."""
-    return replicates.split_tiling(wildcards.tiling)[0]
+    return experiments.split_tiling(wildcards.tiling)[0]
 
 
 def made_of(scene):
@@ -89,13 +92,9 @@ def benchmark_experiment(scene, asked, seed, k, group):
     of_round = (rules.select_poses, rules.capture_views, rules.update_field)
     jobs += [of([], job.benchmark, after, chosen) for job in of_round]
     jobs += [of([], rules.fit_chosen_photos.benchmark, after)] * (chosen != values)
-    prior = config["priors"].get(values["prior"], {"samples": 0, "steps": 0})
     return {key: values[key] for key in ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")} | {
         "corrected": entry["kind"] == "photos",
-        "samples": prior["samples"],
-        "steps": prior["steps"],
         "metrics": of(rules.evaluate_coarse.output.metrics, rules.evaluate_round.output.metrics, after),
-        "facts": of(rules.score_coarse.output.facts, rules.score_round.output.facts, before),
         "times": [list(of_round) for of_round in zip(*jobs, strict=True)],
     }
 
@@ -115,15 +114,17 @@ def seam_experiments():
         variants = [
             (variant, name, number)
             for variant in dict.fromkeys([*asked["tilings"], own])
-            for number, name in enumerate(replicates.list_replicates(variant, own, asked))
+            for number, name in enumerate(experiments.list_replicates(variant, own, asked))
         ]
         for (variant, entry, number), seed in product(variants, config["seeds"]):
             values = seam_branch(scene, entry) | {"seed": seed}
             files = {"table": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts}
             files |= {} if number else {"repeats": rules.measure_repetition.output.table}
-            (cell,) = [{name: expand(path, **values)[0] for name, path in files.items()}]
-            about = {key: values[key] for key in ("scene", "seed", "preset")}
-            cells.append(about | {"variant": variant, "replicate": number} | cell)
+            about = {key: values[key] for key in ("scene", "seed", "preset")} | {
+                "variant": variant,
+                "replicate": number,
+            }
+            cells.append(about | {name: expand(path, **values)[0] for name, path in files.items()})
     return cells
 
 
@@ -134,15 +135,9 @@ def seam_pictures():
 
 
 def compared_tilings():
-    """The entries of `seams` that are compared, by name: of other sizes, tiles have no place in common."""
-    names = dict.fromkeys(name for pair in STUDY["forced_choice"]["pairs"] for name in pair)
-    found = {name: config["tilings"][replicates.split_tiling(name)[0]] for name in names if name != FLOOR}
-    if len({tuple(entry[key] for key in ("tile", "strip", "variants")) for entry in found.values()}) > 1:
-        raise WorkflowError(
-            "config: study.forced_choice.pairs: tilings of other `tile`, `strip` or `variants` have no place in common; "
-            f"name such that are only cut in other ways ({', '.join(found)} are not)"
-        )
-    return found
+    """The entries of `tilings` that people compare, by name."""
+    names = dict.fromkeys(name for pair in STUDY["forced_choice"]["pairs"] for name in pair if name != FLOOR)
+    return {name: config["tilings"][experiments.split_tiling(name)[0]] for name in names}
 
 
 def pair_inputs(wildcards):
@@ -157,20 +152,19 @@ def pair_inputs(wildcards):
 
 def saved_answers(wildcards):
     """The files of answers, where there are any yet."""
-    folder = Path(STUDY["forced_choice"]["answers"])
-    found = sorted(str(p) for p in folder.glob("*.json") if p.is_file() and not p.name.startswith("."))
+    found = sorted(map(str, Path(STUDY["forced_choice"]["answers"]).glob("[!.]*.json")))
     return {"answers": found} if found else {}
 
 
 def sweep_experiments(name):
     """The cells of a row of the config's `sweeps`: what tells each from the others, what it varied, and its files."""
     asked, cells = STUDY["sweeps"][name], {}
-    for chosen in grid.list_combinations(asked["vary"], asked.get("fixed", {})):
-        for scene, seed in product(asked["scenes"], grid.list_seeds(asked["measure"])):
+    for chosen in experiments.list_combinations(asked["vary"], asked.get("fixed", {})):
+        for scene, seed in product(asked["scenes"], experiments.list_seeds(asked["measure"])):
             values = study_branch(scene, chosen) | {"seed": seed}
             measured = [key for key, seeds in asked["measure"].items() if seed in seeds]
             cell = describe_experiment(values, measured) | {"sweep": name, "varied": chosen["shown"]}
-            cells.setdefault(tuple(cell[key] for key in grid.CELL), cell)
+            cells.setdefault(tuple(cell[key] for key in CELL), cell)
     return list(cells.values())
 
 
@@ -178,7 +172,9 @@ def study_branch(scene, chosen):
     """The wildcards of a cell of settings of its own, which may give the photos that it ends with instead of its rounds."""
     entry, over = config["scenes"][scene], {key: value for key, value in chosen.items() if key != "shown"}
     asked = config | over
-    rounds = grid.count_rounds(over, asked["policy"], grid.count_start_photos(entry), asked["k"], asked["rounds"])
+    rounds = experiments.count_rounds(
+        over, asked["policy"], experiments.count_start_photos(entry), asked["k"], asked["rounds"]
+    )
     return experiment_branch(scene, over | {"rounds": rounds})
 
 
@@ -198,11 +194,11 @@ def describe_experiment(values, measured):
 
 def tradeoff_experiments():
     """A cell for every setting of every knob, each knob's most accurate first."""
-    asked, size = STUDY["tradeoff"], settings.find_test_size(FLAT)
+    asked, size = STUDY["tradeoff"], experiments.find_test_size(FLAT)
     return [
         {"knob": s.knob, "setting": s.shown, "most": s.most, "base": s.base, "measure": s.measure}
         | tradeoff_experiment(asked["scene"], asked["seed"], s.chosen, size, s.measure)
-        for s in settings.list_settings(FLAT)
+        for s in experiments.list_settings(FLAT)
     ]
 
 
@@ -221,7 +217,26 @@ def tradeoff_experiment(scene, seed, chosen, size, measure):
 
 def files_of(cells):
     """Everything that cells are read from, but for benchmarks."""
-    return [path for cell in cells for path in [*cell["files"].values(), *cell["stills"]]]
+    return [path for cell in cells for path in [*cell["files"].values(), *cell.get("stills", [])]]
+
+
+def preset_experiments():
+    """The cells of `preset_costs`, a scene and a preset each."""
+    asked = STUDY["preset_costs"]
+    return [preset_experiment(scene, preset) for scene in asked["scenes"] for preset in asked["presets"]]
+
+
+def preset_experiment(scene, preset):
+    """One of them: its files, and the benchmarks of jobs by what they do."""
+    asked = STUDY["preset_costs"]
+    values = experiment_branch(scene, {"preset": preset}) | {"seed": asked["seed"]}
+    cell = describe_run(values, ["views", "tiles"])
+    (metrics,) = expand(rules.evaluate_at.output.metrics, size=asked["size"], **values)
+    told = [] if config["scenes"][scene].get("materials", "one") == "one" else [rules.find_materials]
+    parts = {"fits": ("coarse", "update"), "views": ("score", "select"), "tiles": ("levels", "cut", "bundle")}
+    times = {part: [path for job in jobs for path in cell["times"][job]] for part, jobs in parts.items()}
+    times["tiles"] += [path for job in told for path in expand(job.benchmark, **values)]
+    return cell | {"files": cell["files"] | {"metrics": metrics}, "times": times}
 
 
 def walk_settings(wildcards):
@@ -229,19 +244,15 @@ def walk_settings(wildcards):
     return {key: STUDY["frames"][key] for key in ("heights", "flight", "width", "height", "budgets")}
 
 
-def swept(table):
-    """An input function: the sweeps that one of the study's tables is made from."""
-    return lambda wildcards: [f"study/results/sweeps/{name}.csv" for name in STUDY["tables"][table]]
+def tabled_sweeps():
+    """The sweeps that the paper's tables are made from."""
+    asked = STUDY["tables"]
+    return list(dict.fromkeys([asked["timing"], *asked["sensitivity"], *asked["ablation"]]))
 
 
 def setting_of(sweep):
     """What a sweep varies."""
     return next(iter(STUDY["sweeps"][sweep]["vary"]))
-
-
-def default_of(sweep):
-    """The value that a setting has where it is not varied, as tables write it."""
-    return str(config.get(setting_of(sweep), ""))
 
 
 def estimator_branch(scene, policy):
@@ -261,16 +272,18 @@ def of_estimators(output):
 def figure_files():
     """The paper's figures: the path of each, by its name in docs/figures; they are of scenes, seed and policy of `study`."""
     asked, found = STUDY["tables"]["figures"], {}
+    drawn = (
+        rules.plot_sphere,
+        rules.plot_evolution,
+        rules.plot_estimators,
+        rules.plot_cuts,
+        rules.plot_tile_uncertainty,
+    )
     for scene in asked["scenes"]:
         values = estimator_branch(scene, asked["policy"])
-        shown = {
-            "sphere": rules.plot_sphere.output.plot,
-            "evolution": rules.plot_evolution.output.plot,
-            "estimators": rules.plot_estimators.output.plot,
-            "cuts": rules.plot_cuts.output.plot,
-            "uncertainty": rules.plot_tile_uncertainty.output.plot,
+        found |= {
+            f"{name}_{scene}": expand(rule.output.plot, **values)[0] for name, rule in zip(SHOWN, drawn, strict=True)
         }
-        found |= {f"{name}_{scene}": expand(path, **values)[0] for name, path in shown.items()}
     return found | {"budget": "study/results/sweeps/budget.png"}
 
 
@@ -291,19 +304,9 @@ def kept_suffix(name):
 
 def captions():
     """What the figures of the study show, in their order."""
-    about = {
-        "sphere": "candidates by what scores said of them, and what was chosen",
-        "evolution": "two test views after the first rounds",
-        "estimators": "test views after as many photos, chosen by each estimator",
-        "cuts": "cuts by colours and by what the ground is",
-        "uncertainty": "uncertainty of tiles, and a walk over them",
-    }
-    return [
-        f"{name.partition('_')[2]}: {about[name.partition('_')[0]]}" if "_" in name else "quality against photos"
-        for name in figure_files()
+    return [f"{scene}: {SHOWN[name]}" for name, _, scene in (n.partition("_") for n in figure_files()) if scene] + [
+        "quality against photos"
     ]
-
-
 
 
 def deciding_scores(wildcards):

@@ -17,8 +17,6 @@ rule render_pairs:
         pairs=directory("study/results/forced_choice/{scene}/pairs"),
     log:
         "<logs>/forced_choice/{scene}/render_pairs.log",
-    benchmark:
-        "<benchmarks>/forced_choice/{scene}/render_pairs.tsv"
     threads: 2
     resources:
         mem_mb=per_attempt(6000),
@@ -45,8 +43,6 @@ rule make_kit:
         key="study/results/forced_choice/kit/key.json",
     log:
         "<logs>/forced_choice/make_kit.log",
-    benchmark:
-        "<benchmarks>/forced_choice/make_kit.tsv"
     params:
         scenes=lambda wildcards: STUDY["forced_choice"]["scenes"],
         seed=lambda wildcards: STUDY["forced_choice"]["seed"],
@@ -63,17 +59,10 @@ rule evaluate_answers:
         schema=ANSWERS_SCHEMA,
     output:
         table="study/results/tables/forced_choice.csv",
-        plot=report(
-            "study/results/figures/forced_choice.png",
-            caption="../report/forced_choice.rst",
-            category="Figures",
-            labels={"figure": "which seams are harder to see"},
-        ),
+        plot="study/results/figures/forced_choice.png",
         facts="study/results/forced_choice/participants.json",
     log:
         "<logs>/forced_choice/evaluate_answers.log",
-    benchmark:
-        "<benchmarks>/forced_choice/evaluate_answers.tsv"
     params:
         source=code_of_study("evaluate_answers"),
     script:

@@ -1,9 +1,8 @@
 """Seams: can anybody find the borders and the cuts, and does the terrain repeat? `snakemake seams`.
 
 In: levels and tiles. Out, per experiment (a scene, a seed, a tiling): crops.csv, facts.json, repetition.csv; of each scene's
-own tiling 20 x 20 tiles from above and walking, flat and hilly. Gathered: study/results/tables/seams.csv (every crop),
-seam_summary.csv, seam_ablation.csv and repetition.csv, the last three also in study/docs/data; the page
-study/docs/results/seams.md.
+own tiling 20 x 20 tiles from above and walking, flat and hilly. Gathered: study/results/tables/seams.csv (every crop); in
+study/docs/data seam_summary.csv, seam_ablation.csv and repetition.csv, where runs add up; the page study/docs/results/seams.md.
 """
 
 
@@ -19,8 +18,6 @@ rule measure_seams:
         facts="<results>/<seams>/facts.json",
     log:
         "<logs>/<seams>/measure_seams.log",
-    benchmark:
-        "<benchmarks>/<seams>/measure_seams.tsv"
     priority: -1  # after all jobs of two threads: between them one core would stand idle
     threads: 1  # crops are small: two cells beside each other take half the time
     resources:
@@ -43,11 +40,8 @@ rule measure_repetition:
         tiles="<results>/<tiles>/tiles",
     output:
         table="<results>/<seams>/repetition.csv",
-        plot="<results>/<seams>/repetition.png",
     log:
         "<logs>/<seams>/measure_repetition.log",
-    benchmark:
-        "<benchmarks>/<seams>/measure_repetition.tsv"
     threads: 2
     resources:
         mem_mb=per_attempt(4000),
@@ -74,8 +68,6 @@ rule render_grid:
         ),
     log:
         "<logs>/<seams>/render_grid.log",
-    benchmark:
-        "<benchmarks>/<seams>/render_grid.tsv"
     priority: -1
     threads: 1  # most of it places Gaussians, one cell after another
     resources:
@@ -89,50 +81,29 @@ rule render_grid:
 
 
 rule gather_seams:
-    """Every crop of every cell in one table; what follows from them, added to what earlier runs found."""
+    """Every crop of every cell in one table; what follows from them, added to what earlier runs found; the page and its pictures."""
     input:
         measured=lambda wildcards: [
             cell[name] for cell in seam_experiments() for name in ("table", "facts", "repeats") if name in cell
         ],
+        drawn=lambda wildcards: [path for paths in seam_pictures().values() for path in paths],
+        template=str(HERE / "report/seams.md"),
     output:
         crops="study/results/tables/seams.csv",
-        summary="study/results/tables/seam_summary.csv",
-        ablation="study/results/tables/seam_ablation.csv",
-        repetition="study/results/tables/repetition.csv",
         kept=update(expand("study/docs/data/{table}.csv", table=["seam_summary", "seam_ablation", "repetition"])),
         plot="study/docs/figures/seam_ablation.png",
+        sheet="study/docs/figures/seam_sheet.jpg",
+        page="study/docs/results/seams.md",
     log:
         "<logs>/seams/gather_seams.log",
-    benchmark:
-        "<benchmarks>/seams/gather_seams.tsv"
     params:
         cells=lambda wildcards: seam_experiments(),
         study=lambda wildcards: STUDY["seams"],
+        pictures=lambda wildcards: seam_pictures(),
+        own=lambda wildcards: {scene: config["scenes"][scene]["tiling"] for scene in STUDY["seams"]["scenes"]},
         source=code_of_study("gather_seams"),
     script:
         "../scripts/gather_seams.py"
-
-
-rule write_seams:
-    """What was found, as a page to read, and all that was drawn on one sheet."""
-    input:
-        tables=list(rules.gather_seams.output.kept),
-        ablation=rules.gather_seams.output.plot,
-        template=str(Path(HERE, "report/seams.md")),
-        drawn=lambda wildcards: [path for paths in seam_pictures().values() for path in paths],
-    output:
-        page="study/docs/results/seams.md",
-        sheet="study/docs/figures/seam_sheet.jpg",
-    log:
-        "<logs>/seams/write_seams.log",
-    benchmark:
-        "<benchmarks>/seams/write_seams.tsv"
-    params:
-        pictures=lambda wildcards: seam_pictures(),
-        own=lambda wildcards: {scene: config["scenes"][scene]["tiling"] for scene in STUDY["seams"]["scenes"]},
-        source=code_of_study("write_seams"),
-    script:
-        "../scripts/write_seams.py"
 
 
 rule plot_cuts:
@@ -141,16 +112,9 @@ rule plot_cuts:
         seams=[f"<results>/<round>{{inpainted}}/tiles_{kind}/seams.json" for kind in ("colour", "semantic")],
         tiles=[f"<results>/<round>{{inpainted}}/tiles_{kind}/tiles" for kind in ("colour", "semantic")],
     output:
-        plot=report(
-            "<results>/<round>{inpainted}/seam_cuts.png",
-            caption="../report/cuts.rst",
-            category="Figures",
-            labels={"figure": "cuts by colour and by kind of ground", "scene": "{scene}"},
-        ),
+        plot="<results>/<round>{inpainted}/seam_cuts.png",
     log:
         "<logs>/<round>{inpainted}/plot_cuts.log",
-    benchmark:
-        "<benchmarks>/<round>{inpainted}/plot_cuts.tsv"
     params:
         source=code_of_study("plot_cuts"),
     script:
@@ -160,8 +124,7 @@ rule plot_cuts:
 rule seams:
     """Measure the seams of the config's `seam_study`, and draw what is to be looked at."""
     input:
-        lambda wildcards: list(rules.gather_seams.output),
-        lambda wildcards: list(rules.write_seams.output),
+        rules.gather_seams.output,
         lambda wildcards: [
             path
             for scene in STUDY["seams"]["scenes"]

@@ -1,82 +1,31 @@
 """The paper's tables with their own columns from our runs, the paper's values beside them as columns `paper_`; figures.
 
-In: sweeps that the config's `study.tables` names. Out: study/results/tables/timing.csv, sensitivity.csv, ablation.csv, also in
-study/docs/data; study/results/figures/estimators_{scene}.png; uncertainty.png beside a bundle.
+In: sweeps that the config's `study.tables` names. Out: study/docs/data/timing.csv, sensitivity.csv, ablation.csv;
+study/results/figures/estimators_{scene}.png; uncertainty.png beside a bundle; the page study/docs/results/results.md.
+`snakemake study` makes all of it, and the pages of `stability` and `tradeoff`.
 """
 
 
-rule compare_timing:
-    """What each stage took in our runs, and what a frame of the viewer takes."""
+rule tabulate_paper:
+    """Stages and frames in time; what one setting changes; estimators, policies and cuts less the baseline of their sweep."""
     input:
         unpack(viewer_times),
-        sweep=lambda wildcards: "study/results/sweeps/{timing}.csv".format(**STUDY["tables"]),
+        sweeps=lambda wildcards: [f"study/results/sweeps/{name}.csv" for name in tabled_sweeps()],
     output:
-        table=report(
-            "study/results/tables/timing.csv",
-            caption="../report/timing.rst",
-            category="Tables",
-            labels={"table": "timing"},
-        ),
-        kept="study/docs/data/timing.csv",
+        timing="study/docs/data/timing.csv",
+        sensitivity="study/docs/data/sensitivity.csv",
+        ablation="study/docs/data/ablation.csv",
     log:
-        "<logs>/tables/timing.log",
-    benchmark:
-        "<benchmarks>/tables/timing.tsv"
+        "<logs>/tables/tabulate_paper.log",
     params:
-        value=lambda wildcards: default_of(STUDY["tables"]["timing"]),
+        asked=lambda wildcards: STUDY["tables"],
+        baselines=lambda wildcards: {name: STUDY["sweeps"][name].get("baseline") for name in tabled_sweeps()},
+        settings=lambda wildcards: {name: setting_of(name) for name in tabled_sweeps()},
+        defaults=lambda wildcards: {(key := setting_of(name)): str(config.get(key, "")) for name in tabled_sweeps()},
         families=lambda wildcards: {n: s["family"] for n, s in config["scenes"].items() if "family" in s},
-        source=code_of_study("compare_timing"),
+        source=code_of_study("tabulate_paper"),
     script:
-        "../scripts/compare_timing.py"
-
-
-rule tabulate_sensitivity:
-    """What one setting changes, the others as they are."""
-    input:
-        unpack(viewer_times),
-        sweeps=swept("sensitivity"),
-    output:
-        table=report(
-            "study/results/tables/sensitivity.csv",
-            caption="../report/sensitivity.rst",
-            category="Tables",
-            labels={"table": "sensitivity"},
-        ),
-        kept="study/docs/data/sensitivity.csv",
-    log:
-        "<logs>/tables/sensitivity.log",
-    benchmark:
-        "<benchmarks>/tables/sensitivity.tsv"
-    params:
-        settings=lambda wildcards: [setting_of(name) for name in STUDY["tables"]["sensitivity"]],
-        defaults=lambda wildcards: {setting_of(name): default_of(name) for name in STUDY["tables"]["sensitivity"]},
-        source=code_of_study("tabulate_sensitivity"),
-    script:
-        "../scripts/tabulate_sensitivity.py"
-
-
-rule tabulate_ablation:
-    """Estimators, policies and ways to cut, each less the baseline of its sweep."""
-    input:
-        unpack(viewer_times),
-        sweeps=swept("ablation"),
-    output:
-        table=report(
-            "study/results/tables/ablation.csv",
-            caption="../report/ablation.rst",
-            category="Tables",
-            labels={"table": "ablation"},
-        ),
-        kept="study/docs/data/ablation.csv",
-    log:
-        "<logs>/tables/ablation.log",
-    benchmark:
-        "<benchmarks>/tables/ablation.tsv"
-    params:
-        baselines=lambda wildcards: {name: STUDY["sweeps"][name]["baseline"] for name in STUDY["tables"]["ablation"]},
-        source=code_of_study("tabulate_ablation"),
-    script:
-        "../scripts/tabulate_ablation.py"
+        "../scripts/tabulate_paper.py"
 
 
 rule plot_estimators:
@@ -90,16 +39,9 @@ rule plot_estimators:
         model="<results>/<photos>/sparse",
         frame="<results>/<photos>/ground.json",
     output:
-        plot=report(
-            "study/results/figures/estimators_{scene}.png",
-            caption="../report/estimators.rst",
-            category="Figures",
-            labels={"figure": "estimators", "scene": "{scene}"},
-        ),
+        plot="study/results/figures/estimators_{scene}.png",
     log:
         "<logs>/figures/estimators_{scene}.log",
-    benchmark:
-        "<benchmarks>/figures/estimators_{scene}.tsv"
     resources:
         mem_mb=per_attempt(1500),
         runtime=per_attempt("10m"),
@@ -116,19 +58,46 @@ rule plot_tile_uncertainty:
     input:
         manifest="<results>/<bundle>/davgswt.json",
     output:
-        plot=report(
-            "<results>/<bundle>/uncertainty.png",
-            caption="../report/uncertainty.rst",
-            category="Figures",
-            labels={"figure": "uncertainty of tiles", "scene": "{scene}"},
-        ),
+        plot="<results>/<bundle>/uncertainty.png",
     log:
         "<logs>/<bundle>/plot_tile_uncertainty.log",
-    benchmark:
-        "<benchmarks>/<bundle>/plot_tile_uncertainty.tsv"
     params:
         tau=real("tau"),
         length=16.0,
         source=code_of_study("plot_tile_uncertainty"),
     script:
         "../scripts/plot_tile_uncertainty.py"
+
+
+rule write_results:
+    """The study's tables and figures as a page of docs/."""
+    input:
+        **dict(rules.tabulate_paper.output.items()),
+        lod="study/results/tables/lod.csv",
+        figures=lambda wildcards: list(figure_files().values()),
+        template=str(HERE / "report/results.md"),
+    output:
+        page="study/docs/results/results.md",
+        lod="study/docs/data/lod.csv",
+        figures=[f"study/docs/figures/study_{name}{kept_suffix(name)}" for name in figure_files()],
+    log:
+        "<logs>/study/write_results.log",
+    params:
+        shown=lambda wildcards: captions(),
+        source=code_of_study("write_results"),
+    script:
+        "../scripts/write_results.py"
+
+
+rule study:
+    """All tables and figures of the paper, from our own runs."""
+    input:
+        rules.write_results.output,
+        rules.write_stability.output.page,
+        rules.compare_settings.output.page,
+        lambda wildcards: expand("study/results/sweeps/{name}.png", name=[*tabled_sweeps(), *STUDY["tables"]["also"]]),
+        lambda wildcards: terrain_sheets(),
+
+
+localrules:
+    study,

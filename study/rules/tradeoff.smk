@@ -1,8 +1,9 @@
-"""Speed against accuracy: each setting of the config's `study.tradeoff` turned by itself.
+"""Speed against accuracy: each setting of the config's `study.tradeoff` turned by itself, and presets scene by scene.
 
-In: what each experiment left, and its jobs' benchmarks. Out: study/results/tradeoff/{tradeoff,pareto}.csv, {pareto,knobs}.png;
-study/docs/data/tradeoff.csv, where runs add up; study/docs/results/tradeoff.md. Seconds differ from machine to machine:
-one that is otherwise idle is to run all of it. `snakemake tradeoff`.
+In: what each experiment left, and its jobs' benchmarks. Out: study/results/tradeoff/{tradeoff,pareto}.csv; study/docs/data/tradeoff.csv,
+where runs add up; study/docs/figures/tradeoff_{pareto,knobs}.png; study/docs/results/tradeoff.md; of `study.preset_costs`
+study/docs/data/preset_costs.csv and study/docs/results/presets.md. Seconds differ from machine to machine: one that is otherwise idle
+is to run all of it. `snakemake tradeoff`, `snakemake preset_costs`.
 """
 
 
@@ -23,8 +24,6 @@ rule evaluate_at:
         metrics="<results>/<round>/metrics_{size}.json",
     log:
         "<logs>/<round>/evaluate_at_{size}.log",
-    benchmark:
-        "<benchmarks>/<round>/evaluate_at_{size}.tsv"
     wildcard_constraints:
         t=POSITIVE,
     threads: 2
@@ -39,67 +38,57 @@ rule evaluate_at:
         "../../scripts/evaluate_field.py"
 
 
-rule gather_tradeoff:
-    """What every setting costs, what it is worth, and which of them nothing else beats."""
+rule compare_settings:
+    """What every setting costs, what it is worth, and which of them nothing else beats: tables, figures and the page."""
     input:
         measured=lambda wildcards: files_of(tradeoff_experiments()),
+        template=str(HERE / "report/tradeoff.md"),
     output:
         table="study/results/tradeoff/tradeoff.csv",
         pareto="study/results/tradeoff/pareto.csv",
         kept=update("study/docs/data/tradeoff.csv"),
+        fronts="study/docs/figures/tradeoff_pareto.png",
+        knobs="study/docs/figures/tradeoff_knobs.png",
+        page="study/docs/results/tradeoff.md",
     log:
-        "<logs>/tradeoff/gather_tradeoff.log",
-    benchmark:
-        "<benchmarks>/tradeoff/gather_tradeoff.tsv"
+        "<logs>/tradeoff/compare_settings.log",
     params:
         cells=lambda wildcards: tradeoff_experiments(),
-        source=code_of_study("gather_tradeoff"),
+        source=code_of_study("compare_settings"),
     script:
-        "../scripts/gather_tradeoff.py"
-
-
-rule plot_tradeoff:
-    """Draw what settings are worth over their time: all of them with their front, and knob by knob."""
-    input:
-        table=rules.gather_tradeoff.output.table,
-        pareto=rules.gather_tradeoff.output.pareto,
-    output:
-        pareto=report("study/results/tradeoff/pareto.png", caption="../report/tradeoff.rst", category="Trade-off"),
-        knobs=report("study/results/tradeoff/knobs.png", caption="../report/tradeoff.rst", category="Trade-off"),
-    log:
-        "<logs>/tradeoff/plot_tradeoff.log",
-    benchmark:
-        "<benchmarks>/tradeoff/plot_tradeoff.tsv"
-    params:
-        source=code_of_study("plot_tradeoff"),
-    script:
-        "../scripts/plot_tradeoff.py"
-
-
-rule write_tradeoff:
-    """Which settings are worth their time, in words."""
-    input:
-        table=rules.gather_tradeoff.output.table,
-        pareto=rules.gather_tradeoff.output.pareto,
-        figures=rules.plot_tradeoff.output,
-    output:
-        page="study/docs/results/tradeoff.md",
-        figures=expand("study/docs/figures/tradeoff_{shown}.png", shown=["pareto", "knobs"]),
-    log:
-        "<logs>/tradeoff/write_tradeoff.log",
-    benchmark:
-        "<benchmarks>/tradeoff/write_tradeoff.tsv"
-    params:
-        source=code_of_study("write_tradeoff"),
-    script:
-        "../scripts/write_tradeoff.py"
+        "../scripts/compare_settings.py"
 
 
 rule tradeoff:
     """Speed against accuracy: tables, figures and pages."""
     input:
-        rules.write_tradeoff.output,
+        rules.compare_settings.output,
+
+
+rule gather_preset_costs:
+    """A row for each scene and preset, and the page."""
+    input:
+        measured=lambda wildcards: files_of(preset_experiments()),
+        template=str(HERE / "report/presets.md"),
+    output:
+        table="study/docs/data/preset_costs.csv",
+        page="study/docs/results/presets.md",
+    log:
+        "<logs>/tables/gather_preset_costs.log",
+    params:
+        cells=lambda wildcards: preset_experiments(),
+        size=lambda wildcards: STUDY["preset_costs"]["size"],
+        source=code_of_study("gather_presets"),
+    script:
+        "../scripts/gather_presets.py"
+
+
+rule preset_costs:
+    """What presets cost and are worth: table and page."""
+    input:
+        rules.gather_preset_costs.output,
 
 
 localrules:
     tradeoff,
+    preset_costs,

@@ -4,7 +4,7 @@ from dav_gswt import csv_tables
 from dav_gswt.files import write_json
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import record_provenance
-from dav_gswt_study.forced_choice import answers, plots, results
+from dav_gswt_study.forced_choice import answers, results
 
 with logging_to(snakemake.log[0]):
     paths, out = snakemake.input, snakemake.output
@@ -12,6 +12,6 @@ with logging_to(snakemake.log[0]):
     people = answers.read_answers(files, key, paths.schema)
     rows = results.tabulate_choices(key, people.participants)
     csv_tables.write_table(out.table, rows)
-    plots.write_choice_plot(out.plot, rows)
+    results.write_choice_plot(out.plot, rows)
     origin = record_provenance({"key": paths.key, "answers": files}, {"study": key["study"]})
     write_json(out.facts, people.facts | {"provenance": origin})

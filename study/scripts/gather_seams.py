@@ -1,22 +1,30 @@
-"""Rule gather_seams: crops of all experiments in one table, its summaries, and a figure."""
+"""Rule gather_seams: crops of all experiments in one table, its summaries, and the page with its pictures."""
+
+from pathlib import Path
 
 from dav_gswt import csv_tables
+from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
-from dav_gswt_study.seams import plots, summary, tables
+from dav_gswt_study.markdown import write_page
+from dav_gswt_study.seams import report, summary
 
 with logging_to(snakemake.log[0]):
-    out, cells, study = snakemake.output, snakemake.params.cells, snakemake.params.study
-    rows = [row for cell in cells for row in tables.tabulate_crops(cell)]
+    out, params, cells, study = snakemake.output, snakemake.params, snakemake.params.cells, snakemake.params.study
+    rows = [row for cell in cells for row in summary.tabulate_crops(cell)]
     csv_tables.write_table(out.crops, rows)
     compared = [
         row for row in rows if row["variant"] in study["tilings"] and row["replicate"] < study["compared_replicates"]
     ]
-    found = {
-        out.summary: summary.summarise_crops(rows),
-        out.ablation: summary.compare_variants(compared, study["baseline"]),
-        out.repetition: [row for cell in cells if "repeats" in cell for row in tables.tabulate_repetition(cell)],
-    }
-    for (path, new), kept, key in zip(found.items(), out.kept, tables.KEYS, strict=True):
-        csv_tables.write_table(path, new)
+    ablation = summary.compare_variants(compared, study["baseline"])
+    repetition = [row for cell in cells if "repeats" in cell for row in summary.tabulate_repetition(cell)]
+    found = (summary.summarise_crops(rows), ablation, repetition)
+    for new, kept, key in zip(found, out.kept, summary.KEYS, strict=True):
         csv_tables.update_table(kept, new, key)
-    plots.write_ablation(out.plot, found[out.ablation], study["baseline"])
+    report.write_ablation(out.plot, ablation, study["baseline"])
+    figures.save_figure(figures.draw_sheet(params.pictures, list(report.SHOT_CAPTIONS.values())), out.sheet)
+    pictures = {
+        f"../figures/{Path(out.plot).name}": "Every variant minus the baseline, in three measures",
+        f"../figures/{Path(out.sheet).name}": "Twenty by twenty tiles from above, and at walker height",
+    }
+    tables = tuple(summary.read_seam_table(path) for path in out.kept)
+    write_page(out.page, report.format_seam_page(snakemake.input.template, tables, params.own, pictures))

@@ -4,14 +4,13 @@ from dav_gswt import csv_tables
 from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
 from dav_gswt.tiles import store
-from dav_gswt_study.seams import exemplar, plots, repetition
+from dav_gswt_study.seams import placed_tiles, repetition
 
 with logging_to(snakemake.log[0]):
-    paths, out, params = snakemake.input, snakemake.output, snakemake.params
-    maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(paths.levels))
+    paths, params = snakemake.input, snakemake.params
+    maps = placed_tiles.ExemplarMaps.from_levels(levels.read_levels(paths.levels))
     tiles = store.read_tiles(paths.tiles, paths.seams)
     source = maps.detrend(tiles, params.tiling)
     fields = [level.field for level in source.levels]
     measured = repetition.measure_repetition(tiles, fields, source.exemplar.cells * tiles.spacing, params.seed)
-    csv_tables.write_table(out.table, repetition.tabulate_repetition(measured))
-    plots.write_autocorrelations(out.plot, measured)
+    csv_tables.write_table(snakemake.output.table, repetition.tabulate_repetition(measured))

@@ -7,13 +7,13 @@ from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.reconstruction import ground
-from dav_gswt_study.tables import estimators
+from dav_gswt_study.seams import summary
 from dav_gswt_study.views import evolution
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
     key, columns = evolution.psnr_key(read_scene_frame(paths.frame)), []
-    notes = [estimators.format_seam_note(crops) for crops in paths.get("crops", [])] or [""] * len(paths.fields)
+    notes = [summary.format_seam_note(crops) for crops in paths.get("crops", [])] or [""] * len(paths.fields)
     for title, note, *files in zip(params.titles, notes, paths.fields, paths.grounds, paths.metrics, strict=True):
         fitted, surface, measured = files
         read = read_field(fitted), ground.read_ground(surface), read_json(measured)

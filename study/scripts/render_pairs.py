@@ -5,12 +5,12 @@ from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import record_provenance
 from dav_gswt.tiles import store as tiles
-from dav_gswt_study.forced_choice import pairs, store
-from dav_gswt_study.seams import exemplar, placed_tiles
+from dav_gswt_study.forced_choice import kit, pairs
+from dav_gswt_study.seams import placed_tiles
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
-    maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(paths.levels))
+    maps = placed_tiles.ExemplarMaps.from_levels(levels.read_levels(paths.levels))
     sets = {}
     for name, *files in zip(params.tilings, paths.tiles, paths.seams, strict=True):
         cut = tiles.read_tiles(*files)
@@ -18,6 +18,4 @@ with logging_to(snakemake.log[0]):
     alexnet = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
     inputs = {"seams": list(paths.seams)} | ({"lpips": paths.lpips} if alexnet else {})
     asked = dict(params.study)
-    store.write_pairs(
-        snakemake.output.pairs, pairs.sample_pairs(sets, asked, alexnet), record_provenance(inputs, asked)
-    )
+    kit.write_pairs(snakemake.output.pairs, pairs.sample_pairs(sets, asked, alexnet), record_provenance(inputs, asked))

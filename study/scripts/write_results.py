@@ -6,6 +6,7 @@ from dav_gswt import csv_tables
 from dav_gswt.files import copy_file
 from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
+from dav_gswt_study.markdown import render_template, write_page
 from dav_gswt_study.tables import results
 
 with logging_to(snakemake.log[0]):
@@ -13,6 +14,6 @@ with logging_to(snakemake.log[0]):
     for source, target in zip(paths.figures, out.figures, strict=True):
         figures.copy_figure(source, target)
     copy_file(paths.lod, out.lod)
+    tables = {name: csv_tables.read_table(paths[name]) for name in ("timing", "lod", "sensitivity", "ablation")}
     shown = {about: f"../figures/{Path(path).name}" for about, path in zip(params.shown, out.figures, strict=True)}
-    names = ("timing", "lod", "sensitivity", "ablation")
-    results.write_results(out.page, {name: csv_tables.read_table(paths[name]) for name in names}, shown)
+    write_page(out.page, render_template(paths.template, results.describe_results(tables) | {"figures": shown}))

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.images import image_files
-from dav_gswt_study.forced_choice import kit, trials
+from dav_gswt_study.forced_choice import kit
+from dav_gswt_study.forced_choice.kit import StoredPair
 from dav_gswt_study.forced_choice.pairs import CHECK, PLAIN
-from dav_gswt_study.forced_choice.store import StoredPair
 
 PARTS = Path(__file__).parents[1] / "forced_choice"
 SCHEMA = Path(__file__).parents[1] / "answers.schema.json"
@@ -36,7 +36,7 @@ def _png(rng: np.random.Generator) -> bytes:
         return path.read_bytes()
 
 
-def written(folder: Path, some: list[StoredPair] | None = None, seconds=trials.SECONDS) -> tuple[Path, Path]:
+def written(folder: Path, some: list[StoredPair] | None = None, seconds=kit.SECONDS) -> tuple[Path, Path]:
     """A kit in a folder: its page and its key."""
     page, key = folder / "page", folder / "key.json"
     kit.write_kit(page, key, PARTS, some or drawn(), 0, seconds)
@@ -46,7 +46,7 @@ def written(folder: Path, some: list[StoredPair] | None = None, seconds=trials.S
 def answers(key: dict, number: int, first, upto: int | None = None) -> dict:
     """What the page saves of somebody who answers by a rule. first: of a pair, whether its first crop is chosen."""
     told = []
-    for name, left, right in key["lists"][number % trials.LISTS][:upto]:
+    for name, left, right in key["lists"][number % kit.LISTS][:upto]:
         item = key["items"][name]
         chosen = item["pictures"][0 if first(item) else 1]
         choice = "left" if chosen == left else "right"
@@ -55,4 +55,4 @@ def answers(key: dict, number: int, first, upto: int | None = None) -> dict:
         )
     screen = {"width": 1920, "height": 1080, "pixel_ratio": 1, "picture": 512}
     about = {"format": "davgswt-2afc", "version": 1, "study": key["study"], "participant": f"{number:032x}"}
-    return about | {"list": number % trials.LISTS, "consent": True, "screen": screen, "answers": told}
+    return about | {"list": number % kit.LISTS, "consent": True, "screen": screen, "answers": told}

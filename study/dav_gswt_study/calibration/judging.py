@@ -1,4 +1,4 @@
-"""Collects scores of candidates and the true error there, and compares them with `measures`."""
+"""Collects scores of candidates and the true error there, and compares them with `agreement`."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +14,8 @@ from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import image_files, metrics
 from dav_gswt.photos.training_views import WHOLE, TrainingView, read_training_views
 from dav_gswt.photos.view_split import ViewSplit
+from dav_gswt.prior.interface import Condition
+from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground, read_ground
 from dav_gswt.views.candidates import Candidates
@@ -22,8 +24,8 @@ from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import PHOTO_WIDTH, build_conditions, ground_mask, scoring_camera
 from dav_gswt.views.terms import weighted_mean
-from dav_gswt.views.uncertainty import combine_terms
-from dav_gswt_study.calibration import controls, measures
+from dav_gswt.views.uncertainty import combine_terms, w2_sq
+from dav_gswt_study.calibration import agreement
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ def calibrate_scores(
     """Compare scores with true errors. Returns the content of calibration.json, and a row per candidate.
 
     some, views: candidates and their true pictures. scored: scores and maps. lam: weight of LPIPS in u. prior: also for
-    the estimates of `controls`.
+    the estimates of `control_maps`.
     """
     row = {name: i for i, name in enumerate(scored[0].names)}
     terms, shown = _select_terms(*scored, [row[pose.name] for pose, _ in some], lam)
@@ -66,7 +68,7 @@ def calibrate_scores(
     if prior is not None and some:
         given = judged.field, judged.grid, some, judged.taken, judged.frame
         condition, masks = build_conditions(*given, prior.model.size)
-        others = controls.control_maps(prior, condition)
+        others = control_maps(prior, condition)
         shown |= others
         terms |= {name: weighted_mean(m, masks) for name, m in others.items()}
     corrected = judged.frame.kind == "photos"  # photos differ in exposure
@@ -75,7 +77,7 @@ def calibrate_scores(
         {"pose": pose.name, "error": error[i]} | {name: values[i] for name, values in terms.items()}
         for i, (pose, _) in enumerate(some)
     ]
-    return measures.summarise(terms, shown, error, error_maps, seed), table
+    return agreement.summarise(terms, shown, error, error_maps, seed), table
 
 
 def choose_candidates(
@@ -154,3 +156,16 @@ def _render_at_size(field: GaussianField, camera: Camera, size: int) -> Float32[
     large = camera.resized(round(width * share), round(height * share))
     seen = np.clip(render(field, large).colour, 0, 1).astype(np.float32)
     return image_files.shrink_image(seen, width, height)
+
+
+def control_maps(prior: PriorConfig, condition: Condition) -> dict[str, Float32[Array, "n h w"]]:
+    """Other uncertainty estimates of the project's own prior, as controls: a map a view, in cells of the latents.
+
+    `spread`: how far samples from other noises lie apart, without dropout. `residual`: how far their mean lies from
+    what the field shows.
+    """
+    if not isinstance(prior.model, TerrainPrior):
+        return {}
+    render = prior.model.encode_render(condition)
+    drawn = prior.model.sample(condition, prior.samples, 0.0, prior.steps, prior.seed, common=False)
+    return {"spread": w2_sq(drawn)[1], "residual": ((drawn.mean(1) - render) ** 2).sum(1)}

@@ -17,8 +17,7 @@ def read_cell(cell: dict) -> list[dict]:
     """The rows of a cell, the start first.
 
     cell: what CELL names; `corrected`: PSNR after the photos' exposure is fitted; files: `metrics` of each round, the
-    start's first; `facts`, scores.json of what rounds 1 to T chose by; `times`, for each of these rounds its jobs'
-    benchmarks; `samples` that the prior draws of a pose, in `steps` each (0 without a prior).
+    start's first; `times`, for each later round its jobs' benchmarks.
     """
     found = []
     for t, path in enumerate(cell["metrics"]):
@@ -28,7 +27,6 @@ def read_cell(cell: dict) -> list[dict]:
         row |= {
             "seconds": sum_or_none(run and run[0] for run in map(read_benchmark, cell["times"][t - 1])) if t else 0.0
         }
-        row |= {"evaluations": _count_evaluations(cell["facts"][t - 1], cell["samples"], cell["steps"]) if t else 0}
         provenance = metrics["provenance"]
         found.append(row | describe_origin(provenance) | {"field": provenance["inputs"]["field"][:12]})
     return found
@@ -36,10 +34,5 @@ def read_cell(cell: dict) -> list[dict]:
 
 def read_curves(path: Path | str) -> list[dict]:
     """Read the table of curves."""
-    integers = ("seed", "k", "round", "photos", "evaluations")
+    integers = ("seed", "k", "round", "photos")
     return csv_tables.read_table(path, numbers=(*MEASURES, "seconds"), integers=integers)
-
-
-def _count_evaluations(facts: str, samples: int, steps: int) -> int:
-    """Forward passes of the prior's network, for one pose each."""
-    return samples * steps * read_json(facts)["candidates"]

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.sweeps import sum_or_none
 from dav_gswt_study.comparison.curves import CELL
-from dav_gswt_study.comparison.stats import nauc, photos_to_reach
 from dav_gswt_study.statistics import adjust_holm, bootstrap_paired
 
 EVERYTHING = "all"  # the policy that takes the whole pool: what there is to reach, and no curve
@@ -17,9 +17,9 @@ JUDGED = {"psnr": 1, "worst_psnr": 1, "walker_psnr": 1, "lpips": -1}  # measures
 
 
 def summarise_cells(curves: list[dict]) -> list[dict]:
-    """A row a cell: nAUC, PSNR and the other measures of its last round, photos to reach WAY of all, cost.
+    """A row a cell: nAUC, PSNR and the other measures of its last round, seconds.
 
-    gap: dB under all photos; empty, as `to_reach`, where all were not tried or were not reached.
+    gap: dB under all photos; empty where all were not tried.
     """
     best = {unit[:3]: rounds[-1]["psnr"] for unit, policy, rounds in _group_cells(curves) if policy[0] == EVERYTHING}
     table = []
@@ -28,14 +28,11 @@ def summarise_cells(curves: list[dict]) -> list[dict]:
             continue
         photos, psnr = (np.array([row[key] for row in rounds], float) for key in ("photos", "psnr"))
         goal, last = best.get(unit[:3]), rounds[-1]
-        row = {key: last[key] for key in CELL} | {"photos": last["photos"], "nauc": nauc(photos, psnr)}
+        row = {key: last[key] for key in CELL} | {"photos": last["photos"], "nauc": compute_nauc(photos, psnr)}
         row |= {key: last[key] for key in ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")}
         row |= {f"nauc_{key}": _area(photos, rounds, key) for key in JUDGED if key != "psnr"}
         row |= {"gap": None if goal is None else goal - last["psnr"]}
-        row |= {"to_reach": None if goal is None else photos_to_reach(photos, psnr, goal)}
-        seconds = [r["seconds"] for r in rounds[1:]]
-        row |= {"seconds": None if None in seconds else sum(seconds)}
-        table.append(row | {"evaluations": sum(r["evaluations"] for r in rounds)})
+        table.append(row | {"seconds": sum_or_none(r["seconds"] for r in rounds[1:])})
     return table
 
 
@@ -94,7 +91,20 @@ def _compare_cells(cells: dict[tuple, float], baseline: str) -> list[dict]:
 def _area(photos: Float[Array, "t"], rounds: list[dict], measure: str) -> float | None:
     """The nAUC of a measure; None where a round lacks it."""
     values = [row[measure] for row in rounds]
-    return None if None in values else nauc(photos, np.array(values, float))
+    return None if None in values else compute_nauc(photos, np.array(values, float))
+
+
+def compute_nauc(photos: Float[Array, "t"], psnr: Float[Array, "t"]) -> float:
+    """Normalised area under PSNR against photos: its mean over the budget, by the trapezoidal rule, in dB.
+
+    photos: rising, from the start to the budget. Raises: ValueError: fewer than two rounds, photos that do not rise, a
+    value that is not finite. Source: nAUC = trapezoid(PSNR, n_0..B) / (B - n_0).
+    """
+    if len(photos) < 2:
+        raise ValueError(f"a curve needs at least two rounds, not {len(photos)}")
+    if not (np.diff(photos) > 0).all() or not np.isfinite(psnr).all():
+        raise ValueError("a curve's photos must rise from round to round, and its values be finite")
+    return float(np.trapezoid(psnr, photos) / (photos[-1] - photos[0]))
 
 
 def _comparison_row(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tuple, float]) -> dict:

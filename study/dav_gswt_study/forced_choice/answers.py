@@ -10,7 +10,7 @@ from jsonschema.exceptions import best_match
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
-from dav_gswt_study.forced_choice.trials import FORMAT, VERSION, Trial
+from dav_gswt_study.forced_choice.kit import FORMAT, VERSION, Trial
 
 MAX_BYTES = 1 << 22  # of a file of answers; one of 10000 answers has less
 MAX_FILES = 10000

@@ -12,7 +12,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt_study.seams import rendering
 from dav_gswt_study.seams.placed_tiles import PlacedTiles
-from dav_gswt_study.seams.spatial_index import Footprint
+from dav_gswt_study.seams.rendering import Footprint
 
 SIDE = 48  # pixels of a crop
 MAX_PATCHES = 3  # patches of a crop that are distinguished

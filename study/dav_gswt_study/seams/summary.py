@@ -1,19 +1,58 @@
-"""Summaries of crops: differences with 95 % intervals from a bootstrap over clusters.
+"""Tables of seams: crops of all experiments, and their differences with 95 % intervals from a bootstrap over clusters.
 
 Crops of the same place of the same strip, or of the same tile, are one cluster: a set has four strips, however often
 they occur in the terrain. All views of a place belong to its cluster.
 """
 
+from pathlib import Path
+
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt import csv_tables
+from dav_gswt.files import read_json
 from dav_gswt_study import statistics
 
 EVERY = "every"
 CELL = ("scene", "seed", "preset", "variant")
 PLACES = ("border", "cut", "ceiling")
 MEASURES = ("seam_lpips", "psnr", "jump")
+KEYS = (
+    (*CELL, "view", "ground"),
+    ("variant", "baseline", "measure", "scene", "seed"),
+    (*CELL, "east", "north"),
+)  # keys of the tables seam_summary, seam_ablation and repetition
+NUMBERS = ("seam_lpips", "psnr", "jump")
+
+
+def tabulate_crops(cell: dict) -> list[dict]:
+    """The crops of an experiment. cell: the values of CELL, `replicate`, and its files `table` and `facts`.
+
+    Crops and clusters of different replicates of the tiles differ: the replicate is part of their names.
+    """
+    made = read_json(cell["facts"])["provenance"]
+    origin = {
+        "version": made["version"],
+        "weights": made["inputs"].get("lpips", "")[:12],
+        "tiles": made["inputs"]["seams"][:12],
+    }
+    about, number = {key: cell[key] for key in (*CELL, "replicate")}, cell["replicate"]
+    return [
+        about | row | {key: f"{number}:{row[key]}" if number else row[key] for key in ("crop", "cluster")} | origin
+        for row in read_seam_table(cell["table"])
+    ]
+
+
+def read_seam_table(path: Path | str) -> list[dict]:
+    """Read a table of seams, measures as numbers; no rows where there is no file yet."""
+    rows = csv_tables.read_table(path, numbers=NUMBERS, missing_ok=True)
+    return [row | {key: int(row[key]) for key in ("seed", "crop") if row.get(key, "").isdigit()} for row in rows]
+
+
+def tabulate_repetition(cell: dict) -> list[dict]:
+    """The rows of an experiment's autocorrelation."""
+    return [{key: cell[key] for key in CELL} | row for row in read_seam_table(cell["repeats"])]
 
 
 def summarise_crops(rows: list[dict]) -> list[dict]:
@@ -35,7 +74,7 @@ def summarise_crops(rows: list[dict]) -> list[dict]:
 
 
 def _summarise(rows: list[dict]) -> dict:
-    at = {(row["place"], row["view"], row["ground"], row["crop"]): row for row in rows}
+    at = _index_crops(rows)
     sums = {place: subtract_floors(at, place) for place in PLACES}
     out = {}
     for place in ("border", "cut"):
@@ -94,8 +133,7 @@ def compare_variants(rows: list[dict], baseline: str) -> list[dict]:
 
 def _sum_variant(rows: list[dict], measure: str) -> statistics.ClusterSums:
     if measure == "seam_lpips":
-        at = {(row["place"], row["view"], row["ground"], row["crop"]): row for row in rows}
-        return subtract_floors(at, "cut")
+        return subtract_floors(_index_crops(rows), "cut")
     return statistics.sum_by_cluster((row["cluster"], [row[measure]]) for row in rows if row["place"] == "cut")
 
 
@@ -111,3 +149,19 @@ def _group_rows(rows: list[dict], keys: tuple[str, ...]) -> dict[tuple, list[dic
     for row in rows:
         out.setdefault(tuple(row[key] for key in keys), []).append(row)
     return out
+
+
+def format_seam_note(crops: Path | str) -> str:
+    """The note under a picture of the figure of estimators: Seam-LPIPS of the cuts over their floor, over all views.
+
+    Empty without LPIPS. crops: path of crops.csv.
+    """
+    sums = subtract_floors(_index_crops(read_seam_table(crops)), "cut")
+    if not sums:
+        return ""
+    value, _, _ = statistics.percentile_interval(statistics.bootstrap_clusters(sums)[0][:, 0])
+    return f"\nSeam-LPIPS {value:+.3f}"
+
+
+def _index_crops(rows: list[dict]) -> dict[tuple, dict]:
+    return {(row["place"], row["view"], row["ground"], row["crop"]): row for row in rows}

@@ -1,12 +1,8 @@
-"""The page study/docs/results/results.md: a study's tables and figures. Numbers come from tables or the paper."""
-
-from pathlib import Path
+"""Tables of the page study/docs/results/results.md. Numbers come from tables or the paper."""
 
 import numpy as np
 
-from dav_gswt.files import atomic_file
 from dav_gswt_study.markdown import format_table
-from dav_gswt_study.statistics import two_sided_p
 from dav_gswt_study.tables import paper
 
 UNKNOWN = ""
@@ -40,52 +36,29 @@ ABLATION = {
 TESTED = {"PSNR (dB)": ("psnr", 2), "Seam-LPIPS": ("seam_lpips", 4)}
 
 
-def write_results(path: Path | str, tables: dict[str, list[dict]], figures: dict[str, str]) -> None:
-    """The page of `text`, as a file."""
-    with atomic_file(path) as part:
-        part.write_text(format_results(tables, figures), encoding="utf-8")
-
-
-def format_results(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
-    """tables: rows of timing, lod, sensitivity and ablation. figures: paths from the page, by what they show."""
-    parts = [
-        "# Results",
-        "Made by `snakemake study/docs/results/results.md` from "
-        "`study/docs/data/{timing,lod,sensitivity,ablation}.csv`; do not edit. "
-        "± is a standard deviation over seeds; PSNR of photos is colour-corrected, of synthetic scenes raw. Columns "
-        "“paper” repeat what is printed there, of other scenes, photos and machines: they stand beside ours for "
-        "orientation, not for comparison.",
-        "## Timing",
-        format_table(["scene", *_heads(TIMING)], [[row["scene"], *_cells(row, TIMING)] for row in tables["timing"]]),
-        "Seconds and minutes hold for the machine and for what ran beside the jobs. "
-        "Reconstruction is scoring, choosing and fitting, without the taking of photos; render, sort and update are "
-        "the page's in a headless browser, which without a graphics card draws in software "
-        "(`study/docs/data/frames.csv`; "
-        "empty unless `study.tables.viewer` asks for them). "
-        "The paper's percentages are left out: it does not say of what they are.",
-        "## Levels of detail",
-        format_table(*_levels(tables["lod"])),
-        "## Sensitivity",
-        format_table(
-            ["setting", "value", "paper's value", *_heads(SENSITIVITY)],
-            [[r["setting"], _bold(r), r["paper_value"], *_cells(r, SENSITIVITY)] for r in tables["sensitivity"]],
-        ),
-        "In bold the value that is not varied elsewhere. Seam-LPIPS is of one tile set a scene, and differs by some "
-        "thousandths from one set to the next: `study/docs/results/seams.md` has more sets and intervals.",
-        "## Ablation",
-        format_table(
-            ["sweep", "variant", *_heads(ABLATION)],
-            [[row["sweep"], f"`{row['variant']}`", *_cells(row, ABLATION)] for row in tables["ablation"]],
-        ),
-        "Seam density is the share of cuts that run through the strongest quarter of the ground's gradients.",
-        "Differences from the baseline, paired by scene and seed: mean, 95 % bootstrap interval, t (degrees of "
-        "freedom), p, and p raised for how many variants were compared (Holm).",
-        format_table(*_tested(tables["ablation"])),
-        _slips(),
-        "## Figures",
-        *(f"![{shown}]({path})\n\n{shown}" for shown, path in figures.items()),
+def describe_results(tables: dict[str, list[dict]]) -> dict[str, str]:
+    """Tables of the page. tables: rows of timing, lod, sensitivity and ablation, as text."""
+    varied = [
+        [row["setting"], f"**{row['value']}**" if row["default"] == "True" else row["value"], row["paper_value"]]
+        for row in tables["sensitivity"]
     ]
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    return {
+        "timing": _format_rows(["scene"], [[row["scene"]] for row in tables["timing"]], tables["timing"], TIMING),
+        "levels": format_table(*_levels(tables["lod"])),
+        "sensitivity": _format_rows(["setting", "value", "paper's value"], varied, tables["sensitivity"], SENSITIVITY),
+        "ablation": _format_rows(
+            ["sweep", "variant"],
+            [[row["sweep"], f"`{row['variant']}`"] for row in tables["ablation"]],
+            tables["ablation"],
+            ABLATION,
+        ),
+        "tested": format_table(*_tested(tables["ablation"])),
+    }
+
+
+def _format_rows(names: list[str], named: list[list[str]], rows: list[dict], columns: dict) -> str:
+    cells = [[*about, *_cells(row, columns)] for about, row in zip(named, rows, strict=True)]
+    return format_table([*names, *_heads(columns)], cells)
 
 
 def _heads(columns: dict) -> list[str]:
@@ -104,10 +77,6 @@ def _spread(value: str | None, deviation: str | None, digits: int) -> str:
     if not value:
         return UNKNOWN
     return f"{float(value):.{digits}f}" + (f" ± {float(deviation):.{digits}f}" if deviation else "")
-
-
-def _bold(row: dict) -> str:
-    return f"**{row['value']}**" if row["default"] == "True" else row["value"]
 
 
 def _levels(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
@@ -145,18 +114,3 @@ def _test(row: dict, key: str, digits: int) -> list[str]:
     printed = row["paper_p"] or UNKNOWN
     about = [row[f"{key}_units"], format_value("difference", number), interval, t]
     return [*about, format_value("p", "{:.3f}"), format_value("holm", "{:.3f}"), printed if key == "psnr" else UNKNOWN]
-
-
-def _slips() -> str:
-    """What the paper's text says and its numbers do not."""
-    printed = paper.read_paper()
-    t, df = (paper.parse_number(printed["ablation", "caption", key]) for key in ("t", "df"))
-    start, k, rounds, views = (
-        paper.parse_number(printed["protocol", "views", key]) for key in ("start", "k", "rounds", "all")
-    )
-    taken = start + k * rounds
-    return (
-        f"Not copied from the paper: its t = {t:g} with {df:.0f} degrees of freedom is p = "
-        f"{two_sided_p(t, int(df)):.3f}, not p < 0.01; {taken:.0f} of {views:.0f} views are "
-        f"{views / taken:.1f} times fewer, not ten."
-    )

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-import numpy as np
+import pandas as pd
 
 from dav_gswt import csv_tables
-from dav_gswt_study.sweeps import tables as sweep
+from dav_gswt_study import sweeps
 
 VIEWER = (
     *("render_ms", "render_ms_sd", "sort_ms", "sort_ms_sd", "sort_share"),
@@ -14,43 +14,25 @@ VIEWER = (
 CELL = ("scene", "seed", "preset", "tiling", "tau")  # key of the viewer's measurements
 
 
-def compute_mean(rows: list[dict], key: str) -> float | None:
-    """Mean over scenes of the means over their seeds: scenes with more seeds do not count more."""
-    by_scene: dict[str, list[float]] = {}
-    for row in rows:
-        if row.get(key) is not None:
-            by_scene.setdefault(row["scene"], []).append(row[key])
-    return float(np.mean([np.mean(values) for values in by_scene.values()])) if by_scene else None
-
-
-def compute_deviation(rows: list[dict], key: str) -> float | None:
-    """The standard deviation (ddof 1) over seeds of the mean over scenes, as the paper's; None of fewer than two seeds
-    that all scenes have."""
-    scenes = {row["scene"] for row in rows if row.get(key) is not None}
-    by_seed: dict[str, dict[str, float]] = {}
-    for row in rows:
-        if row.get(key) is not None:
-            by_seed.setdefault(str(row["seed"]), {})[row["scene"]] = row[key]
-    whole = [np.mean(list(values.values())) for values in by_seed.values() if set(values) == scenes]
-    return float(np.std(whole, ddof=1)) if len(whole) > 1 else None
-
-
 def mean_and_deviation(rows: list[dict], key: str) -> dict[str, float | None]:
-    """`mean` under the key, `deviation` under key_sd."""
-    return {key: compute_mean(rows, key), f"{key}_sd": compute_deviation(rows, key)}
+    """The mean under the key, and under key_sd the standard deviation over seeds, as the paper's.
+
+    The mean is over scenes of the means over their seeds: scenes with more seeds do not count more. The deviation is of
+    the means over scenes; None of fewer than two seeds that all scenes have.
+    """
+    known = [(row["scene"], str(row["seed"]), row[key]) for row in rows if row.get(key) is not None]
+    if not known:
+        return {key: None, f"{key}_sd": None}
+    table = pd.DataFrame(known, columns=["scene", "seed", key]).pivot_table(key, "seed", "scene")
+    whole = table.dropna().mean(axis=1)
+    return {key: float(table.mean().mean()), f"{key}_sd": float(whole.std()) if len(whole) > 1 else None}
 
 
-def join_viewer(rows: list[dict], viewer: list[dict]) -> list[dict]:
-    """The rows with what the viewer measured of their bundle, None where nothing. viewer: see `read_viewer`."""
-    at = {tuple(str(row[key]) for key in CELL): row for row in viewer}
-    found = [at.get(tuple(str(row[key]) for key in CELL), {}) for row in rows]
-    return [row | {key: seen.get(key) for key in VIEWER} for row, seen in zip(rows, found, strict=True)]
-
-
-def read_sweeps(paths: list[Path | str], viewer: Path | str | None) -> list[list[dict]]:
-    """The rows of each sweep's table, with what the viewer measured of their bundles."""
-    measured = read_viewer(viewer)
-    return [join_viewer(sweep.read_sweep(path), measured) for path in paths]
+def read_sweep(path: Path | str, viewer: Path | str | None) -> list[dict]:
+    """The rows of a sweep's table, with what the viewer measured of their bundle: VIEWER, None where nothing."""
+    at = {tuple(str(row[key]) for key in CELL): {key: row[key] for key in VIEWER} for row in read_viewer(viewer)}
+    rows = sweeps.read_sweep(path)
+    return [row | at.get(tuple(str(row[key]) for key in CELL), dict.fromkeys(VIEWER)) for row in rows]
 
 
 def read_viewer(path: Path | str | None) -> list[dict]:

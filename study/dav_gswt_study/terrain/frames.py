@@ -21,7 +21,7 @@ from dav_gswt.terrain import endless, heights, stills, visibility
 from dav_gswt.terrain.page import write_page
 from dav_gswt.terrain.stills import FrameTiming, Shot
 from dav_gswt_study.tables import spread
-from dav_gswt_study.terrain.flicker import walk_shots
+from dav_gswt_study.terrain.walk import walk_shots
 
 PARTS = ("render", "sort", "update")
 LIBRARY, PAGE = "library", "page"

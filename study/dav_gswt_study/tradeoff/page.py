@@ -1,7 +1,7 @@
 """study/docs/results/tradeoff.md: which settings are worth their time; every number comes from the table."""
 
+from dav_gswt_study.experiments import PRESET
 from dav_gswt_study.markdown import format_number, format_table
-from dav_gswt_study.tradeoff.settings import PRESET
 from dav_gswt_study.tradeoff.tables import UNITS
 
 SAME = 0.02  # of the time: a setting that takes that much more or less is as fast
@@ -14,32 +14,18 @@ WHAT = {
 }
 
 
-def format_tradeoff(rows: list[dict], pareto: list[dict]) -> str:
-    """rows, pareto: as `tables.read_tradeoff` gives them; the base and a most accurate setting for every knob."""
-    base, first = next(row for row in rows if row["base"]), rows[0]
+def describe_tradeoff(rows: list[dict], pareto: list[dict]) -> dict:
+    """Values of the page's template.
+
+    rows, pareto: as `tables.read_tradeoff` gives them; the base and a most accurate setting for every knob.
+    """
     knobs = dict.fromkeys(row["knob"] for row in rows if row["knob"] != PRESET)
-    parts = [
-        "# Speed against accuracy",
-        "Made by `snakemake tradeoff` from `study/docs/data/tradeoff.csv`; do not edit. "
-        f"Scene `{first['scene']}`, seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}. "
-        f"Each knob is turned by itself from the base, which has the preset `{base['preset']}`, the tiling "
-        f"`{base['tiling']}` and tau {base['tau']:g}; its own settings are bold. Losses are counted from each knob's "
-        "first setting, meant as the most accurate; a loss below 0 is a gain. Seconds are those of whole jobs from the "
-        "start photos to the bundle, without the taking of photos; what settings share counts for each. Memory is the "
-        "largest that was sampled of any job: of those up to the bundle and, where stills tell the loss, of rendering "
-        "these. One scene and one seed: differences of a few hundredths of a decibel are within what another seed "
-        "changes.",
-        "## Presets",
-        format_table(*_tabulate_presets(pareto)),
-        "*Best for its time*: no other setting here is as fast and better; in PSNR, and in LPIPS, as what is ahead in "
-        "PSNR can be the less sharp picture.",
-        "\n".join(f"- {describe_preset(row)}" for row in pareto if row["knob"] == PRESET),
-        "![PSNR and LPIPS over seconds](../figures/tradeoff_pareto.png)",
-        "## Knobs",
-        *(part for knob in knobs for part in _format_knob(knob, rows)),
-        "![Every knob by itself](../figures/tradeoff_knobs.png)",
-    ]
-    return "\n\n".join(part.rstrip("\n") for part in parts if part) + "\n"
+    return {
+        "base": next(row for row in rows if row["base"]),
+        "presets": format_table(*_tabulate_presets(pareto)),
+        "verdicts": [describe_preset(row) for row in pareto if row["knob"] == PRESET],
+        "knobs": [_describe_knob(knob, rows) for knob in knobs],
+    }
 
 
 def describe_preset(row: dict) -> str:
@@ -90,7 +76,7 @@ def _tabulate_presets(pareto: list[dict]) -> tuple[list[str], list[list[str]]]:
     return head, found
 
 
-def _format_knob(knob: str, rows: list[dict]) -> list[str]:
+def _describe_knob(knob: str, rows: list[dict]) -> dict:
     mine = [row for row in rows if row["knob"] == knob]
     best, unit = next(row for row in mine if row["most"]), UNITS[mine[0]["measure"]]
     head = ["setting", "seconds", "PSNR (dB)", "LPIPS", f"loss ({unit})", "memory (MB)", "bundle (MB)"]
@@ -100,9 +86,10 @@ def _format_knob(knob: str, rows: list[dict]) -> list[str]:
         [bold[row["base"]].format(row["setting"]), *(format_number(row[key], digits) for key, digits in form.items())]
         for row in mine
     ]
-    return [
-        f"### {knob}",
-        f"Loss: {WHAT[best['measure']]}; policy `{best['policy']}`.",
-        format_table(head, shown),
-        "\n".join(f"- {describe_change(row, best)}" for row in mine if not row["most"]),
-    ]
+    return {
+        "name": knob,
+        "what": WHAT[best["measure"]],
+        "policy": best["policy"],
+        "table": format_table(head, shown),
+        "changes": [describe_change(row, best) for row in mine if not row["most"]],
+    }

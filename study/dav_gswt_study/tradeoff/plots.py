@@ -1,7 +1,7 @@
 """Figures of the trade-off: all settings with their Pareto front, and a panel for each knob."""
 
 from dav_gswt.images import figures
-from dav_gswt_study.tradeoff.settings import PRESET
+from dav_gswt_study.experiments import PRESET
 
 AXES = {
     "views": ("seconds", "PSNR of test views (dB)"),

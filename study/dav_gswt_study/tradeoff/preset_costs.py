@@ -23,13 +23,13 @@ def tabulate_presets(cells: list[dict], size: int) -> list[dict]:
     psnr: of test photos, after their exposure is fitted where they are real. fits_s, views_s, tiles_s: seconds of whole
     jobs, from the start photos to the bundle; seconds: their sum. peak_mb: the largest memory of any of these jobs.
     bundle_mb: of all chunks, in megabytes. size: of the test photos, at most.
-    cells: `scene`, `preset`, `corrected`, the paths `metrics` and `manifest`, and `times`, benchmarks by PARTS.
+    cells: `scene`, `preset`, `corrected`, `files` (metrics, manifest), and `times`, benchmarks by PARTS.
     """
     return [_tabulate_cell(cell, size) for cell in cells]
 
 
 def _tabulate_cell(cell: dict, size: int) -> dict:
-    metrics, manifest = read_json(cell["metrics"]), read_json(cell["manifest"])
+    metrics, manifest = (read_json(cell["files"][name]) for name in ("metrics", "manifest"))
     found = select_metrics(metrics, "psnr_colour_corrected" if cell["corrected"] else "psnr")
     row = {"scene": cell["scene"], "preset": cell["preset"], "photos": metrics["photos"]}
     row |= {"gaussians": metrics["gaussians"]} | {key: found[key] for key in ("psnr", "ssim", "lpips")}
@@ -42,27 +42,11 @@ def _tabulate_cell(cell: dict, size: int) -> dict:
     return row | {"size": size} | describe_origin(metrics["provenance"]) | describe_machine()
 
 
-def format_presets(rows: list[dict], size: int) -> str:
-    """The page. rows: as `tabulate_presets` has them, NUMBERS as floats. size: of the test photos, pixels."""
-    first, presets = rows[0], list(dict.fromkeys(row["preset"] for row in rows))
-    scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    parts = [
-        "# What presets cost and are worth",
-        "Made by `snakemake preset_costs` from `study/docs/data/preset_costs.csv`; do not edit. "
-        f"Version {first['version']}, renderer {first['renderer']}, on {first['cores']:.0f} cores of "
-        f"{first['processor']}. All else is as the config has it: two rounds of four photos, materials, tiles. PSNR, "
-        f"SSIM and LPIPS are of test photos of {size} pixels (of their own size where that is less), whatever size a "
-        "preset fits; real photos after their exposure is fitted. Seconds are of whole jobs, from the start photos to "
-        "the bundle: placing or rendering photos and the stills are not in them. Where another preset chooses the "
-        "photos (`choose_with`), its rounds are among them. One seed.",
-        "## All scenes",
-        "Seconds as a share of those of `standard`, the geometric mean; losses to the scene's best preset, the mean "
-        "and the largest.",
-        format_table(*_tabulate_means(rows, presets)),
-    ]
-    for scene in scenes:
-        parts += [f"## {scene}", format_table(*_tabulate_scene([row for row in rows if row["scene"] == scene]))]
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+def describe_presets(rows: list[dict]) -> dict:
+    """Values of the page's template. rows: as `tabulate_presets` has them, NUMBERS as floats."""
+    presets, scenes = ([*dict.fromkeys(row[key] for row in rows)] for key in ("preset", "scene"))
+    tables = {scene: format_table(*_tabulate_scene([row for row in rows if row["scene"] == scene])) for scene in scenes}
+    return {"first": rows[0], "means": format_table(*_tabulate_means(rows, presets)), "scenes": tables}
 
 
 def summarise_preset(rows: list[dict], preset: str) -> dict:

@@ -3,16 +3,16 @@
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray as Array
 
 from dav_gswt import csv_tables
 from dav_gswt.images import image_files
 from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.provenance import describe_machine
-from dav_gswt.sweeps import sum_or_none
+from dav_gswt.sweeps import CELL, sum_or_none
+from dav_gswt_study import sweeps
 from dav_gswt_study.statistics import subtract_or_none
-from dav_gswt_study.sweeps import tables as sweeps
-from dav_gswt_study.sweeps.grid import CELL
-from dav_gswt_study.tradeoff.front import find_pareto_front, find_rivals
 
 KEY = ("scene", "seed", "knob", "setting", "preset", "tiling", "prior", "tau", "processor", "cores")  # tells rows apart
 TILE_JOBS = ("levels_s", "cut_s", "bundle_s")
@@ -102,6 +102,33 @@ def tabulate_front(table: list[dict]) -> list[dict]:
             zip(known, find_pareto_front(cost, worth), find_rivals(cost, worth), strict=True)
         )
     ]
+
+
+def find_pareto_front(cost: Float[Array, " n"], worth: Float[Array, " n"]) -> Bool[Array, " n"]:
+    """Points that no other point dominates (costs no more and is worth no less, one of the two strictly).
+
+    Equal points are on the front together. One pass by rising cost, for O(n log n).
+    """
+    on, best = np.zeros(len(cost), bool), -np.inf
+    for price in np.unique(cost):
+        at = cost == price
+        top = worth[at].max()
+        if top > best:
+            on[at], best = worth[at] == top, top
+    return on
+
+
+def find_rivals(cost: Float[Array, " n"], worth: Float[Array, " n"]) -> Int[Array, " n"]:
+    """For each point the one worth most among those that cost no more; itself where none is worth more.
+
+    How far it lies behind the front is worth[rival] - worth, from 0.
+    """
+    found = np.arange(len(cost))
+    for i in found:
+        affordable = np.where(cost <= cost[i], worth, -np.inf)
+        if affordable.max() > worth[i]:
+            found[i] = int(affordable.argmax())
+    return found
 
 
 def read_tradeoff(path: Path | str) -> list[dict]:

@@ -13,7 +13,7 @@ from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.raster import render
 from dav_gswt.views import scoring
 from dav_gswt.views.prior_sampling import PriorConfig
-from dav_gswt_study.calibration import controls, judging
+from dav_gswt_study.calibration import judging
 
 METHODS = ("sample", "decode", "encode_render")
 
@@ -69,11 +69,11 @@ def test_controls_are_what_they_say(model):
     """From `sample` itself: how far samples from other noises lie apart, and their mean from the render."""
     condition, _ = scoring.build_conditions(patch.field(), patch.grid(), pool(2), patch.photos(), patch.FRAME, 64)
     prior = PriorConfig(model, 3, 2, 0.2, seed=4)
-    found = controls.control_maps(prior, condition)
+    found = judging.control_maps(prior, condition)
     drawn = model.sample(condition, 3, 0.0, 2, 4, common=False)
     pairs = [((drawn[:, i] - drawn[:, j]) ** 2).sum(1) for i, j in ((0, 1), (0, 2), (1, 2))]
     np.testing.assert_allclose(found["spread"], np.mean(pairs, 0), rtol=1e-4)
     apart = ((drawn.mean(1) - model.encode_render(condition)) ** 2).sum(1)
     np.testing.assert_allclose(found["residual"], apart, rtol=1e-4)
     other = SimpleNamespace(name="other", size=64, **dict.fromkeys(METHODS, print))  # not the project's own
-    assert controls.control_maps(replace(prior, model=other), condition) == {}
+    assert judging.control_maps(replace(prior, model=other), condition) == {}

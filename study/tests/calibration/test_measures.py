@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from dav_gswt_study.calibration import measures
+from dav_gswt_study.calibration import agreement as measures
 
 
 def test_a_score_that_knows_the_errors_and_one_that_knows_nothing():

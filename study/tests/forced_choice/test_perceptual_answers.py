@@ -4,12 +4,12 @@ import answer_files
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt_study.forced_choice import answers, results, trials
+from dav_gswt_study.forced_choice import answers, kit, results
 
 
 @pytest.fixture(scope="module")
 def key():
-    return trials.make_key(answer_files.drawn(), seed=0)
+    return kit.make_key(answer_files.drawn(), seed=0)
 
 
 def attentive(item):
@@ -49,7 +49,7 @@ def test_another_file_is_no_key(tmp_path):
 
 
 def test_a_fifth_of_the_checks_may_be_wrong():
-    key = trials.make_key(answer_files.drawn(crops=1, checks=5, scenes=("desert",)), seed=0)
+    key = kit.make_key(answer_files.drawn(crops=1, checks=5, scenes=("desert",)), seed=0)
     checks = [name for name, item in key["items"].items() if item["check"]]
     for wrong, kept in ((1, True), (2, False)):
         missed = [key["items"][name]["pictures"] for name in checks[:wrong]]
@@ -118,5 +118,5 @@ def test_without_answers_there_is_the_model_observer_alone_whose_ties_count_as_h
     items = {name: item | {"over": [0.1, 0.1]} for name, item in key["items"].items() if not item["check"]}
     assert results._tabulate_model(items)["share"] == 0.5
     items = {name: item | {"over": [None, None]} for name, item in key["items"].items()}
-    with pytest.raises(InputError, match="neither answers .* fetches it"):
+    with pytest.raises(InputError, match="neither answers .* make the kit again"):
         results.tabulate_choices(key | {"items": items}, [])

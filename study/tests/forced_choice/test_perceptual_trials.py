@@ -6,7 +6,7 @@ import answer_files
 import pytest
 
 from dav_gswt.files import read_json
-from dav_gswt_study.forced_choice import kit, trials
+from dav_gswt_study.forced_choice import kit
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +16,7 @@ def drawn():
 
 @pytest.fixture(scope="module")
 def key(drawn):
-    return trials.make_key(drawn, seed=7)
+    return kit.make_key(drawn, seed=7)
 
 
 def test_every_list_has_every_pair_once_half_either_way_round_and_the_next_list_exchanges_left_and_right(key):
@@ -38,8 +38,8 @@ def test_every_list_has_every_pair_once_half_either_way_round_and_the_next_list_
 
 
 def test_the_same_seed_makes_the_same_kit_and_another_another(drawn, key):
-    assert trials.make_key(drawn, seed=7) == key
-    other = trials.make_key(drawn, seed=8)
+    assert kit.make_key(drawn, seed=7) == key
+    other = kit.make_key(drawn, seed=8)
     assert other["study"] != key["study"] and other["lists"] != key["lists"]
     assert not set(other["items"]) & set(key["items"])
 

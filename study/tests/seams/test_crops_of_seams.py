@@ -9,7 +9,7 @@ from dav_gswt.images import metrics
 from dav_gswt.raster.interface import RIM
 from dav_gswt.terrain import heights, stills
 from dav_gswt_study.seams import crops, measure, places, rendering
-from dav_gswt_study.seams.spatial_index import MAX_SLOPE, Footprint, SpatialIndex
+from dav_gswt_study.seams.rendering import MAX_SLOPE, Footprint, SpatialIndex
 
 HILLS = {"kind": "hills", "height": 1.0, "wavelength": 8.0}
 _, WALKER, TOP = crops.VIEWS

@@ -5,7 +5,7 @@ from scipy.ndimage import binary_erosion
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import metrics
-from dav_gswt_study.forced_choice import pairs, store
+from dav_gswt_study.forced_choice import kit, pairs
 from dav_gswt_study.seams import measure
 from dav_gswt_study.seams.crops import SIDE
 
@@ -66,11 +66,11 @@ def test_the_same_seed_draws_the_same_pairs_and_the_model_observer_judges_what_h
 
 
 def test_what_is_written_is_read_again(items, tmp_path):
-    store.write_pairs(tmp_path / "pairs", items, {})
-    read = store.read_pairs(tmp_path / "pairs", "desert")
+    kit.write_pairs(tmp_path / "pairs", items, {})
+    read = kit.read_pairs(tmp_path / "pairs", "desert")
     compared = [(pair.about["scene"], pair.about["a"], pair.about["b"]) for pair in read]
     assert compared == [("desert", *(half.name for half in item.halves)) for item in items]
     assert [pair.check for pair in read].count(True) == 1
     (tmp_path / "pairs/001_b.png").unlink()
     with pytest.raises(InputError, match="001_b.png"):
-        store.read_pairs(tmp_path / "pairs", "desert")
+        kit.read_pairs(tmp_path / "pairs", "desert")

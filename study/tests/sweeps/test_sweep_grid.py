@@ -2,7 +2,7 @@ import pytest
 from study_configs import check_flat, flat_config
 
 from dav_gswt.errors import InputError
-from dav_gswt_study.sweeps import grid
+from dav_gswt_study import experiments as grid
 
 ROW = {"scenes": ["desert_pool"], "vary": {"k": [2, 4]}, "measure": {"views": [0]}}
 
@@ -25,24 +25,16 @@ def test_rounds_are_those_asked_for_or_as_many_as_photos_have_room_for():
 
 
 @pytest.mark.parametrize(
-    "table, change, said",
+    "change, said",
     [
-        ("mine", {"vary": {"kk": [2]}}, "sweeps.mine.vary: there is no key 'kk'"),
-        ("mine", {"measure": {}}, "nothing is measured"),
-        ("mine", {"fixed": {"k": 4}}, "sweeps.mine.fixed.k: is varied already"),
-        ("mine", {"scenes": ["moon"]}, "sweeps.mine.scenes: moon is no scene"),
-        ("mine", {"vary": {"tiling": ["glue"]}}, "there is no tiling 'glue'"),
-        ("mine", {"vary": {"lam": [0, 1]}}, "lam: makes no difference to the policy auto"),
-        ("mine", {"fixed": {"photos": 10}}, "photos: 10 leave no round of 4"),
-        ("mine", {"fixed": {"photos": 20, "rounds": 2}}, "photos and rounds"),
-        ("tables", {"timing": "speed"}, "there is no sweep 'speed'"),
-        ("tables", {"ablation": ["k"]}, "sweeps.k.baseline: must be one of 2, 4, 8"),
+        ({"vary": {"kk": [2]}}, "there is no key 'kk'"),
+        ({"vary": {"p_drop": [1.5]}}, "less than 1"),
+        ({"measure": {}}, "at least 1 item"),
+        ({"measure": {"beauty": [0]}}, "sweeps.mine.measure"),
     ],
 )
-def test_what_makes_no_sense_is_named(table, change, said):
-    config = flat_config()
-    mine, tables = (ROW | change, {}) if table == "mine" else (ROW, change)
-    check_flat(config | {"sweeps": config["sweeps"] | {"mine": ROW}})
-    sweeps = config["sweeps"] | {"mine": mine}
+def test_what_makes_no_sense_is_named(change, said):
+    sweeps = flat_config()["sweeps"]
+    check_flat(flat_config() | {"sweeps": sweeps | {"mine": ROW}})
     with pytest.raises(InputError, match=said):
-        check_flat(config | {"sweeps": sweeps, "tables": config["tables"] | tables})
+        check_flat(flat_config() | {"sweeps": sweeps | {"mine": ROW | change}})

@@ -4,8 +4,8 @@ import pytest
 
 from dav_gswt import csv_tables
 from dav_gswt.sweeps import TILES, TIMES
+from dav_gswt_study import sweeps as tables
 from dav_gswt_study.seams import measure
-from dav_gswt_study.sweeps import tables
 
 CELL = dict(
     sweep="tau", scene="desert", seed=0, preset="draft", policy="farthest", prior="none", p_drop="0", lam="0", k=4,

@@ -26,7 +26,7 @@ def cell(folder, scene, preset, corrected=False):
         (place / f"{part}.tsv").write_text(f"s\tmax_rss\n{seconds}\t{800.0 + number}\n")
         times[part] = [str(place / f"{part}.tsv")] * 2
     files = {"metrics": str(place / "metrics.json"), "manifest": str(place / "davgswt.json")}
-    return {"scene": scene, "preset": preset, "corrected": corrected, "times": times} | files
+    return {"scene": scene, "preset": preset, "corrected": corrected, "times": times, "files": files}
 
 
 def tabulate(*cells):

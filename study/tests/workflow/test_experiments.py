@@ -41,11 +41,11 @@ def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, 
     sweep |= {"measure": {"views": [0], "tiles": [0], "stills": [0]}}
     figures = {"scenes": ["desert"], "seed": 0, "estimators": ["w2"], "policy": "farthest", "rounds": 1}
     tables = {"timing": "few", "sensitivity": ["few"], "ablation": ["few"], "also": [], "figures": figures}
-    made = [f"study/results/tables/{name}.csv" for name in ("timing", "sensitivity", "ablation")]
+    made = [f"study/docs/data/{name}.csv" for name in ("timing", "sensitivity", "ablation")]
     uncertainty = str(tiny.bundle.relative_to(tiny.folder) / "uncertainty.png")
     configs = write_study(tmp_path, sweeps={"few": sweep}, tables=tables)
     done = snakemake(copied, "--cores", "2", "study/results/sweeps/few.png", *made, uncertainty, configs=configs)
-    assert "8 of 8 steps (100%) done" in done.stdout  # bundle, stills, gather, plot, three tables, uncertainty
+    assert "5 of 5 steps (100%) done" in done.stdout  # bundle, stills, sweep, tables, uncertainty
     rows = read_rows(copied / "study/results/sweeps/few.csv")
     assert [(row["tau"], row["scene"], row["photos"]) for row in rows] == [(t, "desert", "7") for t in ("0.3", "0.6")]
     assert all(float(row[key]) > 0 for row in rows for key in ("psnr", "bundle_mb", "orders", "recon_s", "stills_s"))
@@ -61,7 +61,7 @@ def test_a_finished_run_is_traded_off(snakemake, copied, tmp_path):
     configs = write_study(tmp_path, tradeoff={"scene": "desert", "base": base, "presets": ["draft"], "only": ["tau"]})
     page = "study/docs/results/tradeoff.md"
     done = snakemake(copied, "--cores", "2", "--scheduler", "greedy", page, configs=configs)
-    assert "8 of 8 steps (100%) done" in done.stdout  # metrics, two bundles and their stills, table, plot, page
+    assert "6 of 6 steps (100%) done" in done.stdout  # metrics, two bundles and their stills, page
     rows = read_rows(copied / "study/results/tradeoff/tradeoff.csv")
     assert [row["setting"] for row in rows] == ["draft", "0", "0.6", "1"]
     assert all(float(row[key]) > 0 for row in rows for key in ("seconds", "own_seconds", "psnr", "bundle_mb"))

@@ -1,12 +1,23 @@
-"""The figure of a sweep: a panel a measure over what is varied; where rounds are too, PSNR against photos as well."""
+"""Sweeps: one table of what the cells of a row of the config's `sweeps` measured, and one figure.
+
+The figure has a panel a measure over what is varied; where rounds are too, PSNR against photos as well.
+"""
 
 from pathlib import Path
 
 import numpy as np
 
+from dav_gswt import csv_tables
+from dav_gswt.files import read_json
 from dav_gswt.images import figures
-from dav_gswt_study.sweeps.grid import EVERYTHING
+from dav_gswt.sweeps import CELL, COLUMNS, QUALITY, TILES, TIMES, describe_origin, tabulate_cell
+from dav_gswt_study.experiments import EVERYTHING
+from dav_gswt_study.seams import summary
 
+KEY = ("sweep", *CELL)  # what tells rows apart
+ABOUT = ("samples", "steps")  # of the prior, which its name hides
+SEAMS = ("seam_lpips", "seam_lpips_low", "seam_lpips_high", "seam_psnr", "seam_jump", "seam_density")
+NUMBERS = (*ABOUT, "photos", "gaussians", *QUALITY, *TILES, *SEAMS, *TIMES)
 PANELS = {
     "psnr": "PSNR of test views (dB)",
     "worst_psnr": "PSNR, worst tenth (dB)",
@@ -22,13 +33,41 @@ PANELS = {
     "stills_s": "three stills (s)",
     "peak_mb": "peak memory (MB)",
 }
-COLUMNS, WIDE, TALL = 3, 3.3, 2.5  # inches a panel
+PANELS_A_ROW, WIDE, TALL = 3, 3.3, 2.5  # inches a panel
 LONG = 8  # letters of a name, above which names lie askew
 
 
-def write_figure(path: Path | str, name: str, axes: list[str], rows: list[dict]) -> None:
-    """The figure of `draw_figure`, as a PNG."""
-    figures.save_figure(draw_figure(name, axes, rows), path)
+def tabulate_experiment(cell: dict) -> dict:
+    """The row of an experiment: the columns of `dav_gswt.sweeps.tabulate_experiment`, what was varied, and its seams.
+
+    seam_lpips: Seam-LPIPS of cuts less their floor over all views, with its 95 % interval over places; seam_psnr and
+    seam_jump of these cuts; seam_density: share of their length through strong gradients.
+    cell: what KEY and ABOUT name, `varied`, `corrected`, `files` of what was measured, `times`: benchmarks by job.
+    """
+    found = {key: cell[key] for key in (*KEY, *ABOUT)}
+    found |= {f"varied_{k}": value for k, value in enumerate(cell["varied"].values())}
+    found |= dict.fromkeys(SEAMS) | {"tiles": None} | tabulate_cell(cell)
+    found |= _read_seams(cell | cell["files"]) if "crops" in cell["files"] else {}
+    return {name: found[name] for name in list_columns(len(cell["varied"]))}
+
+
+def list_columns(axes: int) -> tuple[str, ...]:
+    """The table's columns, in order. axes: how many settings are varied together."""
+    return (*KEY, *(f"varied_{k}" for k in range(axes)), *ABOUT, *COLUMNS, *SEAMS, "tiles")
+
+
+def read_sweep(path: Path | str) -> list[dict]:
+    """Read a sweep's table, NUMBERS as floats, None where empty; no rows where there is no file yet."""
+    return csv_tables.read_table(path, numbers=NUMBERS, missing_ok=True)
+
+
+def _read_seams(cell: dict) -> dict:
+    rows = summary.tabulate_crops(cell | {"table": cell["crops"], "variant": cell["tiling"], "replicate": 0})
+    row = next(r for r in summary.summarise_crops(rows) if r["view"] == r["ground"] == summary.EVERY)
+    named = {"seam_lpips": "cut", "seam_lpips_low": "cut_low", "seam_lpips_high": "cut_high"}
+    found = {key: row[name] for key, name in (named | {"seam_psnr": "cut_psnr", "seam_jump": "cut_jump"}).items()}
+    facts = read_json(cell["facts"])
+    return found | {"seam_density": facts["dense"], "tiles": row["tiles"]} | describe_origin(facts["provenance"])
 
 
 def draw_figure(name: str, axes: list[str], rows: list[dict]):
@@ -40,8 +79,8 @@ def draw_figure(name: str, axes: list[str], rows: list[dict]):
     last = [row for row in rows if len(axes) < 2 or row["varied_1"] == _last(rows, row["varied_0"])]
     shown = [key for key in PANELS if any(row[key] is not None for row in last)]
     count = len(curves) + len(shown)
-    figure = figures.make_figure(WIDE * min(COLUMNS, count), TALL * -(-count // COLUMNS) + 0.5)
-    grid = figure.subplots(-(-count // COLUMNS), min(COLUMNS, count), squeeze=False).ravel()
+    figure = figures.make_figure(WIDE * min(PANELS_A_ROW, count), TALL * -(-count // PANELS_A_ROW) + 0.5)
+    grid = figure.subplots(-(-count // PANELS_A_ROW), min(PANELS_A_ROW, count), squeeze=False).ravel()
     for panel, scene in zip(grid, curves, strict=False):
         _draw_curves(panel, [row for row in rows if row["scene"] == scene])
         panel.set_title(scene, fontsize=9, loc="left")

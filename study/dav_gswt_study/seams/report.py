@@ -1,0 +1,147 @@
+"""The page of seams, a template filled with the tables that grow in study/docs/data; and figures of seams."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt.geometry import cameras
+from dav_gswt.images import figures
+from dav_gswt.raster import render
+from dav_gswt.tiles.build import TileSet
+from dav_gswt_study.markdown import format_table, render_template
+from dav_gswt_study.seams.repetition import LAGS
+from dav_gswt_study.seams.summary import EVERY, MEASURES
+
+SHOT_CAPTIONS = {  # by the names of rule render_grid
+    "grid_flat": "from above",
+    "grid_hilly": "the same on hills",
+    "walker_flat": "a walker",
+    "walker_hilly": "the same on hills",
+}
+DIGITS = {"seam_lpips": 4, "psnr": 2, "jump": 2}
+HEADS = {"seam_lpips": "Seam-LPIPS over the floor", "psnr": "PSNR (dB)", "jump": "jump"}
+TILES_SHOWN = 4  # tiles of the figure of cuts
+NAMES = {"seam_lpips": "Seam-LPIPS of cuts over their floor", "psnr": "PSNR of cuts (dB)", "jump": "jump across cuts"}
+
+
+def format_seam_page(
+    template: Path | str, tables: tuple[list[dict], ...], own: dict[str, str], pictures: dict[str, str]
+) -> str:
+    """The page of seams. tables: seam_summary, seam_ablation and repetition, as `summary.read_seam_table` reads them.
+
+    own: the tiling of each scene. pictures: captions by path.
+    """
+    summary, ablation, repetition = tables
+    values = {
+        "baseline": next((row["baseline"] for row in ablation), ""),
+        "scenes": _format_scenes(summary, own),
+        "variants": _format_variants(ablation),
+        "repetition": _format_repetition(repetition, own),
+        "pictures": pictures,
+    }
+    return render_template(template, values)
+
+
+def _format_scenes(summary: list[dict], own: dict[str, str]) -> str:
+    head = ["scene", "tiling", "sets", "borders over floor", "cuts over floor", "ceiling over floor", "share"]
+    head += ["jump: border", "cut", "floor"]
+    lines = []
+    for row in summary:
+        if (row["view"], row["ground"]) == (EVERY, EVERY) and own.get(row["scene"]) == row["variant"]:
+            places = [format_interval(row, place, 4) for place in ("border", "cut", "ceiling")]
+            way = f"{float(row['share']):.0%}" if row["share"] else ""
+            jumps = [f"{float(row[f'{place}_jump']):.2f}" for place in ("border", "cut", "floor")]
+            lines.append([row["scene"], f"`{row['variant']}`", row.get("sets") or "1", *places, way, *jumps])
+    return format_table(head, lines)
+
+
+def _format_variants(ablation: list[dict]) -> str:
+    found = {(row["variant"], row["scene"], row["measure"]): row for row in ablation}
+    cells = sorted({key[:2] for key in found}, key=lambda key: (key[0], key[1] != EVERY, key[1]))
+    lines = []
+    for variant, scene in cells:
+        rows = [(measure, found.get((variant, scene, measure))) for measure in MEASURES]
+        values = [format_interval(row, "difference", DIGITS[measure]) if row else "" for measure, row in rows]
+        lines.append([f"`{variant}`", "all" if scene == EVERY else scene, *values])
+    return format_table(["cut", "scene", *(HEADS[measure] for measure in MEASURES)], lines)
+
+
+def _format_repetition(repetition: list[dict], own: dict[str, str]) -> str:
+    lags = [(str(east), str(north)) for east, north in LAGS]
+    at = {(row["scene"], row["variant"], row["east"], row["north"]): row for row in repetition}
+    lines = []
+    for scene, variant in own.items():
+        rows = [at.get((scene, variant, *lag)) for lag in lags]
+        if any(rows):
+            lines.append([scene, *(_format_correlation(row) for row in rows)])
+    return format_table(["scene", *(f"{east}, {north}" for east, north in lags)], lines)
+
+
+def _format_correlation(row: dict | None) -> str:
+    if not row or not row["terrain"]:
+        return ""
+    return f"{float(row['terrain']):.3f}" + (f" ({float(row['exemplar']):.3f})" if row["exemplar"] else "")
+
+
+def format_interval(row: dict, name: str, digits: int) -> str:
+    """A value and in brackets its interval; empty where it is not known."""
+    if not row[name]:
+        return ""
+    value, low, high = (f"{float(row[key]):+.{digits}f}" for key in (name, f"{name}_low", f"{name}_high"))
+    return f"{value} ({low}, {high})"
+
+
+def write_ablation(path: Path | str, rows: list[dict], baseline: str) -> None:
+    """A panel for each measure: every variant minus the baseline with its 95 % interval; dots are scenes."""
+    variants = sorted({row["variant"] for row in rows})
+    figure = figures.make_figure(11.0, 1.4 + 0.5 * max(len(variants), 1))
+    for axes, measure in zip(figure.subplots(1, len(MEASURES)), MEASURES, strict=True):
+        for place, variant in enumerate(variants):
+            mine = [r for r in rows if (r["variant"], r["measure"]) == (variant, measure)]
+            scenes = [r for r in mine if r["scene"] != EVERY]
+            for row in [r for r in mine if r["scene"] == EVERY] or scenes[:1]:
+                axes.plot([row["difference_low"], row["difference_high"]], [place, place], color="0.25", linewidth=2)
+                axes.plot(row["difference"], place, "s", color="0.25", markersize=6)
+            dots = [r["difference"] for r in scenes]
+            axes.plot(dots, [place] * len(dots), "o", color="#0072b2", markersize=4, alpha=0.7)
+        axes.axvline(0, color="black", linewidth=1, linestyle=":")
+        axes.set_yticks(range(len(variants)), variants if axes.get_subplotspec().is_first_col() else [], fontsize=9)
+        axes.set_ylim(len(variants) - 0.5, -0.5)
+        axes.set_xlabel(f"{NAMES[measure]}, less that of {baseline}", fontsize=8)
+        axes.tick_params(axis="x", labelsize=7)
+        axes.grid(axis="x", alpha=0.3)
+    figures.save_figure(figure, path)
+
+
+def write_cuts(path: Path | str, variants: dict[str, TileSet]) -> None:
+    """Some tiles from above with their cuts, a row for each variant."""
+    figure = figures.make_figure(3.0 * TILES_SHOWN, 3.2 * len(variants))
+    grid = figure.subplots(len(variants), TILES_SHOWN, squeeze=False)
+    for line, (name, tiles) in zip(grid, variants.items(), strict=True):
+        for axes, number in zip(line, np.linspace(0, 15, TILES_SHOWN).astype(int).tolist(), strict=True):
+            axes.imshow(render_tile(tiles, number), extent=(0, tiles.side, 0, tiles.side))
+            _draw_cuts(axes, tiles.labels[number], tiles.spacing)
+            axes.set_title(f"{name}, tile {number}", fontsize=9, loc="left")
+            axes.axis("off")
+    figures.save_figure(figure, path)
+
+
+def render_tile(tiles: TileSet, number: int) -> Float[Array, "h w 3"]:
+    """A tile from above, two pixels a finest cell."""
+    field, pixels = tiles.fields[0][number], 2 * len(tiles.labels[number])
+    top = float(field.means[:, 2].max()) + 10 * tiles.spacing
+    return np.clip(render(field, cameras.top_down(0.0, 0.0, pixels, pixels, 0.5 * tiles.spacing, top)).colour, 0, 1)
+
+
+def _draw_cuts(axes, labels: Array, spacing: float) -> None:
+    """Draw lines between cells of different labels."""
+    from matplotlib.collections import LineCollection
+
+    y, x = np.nonzero(labels[:, 1:] != labels[:, :-1])
+    upright = np.stack([np.stack([x + 1, y], 1), np.stack([x + 1, y + 1], 1)], 1)
+    y, x = np.nonzero(labels[1:] != labels[:-1])
+    flat = np.stack([np.stack([x, y + 1], 1), np.stack([x + 1, y + 1], 1)], 1)
+    lines = np.concatenate([upright, flat]) * spacing
+    axes.add_collection(LineCollection(list(lines), colors="#d55e00", linewidths=1.0))
