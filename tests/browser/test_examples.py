@@ -119,7 +119,7 @@ def test_spark_draws_our_spz_as_we_draw_it(chromium, serve, node_modules, walked
     off by a pixel, or mirrored, has 30 at most.
     """
     page, manifest, terrain = walked
-    settings = Export(radius=3.0, centre=[1.0, 1.0], formats=["spz", "ply"])
+    settings = Export(columns=6, rows=6, centre=[1.0, 1.0], formats=["spz", "ply"])
     settings = settings.model_dump(mode="json", exclude_none=True)
     terrain_files.export_terrain(terrain, manifest, settings, tmp_path / "terrain")
     told = "document.querySelector('p').textContent"
@@ -144,9 +144,11 @@ def test_exits_lie_alike_in_other_programs(chromium, serve, node_modules, walked
     Gaussians each in its way, and a picture that is off by a pixel, or mirrored, has 30 at most.
     """
     page, manifest, terrain = walked
-    settings = Export(radius=2.0, formats=["spz", "ply", "glb", "3dtiles"]).model_dump(mode="json", exclude_none=True)
+    settings = Export(columns=4, rows=4, formats=["spz", "ply", "glb", "3dtiles"]).model_dump(
+        mode="json", exclude_none=True
+    )
     terrain_files.export_terrain(terrain, manifest, settings, tmp_path / "terrain")
-    ground_files.export_ground(terrain, manifest, cover_content().tiles, None, settings, tmp_path / "ground")
+    ground_files.export_ground(terrain, manifest, cover_content().tiles, settings, tmp_path / "ground")
     with running(serve, page, tmp_path) as address:
         seen = {name: exits.visit(chromium, address, name) for name in EXITS}
     spz, *others = (seen[name].astype(np.float32) / 255 for name in ("spz", "ply", "glb", "3dtiles"))

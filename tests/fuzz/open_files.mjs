@@ -6,7 +6,7 @@ import { pathToFileURL } from "node:url";
 
 const viewer = pathToFileURL(`${process.argv[2]}/`);
 const load = (name) => import(new URL(name, viewer));
-const { initialChunks, readChunks, readHeightMap, readManifest, readPictures, sourceOf } = await load("data/bundle.js");
+const { initialChunks, readChunks, readHeightMap, readManifest, sourceOf } = await load("data/bundle.js");
 const { PageError } = await load("data/checks.js");
 const { openZip } = await load("data/zip.js");
 const { cameraAt } = await load("terrain/camera.js");
@@ -24,7 +24,7 @@ async function read({ files, zip }) {
     : await openZip(new Blob([bytesOf(zip)]));
   const source = await sourceOf(named), manifest = await readManifest(source);
   const pixels = await readHeightMap(manifest, source), heights = createHeights(manifest.heights, pixels);
-  const builder = createFrameBuilder(structuredClone(manifest), heights, await readPictures(manifest, source));
+  const builder = createFrameBuilder(structuredClone(manifest), heights);
   await readChunks(initialChunks(manifest), source, { take: (chunk) => builder.add(chunk) });
   const place = { x: 1, y: 1, eye: manifest.eye_floor, yaw: 30, pitch: -20 };
   const frame = builder.build(cameraAt(place, 320, 200, heights), 1e6, true);
