@@ -154,7 +154,7 @@ def test_a_photo_from_the_future_is_named_before_the_work(snakemake, tmp_path):
     """Snakemake refuses results that are older than their inputs, once a job has ended."""
     (photo := tmp_path / "a.jpg").touch()
     os.utime(photo, (0, time.time() + 3600))
-    scene = f"{{kind: photos, folder: {tmp_path}, size: 64, start: 8, agent: replay, preset: draft, tiling: semantic}}"
+    scene = f"{{kind: photos, folder: {tmp_path}, size: 64, start: 8, agent: replay, preset: draft, tiling: auto}}"
     (tmp_path / "mine.yaml").write_text(f"scene: mine\nscenes: {{mine: {scene}}}\n")
     target = "results/mine/photos/ground.json"
     done = snakemake(tmp_path, target, "--dry-run", configs=(USUAL, tmp_path / "mine.yaml"), check=False)

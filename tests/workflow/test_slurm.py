@@ -16,11 +16,8 @@ from dav_gswt.files import digest_files, read_json, write_json
 
 pytestmark = pytest.mark.slow
 COARSE = "results/desert/seed{}/draft/coarse"
-FEW = (
-    "study: {sweeps: {few: {scenes: [desert], vary: {k: [1, 2]}, fixed: {policy: farthest, rounds: 1}, "
-    "measure: {views: [0]}}}}"
-)
-TABLE = "results/sweeps/few.csv"
+FEW = "rounds: 1\nsweeps: {k: [1, 2]}"
+TABLE = "results/sweeps/k.csv"
 # Beside the profile what this Slurm lacks (accounts, a database), and less time between two looks at the queue.
 SLURM = ["--profile", "workflow/profiles/slurm", "--slurm-status-command", "squeue", "--slurm-no-account"]
 SLURM += ["--slurm-init-seconds-before-status-checks", "4"]
