@@ -4,6 +4,7 @@ In: the runs of the config's scene for each value of the config's `sweeps`, the 
 have in common is made once. Out: results/sweeps/{sweep}.csv, results/tables/timing.csv.
 """
 
+
 rule gather_sweep:
     """Collect what each value of a setting changes, and what it costs."""
     input:
