@@ -20,6 +20,6 @@ def test_the_stand_in_takes_what_gsplat_takes(name):
             assert given.default == real[parameter].default, parameter
 
 
-@pytest.mark.parametrize("module", ["raster.cuda", "reconstruction.fitting.device_descent", "study.gsplat_fit"])
+@pytest.mark.parametrize("module", ["raster.cuda", "reconstruction.fitting.device_descent"])
 def test_what_is_written_for_a_gpu_can_be_imported(module):
     assert import_module(f"dav_gswt.{module}")
