@@ -1,5 +1,5 @@
 """Export: the photos of a round for other programs that train fields; for viewers, engines and simulators a finite
-terrain. Not part of `all`: files are asked for by their paths (docs/exports.md).
+terrain. Not part of `all`: name the path of the file that you want (docs/exports.md).
 
 In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/terrain,
 exports/ground.

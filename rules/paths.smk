@@ -17,7 +17,6 @@ from dav_gswt.files import is_from_future, locate_path
 from dav_gswt.images.lpips_weights import locate_weights
 from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
 from dav_gswt.sweeps import CELL
-
 from dav_gswt.views.policies import NEEDS_PHOTOS, POLICY_NAMES, PRIOR_POLICIES
 from dav_gswt.workflow import NamedEntries, lift_job_rate_limit, list_command_line_values
 
