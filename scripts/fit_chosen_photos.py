@@ -21,4 +21,4 @@ with logging_to(snakemake.log[0]):
     fitted = update.fit_chosen_photos(photos, frame, params.preset, files, rng)
     write_field(fitted.field, snakemake.output.field)
     ground.write_ground(fitted.grid, snakemake.output.ground)
-    write_json(snakemake.output.fit, fitted.report.to_dict())
+    write_json(snakemake.output.fit, vars(fitted.report))

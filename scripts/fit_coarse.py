@@ -20,4 +20,4 @@ with logging_to(snakemake.log[0]):
     fitted = coarse.fit_coarse_field(start, settings, np.random.default_rng(params.seed))
     write_field(fitted.field, snakemake.output.field)
     ground.write_ground(fitted.grid, snakemake.output.ground)
-    write_json(snakemake.output.fit, fitted.report.to_dict())
+    write_json(snakemake.output.fit, vars(fitted.report))

@@ -24,4 +24,4 @@ with logging_to(snakemake.log[0]):
     updated = update.update_as_preset(update.UpdateInput(*last, known, new), params.preset, files, rng)
     write_field(updated.field, snakemake.output.field)
     ground.write_ground(updated.grid, snakemake.output.ground)
-    write_json(snakemake.output.fit, updated.report.to_dict())
+    write_json(snakemake.output.fit, vars(updated.report))

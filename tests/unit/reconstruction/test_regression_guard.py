@@ -46,7 +46,7 @@ def test_ordinary_photos_are_taken_and_both_sides_are_reported():
     assert report.new_photos == ["photo_1", "photo_2", "photo_3"]
     before, after = (np.mean(regression_guard.measure_psnr(f, masked)) for f in (made.field(), found.field))
     assert (report.psnr_before, report.psnr_after) == pytest.approx((before, after), abs=1e-9)
-    json.dumps(found.report.to_dict(), allow_nan=False)
+    json.dumps(vars(found.report), allow_nan=False)
 
 
 def test_photos_that_contradict_the_others_change_nothing(caplog, monkeypatch):
@@ -62,7 +62,7 @@ def test_photos_that_contradict_the_others_change_nothing(caplog, monkeypatch):
     without = refined(photos, [])
     same(without.field, made.field())
     assert without.report.taken and without.report.new_photos == [] and without.report.steps == 0
-    reports = [found.report.to_dict(), without.report.to_dict()]
+    reports = [vars(found.report), vars(without.report)]
     assert regression_guard.list_rejected_photos(reports) == {"photo_1", "photo_2", "photo_3"}
 
 

@@ -39,11 +39,7 @@ def select_farthest_poses(candidates: list[Pose], count: int, taken: Float[Array
 
     taken: relative to the exemplar's centre.
     """
-    return select_farthest(np.array([pose_offset(p) for p in candidates]).reshape(-1, 3), count, taken)
-
-
-def select_farthest(places: Float[Array, "n 3"], count: int, taken: Float[Array, "m 3"] | None = None) -> list[int]:
-    """`select_farthest_poses` of places."""
+    places = np.array([pose_offset(p) for p in candidates]).reshape(-1, 3)
     nearest, chosen = np.full(len(places), np.inf), []
     for at in [] if taken is None else taken:
         nearest = np.minimum(nearest, np.linalg.norm(places - at, axis=1))

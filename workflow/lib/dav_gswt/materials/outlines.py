@@ -6,6 +6,7 @@ and heights of both, with borders where the map has an edge.
 
 from dataclasses import replace
 
+import maxflow
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
@@ -22,6 +23,7 @@ from scipy.special import logsumexp
 
 from dav_gswt.materials.maps import GroundMaps, unite
 from dav_gswt.materials.objects import BORDER, Footprint
+from dav_gswt.tiles.energy import connect_neighbours
 
 LEAST_AGREEMENT = 0.4  # IoU of a refined outline with the one before it: less is another thing
 AROUND, LEAST_AROUND = 0.5, 4  # of the footprint's box, and cells: what the cut sees beside it, to each side
@@ -90,8 +92,6 @@ def cut_object(
 
     own: its outline so far. ground: cells that are ground for sure. The window's border is no object.
     """
-    import maxflow
-
     depth = distance_transform_edt(np.pad(own, 1))[1:-1, 1:-1]
     core = depth > CORE * depth.max()
     if min(own.sum(), ground.sum()) < LEAST_CELLS:
@@ -106,11 +106,8 @@ def cut_object(
     nodes = graph.add_grid_nodes(own.shape)
     steps = [(np.diff(features, axis=axis) ** 2).sum(-1) for axis in (1, 0)]
     usual = 2 * max(float(np.mean(np.concatenate([step.ravel() for step in steps]))), 1e-9)
-    for axis, step in zip((1, 0), steps, strict=True):  # a border is cheap where neighbours differ
-        pad, structure = np.zeros((2, 2), int), np.zeros((3, 3))
-        pad[axis, 1], structure[1 + (axis == 0), 1 + (axis == 1)] = 1, 1
-        weights = np.pad(SMOOTHING * np.exp(-step / usual), pad)
-        graph.add_grid_edges(nodes, weights, structure, symmetric=True)
+    # a border is cheap where neighbours differ
+    connect_neighbours(graph, nodes, *(SMOOTHING * np.exp(-step / usual) for step in steps))
     graph.add_grid_tedges(nodes, np.maximum(-cost, 0), np.maximum(cost, 0))
     graph.maxflow()
     return ~graph.get_grid_segments(nodes)

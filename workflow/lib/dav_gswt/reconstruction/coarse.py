@@ -74,27 +74,23 @@ def fit_coarse_field(
     spacing = settings.spacing * observation.pixel_size(frame, views)
     grid = ground.fit_ground(frame, points, spacing, limit_discs(settings.max_gaussians), BLOCK, given.margin)
     if (wider := grid.spacing / spacing) > MUCH_WIDER:
-        _log.warning(
-            "the ground is so large that its discs are %.1f times as wide as the preset asks for: for a sharper "
-            "terrain give it %.1f times as many Gaussians (max_gaussians), or photos of less ground",
-            wider,
-            wider**2,
-        )
-    scene = observation.observe(frame, grid, views)
-    shell = objects.make_shell(scene.relief, scene.views)
-    isolated = objects.make_isolated_points(grid, scene.relief, points, given.colours, BAND * frame.flying_height)
+        said = "discs of this large ground are %.1f times as wide as the preset asks for: raise its max_gaussians"
+        _log.warning(said, wider)
+    views, relief = observation.observe(frame, grid, views)
+    shell = objects.make_shell(relief, views)
+    isolated = objects.make_isolated_points(grid, relief, points, given.colours, BAND * frame.flying_height)
     room = settings.max_gaussians - grid.heights.size - underlay.count_gaussians(grid)
     occluders = observation.thin_at_random(concatenate_fields([isolated, shell]), room, rng)
-    colour, known = observation.ground_colours(grid, scene.views, occluders)
+    colour, known = observation.ground_colours(grid, views, occluders)
     grid = replace(grid, seen=known)
     layer = discs.make_ground_discs(grid, discs.fill_unknown(colour, known))
     start = concatenate_fields([layer, underlay.make_underlay(grid, layer), occluders])
     _log.info(
         "ground: %d x %d discs of %.4g %s, %.0f %% seen", *grid.shape, grid.spacing, frame.unit, 100 * known.mean()
     )
-    _log.info("objects: %d Gaussians over %.1f %% of the ground", len(occluders), 100 * scene.relief.stands.mean())
-    constraints = observation.make_constraints(grid, scene.relief, occluders, frame)
-    masked = observation.mask_for_fit(scene.views, grid)
+    _log.info("objects: %d Gaussians over %.1f %% of the ground", len(occluders), 100 * relief.stands.mean())
+    constraints = observation.make_constraints(grid, relief, occluders, frame)
+    masked = observation.mask_for_fit(views, grid)
     options = replace(options, name="fit coarse field")
     fit = trainer.fit_field(start, masked, settings.plan_coarse_fit(len(views)), constraints, rng, options)
     return Reconstruction(*finish_field(fit.field, grid, masked), fit.report)

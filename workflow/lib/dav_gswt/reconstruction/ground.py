@@ -146,7 +146,8 @@ def fit_surface(grid: Ground, points: Float[Array, "n 3"]) -> Float[Array, "rows
     v = np.clip((points[:, 1] - grid.south) / (rows * grid.spacing) * (ny - 1), 0, ny - 1.000001)
     u = np.clip((points[:, 0] - grid.west) / (columns * grid.spacing) * (nx - 1), 0, nx - 1.000001)
     sample = _bilinear(v, u, ny, nx)
-    bend = kron(identity(ny), _second(nx)), kron(_second(ny), identity(nx)), 2 * kron(_first(ny), _first(nx))
+    first, second = ([np.diff(np.eye(n), order, axis=0) for n in (ny, nx)] for order in (1, 2))
+    bend = kron(identity(ny), second[1]), kron(second[0], identity(nx)), 2 * kron(*first)
     stiff = STIFFNESS * reduce(add, (b.T @ b for b in bend)) + 1e-9 * identity(ny * nx)
     z, weight, knots = points[:, 2], np.ones(len(points)), np.zeros(ny * nx)
     for _ in range(5):
@@ -172,15 +173,6 @@ def _bilinear(v, u, ny: int, nx: int):
     values = np.concatenate([(1 - fv) * (1 - fu), (1 - fv) * fu, fv * (1 - fu), fv * fu])
     knots = np.concatenate([i * nx + j, i * nx + j + 1, (i + 1) * nx + j, (i + 1) * nx + j + 1])
     return coo_matrix((values, (np.tile(p, 4), knots)), shape=(len(v), ny * nx)).tocsr()
-
-
-# SciPy's stubs do not know lists of arrays in diags, hence the ignored rules.
-def _first(n: int):
-    return diags([-np.ones(n - 1), np.ones(n - 1)], [0, 1], shape=(n - 1, n))  # pyright: ignore[reportCallIssue, reportArgumentType]
-
-
-def _second(n: int):
-    return diags([np.ones(n - 2), -2 * np.ones(n - 2), np.ones(n - 2)], [0, 1, 2], shape=(n - 2, n))  # pyright: ignore[reportCallIssue, reportArgumentType]
 
 
 def write_ground(grid: Ground, path: Path | str) -> None:

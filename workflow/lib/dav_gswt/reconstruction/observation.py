@@ -1,7 +1,6 @@
 """What the photos show of a scene before any fit: exposure, moving objects, relief, colours of the ground, and sky."""
 
 import logging
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -29,28 +28,23 @@ MIN_DIFFERENCE = 0.12  # of the range of colours
 NOTABLE_SHARE = 0.2  # of a photo's pixels, beyond which the log warns: a large shadow, or a wrong place
 
 
-@dataclass(frozen=True)
-class Observation:
-    """views: the photos at one exposure, without moving objects. relief: what rises above the ground."""
-
-    views: list[TrainingView]
-    relief: Relief
-
-
 def pixel_size(frame: SceneFrame, views: list[TrainingView]) -> float:
     """Size on the ground of the finest photo's pixel."""
     return min(frame.flying_height / view.camera.fx for view in views)
 
 
-def observe(frame: SceneFrame, grid: Ground, views: list[TrainingView]) -> Observation:
-    """Equalize the photos' exposure, sweep the relief, and mask what moves; synthetic photos need only the sweep."""
+def observe(frame: SceneFrame, grid: Ground, views: list[TrainingView]) -> tuple[list[TrainingView], Relief]:
+    """Equalize the photos' exposure, sweep the relief, and mask what moves; synthetic photos need only the sweep.
+
+    Returns: the photos at one exposure, without moving objects; what rises above the ground.
+    """
     if frame.kind == "photos":
         views = exposure.equalize_exposure(views, thin_places(grid.centres))
     relief = sweep_heights(grid, views, frame.flying_height, pixel_size(frame, views))
     if frame.kind == "photos":
         open_ground = ~(relief.onto(grid, relief.stands.astype(float)) > 0.1)
         views = mask_distractors(views, grid.centres[open_ground.ravel()], grid.spacing)
-    return Observation(views, relief)
+    return views, relief
 
 
 def mask_distractors(views: list[TrainingView], points: Float[Array, "n 3"], spacing: float) -> list[TrainingView]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
+from scipy.ndimage import map_coordinates
 
 from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.raster import backends
@@ -17,7 +18,6 @@ from dav_gswt.reconstruction.ground import Ground
 
 CHUNK = 1_200_000  # colours of points at a time, over all photos
 LARGEST = 50_000  # points at a time, so that they stay in the cache
-RAYS = 4_000_000  # points times photos at a time
 ITERATIONS = 3  # of the intersection of a ray with the ground
 
 
@@ -99,22 +99,12 @@ def _add_by_core(view: TrainingView, places: Array, heights: Array, sums: Colour
 def _add_by_numpy(view: TrainingView, places: Array, heights: Array, sums: ColourSums) -> None:
     start, up = to_camera(places, view), view.camera.rotation[:, 2].astype(np.float32)
     for k, height in enumerate(heights):
-        rows, colours = _sample_bilinear(view, start + height * up)
+        rows, x, y = project_visible(view, start + height * up)
+        channels = np.moveaxis(view.image, -1, 0)
+        colours = np.stack([map_coordinates(channel, [y, x], order=1) for channel in channels], 1)
         sums.total[k, rows] += colours
         sums.squares[k, rows] += np.einsum("nc,nc->n", colours, colours)
         sums.count[k, rows] += 1
-
-
-def _sample_bilinear(view: TrainingView, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m 3"]]:
-    """Rows of the points (in the camera's frame) that the photo sees, and its colours there."""
-    camera = view.camera
-    rows, x, y = project_visible(view, q)
-    column, row = x.astype(np.int32), y.astype(np.int32)
-    right, down = ((at - cell).astype(np.float32)[:, None] for at, cell in ((x, column), (y, row)))
-    flat, at = view.image.reshape(-1, 3), row * camera.width + column
-    top = flat[at] * (1 - right) + flat[at + 1] * right
-    bottom = flat[at + camera.width] * (1 - right) + flat[at + camera.width + 1] * right
-    return rows, top * (1 - down) + bottom * down
 
 
 def to_camera(places: Float32[Array, "n 3"], view: TrainingView) -> Float32[Array, "n 3"]:
@@ -149,9 +139,7 @@ def median_behind(
 
     values: NaN where unknown. The result is NaN where fewer than `least` photos see ground with a value.
     """
-    size = max(1, RAYS // len(views))
-    parts = [places[start : start + size] for start in range(0, len(places), size)]
-    medians = [_median_behind(grid, values, part, views, least) for part in parts]
+    medians = [_median_behind(grid, values, part, views, least) for part in chunk_points(places, views)]
     return np.concatenate([np.zeros(0, np.float32), *medians])
 
 

@@ -15,13 +15,11 @@ from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter, label
 
-from dav_gswt.geometry.poses import select_farthest
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import photo_colours
 from dav_gswt.reconstruction.ground import Ground
 
 MAX_CELLS = 60_000  # of the sweep's own grid
-SOME_CELLS = 2000  # of them, by which photos are left out
 LOW, HIGH = -0.02, 0.3  # heights tried, in flying heights over the surface
 WINDOW = 2.0  # cells: standard deviation of the window over which photos are compared
 ONE_STEP, MORE_STEPS = 0.01, 0.06  # cost of a change of height by one step, by more, between cells
@@ -29,8 +27,6 @@ AIR_COST = 0.01  # of any height above the surface
 MAX_COST = 0.8  # of an object, in costs of the surface
 UNKNOWN_COST = 0.3  # where fewer than two photos look
 SUPPORT = 0.7  # of the photos that see the surface must see a height above it
-ENOUGH_PHOTOS = 32  # that see a cell: more say nothing new
-SPARED = 0.05  # of what a photo sees, at most, that lacks photos, for it to be left out
 MIN_PHOTOS = 3  # that must agree on an object: two agree anywhere along a stripe
 SLANT = 2.0  # run over fall of a ray: how far beyond the grid (half of it at most) the ground is compared too
 MAX_SLENDERNESS = 4.0  # height over width of an object: more is a wrong match
@@ -61,7 +57,6 @@ def sweep_heights(grid: Ground, views: list[TrainingView], flying_height: float,
     """Sweep heights LOW to HIGH over the grid's surface, in steps of `pixel`, a pixel's size on the ground."""
     stride = max(1, int(np.ceil(np.sqrt(grid.heights.size / MAX_CELLS))))
     coarse = coarsen_grid(grid, stride)
-    views = leave_out_photos(coarse, views)
     step = max(pixel, coarse.spacing / 2)
     heights = step * np.arange(np.floor(LOW * flying_height / step), np.ceil(HIGH * flying_height / step) + 1)
     costs, photos = measure_disagreement(coarse, views, heights)
@@ -77,21 +72,6 @@ def sweep_heights(grid: Ground, views: list[TrainingView], flying_height: float,
     stands = reject_columns(sure & (above > OBJECT_STEPS * step), above, coarse.spacing)
     near = np.abs(above) <= OBJECT_STEPS * step
     return Relief(coarse, np.where(stands | near, above, 0), stands, known, step)
-
-
-def leave_out_photos(grid: Ground, views: list[TrainingView]) -> list[TrainingView]:
-    """The views without those that see only ground that ENOUGH_PHOTOS see; those farthest apart are kept first."""
-    if len(views) <= ENOUGH_PHOTOS:
-        return views
-    places = grid.centres[:: max(1, grid.heights.size // SOME_CELLS)].astype(np.float32)
-    photos, kept = np.zeros(len(places), int), []
-    for k in select_farthest(np.array([view.camera.centre for view in views]), len(views)):
-        seen = photo_colours.project_visible(views[k], photo_colours.to_camera(places, views[k]))[0]
-        views[k].release()
-        if (photos[seen] < ENOUGH_PHOTOS).sum() > SPARED * len(seen):
-            photos[seen] += 1
-            kept.append(k)
-    return [views[k] for k in sorted(kept)]
 
 
 def reject_columns(

@@ -51,27 +51,24 @@ def fit_with_guard(
     new: list[TrainingView],
     plan: FitPlan,
     fit: Callable[[GaussianField, FitPlan], FitResult],
-    retries: int = RETRIES,
-    second_opinion: Callable[[], bool] | None = None,
 ) -> tuple[GaussianField, UpdateReport]:
-    """Fit, and go on fitting, `retries` times at most, while the earlier photos have lost too much.
+    """Fit, and go on fitting, RETRIES times at most, while the earlier photos have lost too much.
 
     Args:
         last: From before the new photos; it is kept if the loss stays above the bound.
         start: What the fit starts from.
         fit: A fit to all views. Where no earlier photo has a pixel that counts, nothing can be lost.
-        second_opinion: Called if the earlier photos have lost too much: whether the new photos are right all the same.
     Returns: The field of the last fit, or the one from before, and the report.
     """
-    before, fitted = measure_psnr(last, earlier), fit(start, plan)
-    most = allowed_loss(len(earlier), len(new))
-    fits, reached = [fitted.report], measure_psnr(fitted.field, earlier)
-    while (loss := mean_loss(before, reached)) > most and len(fits) <= retries:
+    most, seeing = allowed_loss(len(earlier), len(new)), [view for view in one_by_one(earlier) if view.weight.any()]
+    before, fitted = measure_psnr(last, seeing), fit(start, plan)
+    fits, reached = [fitted.report], measure_psnr(fitted.field, seeing)
+    while (loss := mean_loss(before, reached)) > most and len(fits) <= RETRIES:
         _log.info("the earlier photos lost %.2f dB: fitting on", loss)
         fitted = fit(fitted.field, replace(plan, steps=fits[0].steps))
         fits.append(fitted.report)
-        reached = measure_psnr(fitted.field, earlier)
-    accepted = loss <= most or (second_opinion is not None and second_opinion())
+        reached = measure_psnr(fitted.field, seeing)
+    accepted = loss <= most
     if not accepted:
         _log.warning(
             "the new photos contradict the earlier ones: with %s the field shows those %.2f dB worse (bound: %.2g dB). "
@@ -82,7 +79,8 @@ def fit_with_guard(
             most,
         )
     kept, after = (fitted.field, reached) if accepted else (last, before)
-    effect = len(earlier), _mean(before), _mean(after), [view.name for view in new], accepted
+    level = [float(np.mean(values)) if values else None for values in (before, after)]
+    effect = len(earlier), *level, [view.name for view in new], accepted
     return kept, UpdateReport(sum(each.steps for each in fits), len(kept), *effect)
 
 
@@ -91,21 +89,21 @@ def allowed_loss(earlier: int, new: int) -> float:
     return ALLOWED_LOSS + (LOSS_PER_DOUBLING * log2((earlier + new) / earlier) if earlier else 0.0)
 
 
-def mean_loss(before: list[float | None], after: list[float | None]) -> float:
-    """Mean loss of PSNR in dB, counted below VISIBLE_PSNR only; 0 where no value is known."""
-    known = [(b, a) for b, a in zip(before, after, strict=True) if b is not None and a is not None]
-    return float(np.mean([min(b, VISIBLE_PSNR) - min(a, VISIBLE_PSNR) for b, a in known])) if known else 0.0
+def mean_loss(before: list[float], after: list[float]) -> float:
+    """Mean loss of PSNR in dB, counted below VISIBLE_PSNR only; 0 without any value."""
+    lost = np.minimum(before, VISIBLE_PSNR) - np.minimum(after, VISIBLE_PSNR)
+    return float(lost.mean()) if len(lost) else 0.0
 
 
 def list_rejected_photos(reports: Iterable[dict]) -> set[str]:
     """Names of the photos that contradicted earlier ones, by their rounds' fit.json."""
-    return {name for report in reports if not report["taken"] for name in report["new_photos"]}
+    return {name for report in reports if not report.get("taken", True) for name in report["new_photos"]}
 
 
-def measure_psnr(field: GaussianField, views: list[TrainingView]) -> list[float | None]:
-    """PSNR of each photo in dB over the pixels that count, after a gain and offset per channel; None without any."""
+def measure_psnr(field: GaussianField, views: list[TrainingView]) -> list[float]:
+    """PSNR of each photo in dB over the pixels that count, after a gain and offset per channel."""
     rasterizer = raster.make_rasterizer()
-    return [_psnr(rasterizer, field, view) if view.weight.any() else None for view in one_by_one(views)]
+    return [_psnr(rasterizer, field, view) for view in one_by_one(views)]
 
 
 def _psnr(rasterizer: raster.Rasterizer, field: GaussianField, view: TrainingView) -> float:
@@ -116,8 +114,3 @@ def _psnr(rasterizer: raster.Rasterizer, field: GaussianField, view: TrainingVie
     level = np.clip(metrics.correct_colours(np.clip(picture, 0, 1), view.image, view.weight), 0, 1)
     found = metrics.psnr(level.astype(np.float32), view.image, view.weight)
     return EQUAL_PSNR if found is None else min(EQUAL_PSNR, float(found))
-
-
-def _mean(values: list[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None

@@ -1,6 +1,6 @@
 """UPDATE_GS of the paper: from a field and new photos to the next field.
 
-`update_field` fits the field on, to all photos so far. `update_from_scratch` fits a new field to them, with as many
+`update_field` fits the field on, to all photos so far. `fit_chosen_photos` fits a new field to them, with as many
 steps as the rounds have together: it depends on the photos alone, not on the rounds that they came in, and keeps
 nothing that a fit to fewer photos got wrong, but it costs a whole fit in each round.
 """
@@ -19,7 +19,7 @@ from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import objects, observation, underlay
-from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, finish_field, fit_coarse_field, read_start_views
+from dav_gswt.reconstruction.coarse import Reconstruction, finish_field, fit_coarse_field, read_start_views
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import FitPlan, FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions, FitResult
@@ -55,11 +55,9 @@ def update_as_preset(
     given: UpdateInput, preset: Mapping[str, Any], files: PhotoFiles, rng: np.random.Generator
 ) -> Reconstruction:
     """The field of a round, as the preset's `update` says: `continue` or `scratch`."""
-    settings = FitSettings.from_preset(preset)
     if preset["update"] == "continue":
-        return update_field(given, settings, rng)
-    start = read_start_views(given.frame, given.earlier + given.new, files.model, files.images, files.whole)
-    return update_from_scratch(given, start, settings, files.start, rng)
+        return update_field(given, FitSettings.from_preset(preset), rng)
+    return fit_chosen_photos(given.earlier + given.new, given.frame, preset, files, rng)
 
 
 def fit_chosen_photos(
@@ -69,7 +67,7 @@ def fit_chosen_photos(
     files: PhotoFiles,
     rng: np.random.Generator,
 ) -> Reconstruction:
-    """The field of photos that another preset's rounds chose: one fit to all of them."""
+    """The field of all photos that rounds chose: one fit to all of them, without a look at what contradicts."""
     start = read_start_views(frame, photos, files.model, files.images, files.whole)
     settings = FitSettings.from_preset(preset).from_scratch(files.start, len(photos))
     return fit_coarse_field(start, settings, rng)
@@ -99,36 +97,6 @@ def update_field(given: UpdateInput, settings: FitSettings, rng: np.random.Gener
     return Reconstruction(*finish_field(kept, start.grid, start.views), report)
 
 
-def update_from_scratch(
-    given: UpdateInput, start: StartViews, settings: FitSettings, first: int, rng: np.random.Generator
-) -> Reconstruction:
-    """Fit a new field to the earlier and the new photos. first: photos of the first fit.
-
-    New photos that contradict the earlier ones change nothing; without new photos the field is returned as it is.
-    A fit from scratch shows earlier photos worse than a fit to them alone did, on rich ground by more than the guard's
-    bound. `update_field` then tells whether photos contradict each other.
-    """
-    field, grid, count = given.field, given.grid, len(given.earlier)
-    if not given.new:
-        return Reconstruction(field, grid, UpdateReport(gaussians=len(field)))
-    photos = start.views
-    anew = settings.from_scratch(first, len(photos))
-    made: list[Reconstruction] = []
-
-    def fit(begin: GaussianField, plan: FitPlan) -> FitResult:
-        made.append(fit_coarse_field(start, anew, rng))
-        return FitResult(made[-1].field, made[-1].report)
-
-    def is_update_accepted() -> bool:
-        report = update_field(given, settings, rng.spawn(1)[0]).report
-        return isinstance(report, UpdateReport) and report.taken
-
-    seen = observation.mask_for_fit(photos, grid)
-    plan = anew.plan_coarse_fit(len(photos))
-    _, report = fit_with_guard(field, field, seen[:count], seen[count:], plan, fit, 0, is_update_accepted)
-    return replace(made[-1], report=report) if report.taken else Reconstruction(field, grid, report)
-
-
 @dataclass(frozen=True)
 class _Start:
     """What the fit of an update starts from. views: all photos, with weights as the fit takes them."""
@@ -142,21 +110,20 @@ class _Start:
 def _prepare_start(given: UpdateInput, settings: FitSettings, rng: np.random.Generator) -> _Start:
     """The field with colours and objects that it lacks; its first Gaussians stay those of the grid."""
     field, grid, frame = given.field, given.grid, given.frame
-    scene = observation.observe(frame, grid, given.earlier + given.new)
+    views, relief = observation.observe(frame, grid, given.earlier + given.new)
     occluders = field[grid.heights.size + underlay.count_gaussians(grid) :]
-    shell = objects.make_shell(scene.relief, scene.views)
-    added = _drop_near(shell, occluders, scene.relief.grid.spacing)
+    added = _drop_near(objects.make_shell(relief, views), occluders, relief.grid.spacing)
     added = observation.thin_at_random(added, settings.max_gaussians - len(field), rng)
     sh = np.zeros((len(added), *field.sh.shape[1:]), np.float32)
     sh[:, :1] = added.sh[:, :1]
     added = replace(added, sh=sh)
     _log.info("objects: %d Gaussians where nothing stood", len(added))
     field, occluders = concatenate_fields([field, added]), concatenate_fields([occluders, added])
-    colour, known = observation.ground_colours(grid, scene.views, occluders)
+    colour, known = observation.ground_colours(grid, views, occluders)
     field = replace(field, sh=_colour_cells(field.sh, (known & ~grid.seen).ravel(), colour))
     grid = replace(grid, seen=known)
-    masked = observation.mask_for_fit(scene.views, grid)
-    return _Start(field, grid, masked, observation.make_constraints(grid, scene.relief, occluders, frame))
+    masked = observation.mask_for_fit(views, grid)
+    return _Start(field, grid, masked, observation.make_constraints(grid, relief, occluders, frame))
 
 
 def _colour_cells(sh: Array, cells: Array, colour: Array) -> Array:

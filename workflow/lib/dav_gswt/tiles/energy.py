@@ -13,7 +13,7 @@ through a shrub would be cheap. W is symmetric in the patches, finite, not negat
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import maxflow
 import numpy as np
@@ -175,8 +175,6 @@ def find_cut(
 ) -> Cut:
     """The cheapest partition of a grid into two patches, exactly (max-flow). All of it may be one patch.
 
-    Only cells that are not forced become nodes.
-
     Args:
         right, upper: costs of parting a cell from its right and its upper neighbour.
         first, second: cells that must show the first and the second patch.
@@ -185,26 +183,22 @@ def find_cut(
     if (first & second).any():
         raise ValueError("a cell is forced to both patches")
     right, upper, unit = _quantize(right, upper)
-    node = np.cumsum(~(first | second)).reshape(first.shape) - 1
-    free = int(node[-1, -1]) + 1
-    node[first], node[second] = -1, -2
-    tails = np.concatenate([node[:, :-1].ravel(), node[:-1].ravel()])
-    heads = np.concatenate([node[:, 1:].ravel(), node[1:].ravel()])
-    costs = np.concatenate([right.ravel(), upper.ravel()])
-    labels = second.copy()
-    if free:
-        graph = maxflow.GraphInt()
-        nodes = graph.add_nodes(free)
-        inner = (tails >= 0) & (heads >= 0) & (costs > 0)
-        graph.add_edges(tails[inner], heads[inner], costs[inner], costs[inner])
-        graph.add_grid_tedges(
-            nodes,
-            _terminal_capacities(-1, tails, heads, costs, free),
-            _terminal_capacities(-2, tails, heads, costs, free),
-        )
-        graph.maxflow()
-        labels[node >= 0] = graph.get_grid_segments(nodes)
+    graph = maxflow.GraphInt()
+    nodes = graph.add_grid_nodes(first.shape)
+    connect_neighbours(graph, nodes, right, upper)
+    forced = int(right.sum() + upper.sum()) + 1  # more than any seam costs
+    graph.add_grid_tedges(nodes, forced * first, forced * second)
+    graph.maxflow()
+    labels = graph.get_grid_segments(nodes)
     return Cut(labels, _sum_costs(labels, right, upper) / unit)
+
+
+def connect_neighbours(graph: Any, nodes: Array, right: Array, upper: Array) -> None:
+    """Edges from each node of a grid to its right and its upper neighbour, both ways."""
+    east, north = np.zeros((3, 3)), np.zeros((3, 3))
+    east[1, 2] = north[2, 1] = 1
+    graph.add_grid_edges(nodes, np.pad(right, ((0, 0), (0, 1))), east, symmetric=True)
+    graph.add_grid_edges(nodes, np.pad(upper, ((0, 1), (0, 0))), north, symmetric=True)
 
 
 def price_cut(right: Float[Array, "h w1"], upper: Float[Array, "h1 w"], labels: Bool[Array, "h w"]) -> Cut:
@@ -224,12 +218,3 @@ def _quantize(right: Array, upper: Array) -> tuple[Array, Array, float]:
 
 def _sum_costs(labels: Array, right: Array, upper: Array) -> int:
     return int(right[labels[:, 1:] != labels[:, :-1]].sum() + upper[labels[1:] != labels[:-1]].sum())
-
-
-def _terminal_capacities(terminal: int, tails: Array, heads: Array, costs: Array, free: int) -> Array:
-    """Capacity from each free node to a terminal: the sum over its neighbours that are forced to it, in quanta."""
-    out = np.zeros(free, np.int64)
-    for here, there in ((tails, heads), (heads, tails)):
-        pick = (here >= 0) & (there == terminal)
-        np.add.at(out, here[pick], costs[pick])
-    return out

@@ -4,7 +4,6 @@ Fitted before the fit, between the photos' colours of the same points, and at ev
 photos get none.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -106,12 +105,7 @@ def _average_cells(
     return mean
 
 
-@dataclass(frozen=True)
-class Sample:
-    """The pixels of a photo that tell its exposure."""
-
-    image: Float32[Array, "r c 3"]
-    weight: Float32[Array, "r c"]
+Sample = tuple[Float32[Array, "r c 3"], Float32[Array, "r c"]]  # pixels of a photo, with their weights
 
 
 def thin(picture: Any, size: int) -> Any:
@@ -122,7 +116,7 @@ def thin(picture: Any, size: int) -> Any:
 
 def sample_photo(image: Float32[Array, "h w 3"], weight: Float32[Array, "h w"]) -> Sample:
     """The pixels of a photo that `thin` leaves."""
-    return Sample(thin(image, weight.size), thin(weight, weight.size))
+    return thin(image, weight.size), thin(weight, weight.size)
 
 
 class ExposureTracker:
@@ -158,7 +152,7 @@ def update_gain_and_offset(
     objects, objects that the field lacks) are ignored. a is held within 1 / MAX_STEP_GAIN .. MAX_STEP_GAIN by a prior
     and by clipping. If no pixel counts they stay unchanged.
     """
-    image, weight = photo.image, photo.weight
+    image, weight = photo
     counts = weight > 0
     if not counts.any():
         return before

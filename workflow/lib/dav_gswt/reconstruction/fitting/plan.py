@@ -1,7 +1,7 @@
 """The plan of a fit: what a preset lets it spend, and what happens at which step."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from dav_gswt.reconstruction import underlay
@@ -15,11 +15,6 @@ PRUNE_AT = 0.8  # of the steps; the rest makes up for what is pruned
 # would undo its detail faster than a round's few steps make it again (docs/active-views.md)
 UPDATE_RATE = 0.3
 GROUND_SHARE = 0.9  # of the Gaussians, that the ground may take with its underlay; objects get the rest
-
-
-def count_first_steps(steps: int, steps_per_photo: int, photos: int) -> int:
-    """Steps of a first fit: `steps` for FEW_PHOTOS photos, and `steps_per_photo` for each photo more."""
-    return steps + steps_per_photo * max(0, photos - FEW_PHOTOS)
 
 
 @dataclass(frozen=True)
@@ -66,7 +61,7 @@ class FitSettings:
 
     def plan_coarse_fit(self, photos: int) -> FitPlan:
         """The plan of the first fit, to so many photos."""
-        steps = count_first_steps(self.steps, self.steps_per_photo, photos)
+        steps = self.steps + self.steps_per_photo * max(0, photos - FEW_PHOTOS)
         return FitPlan(steps, self.max_gaussians, self.sh_degree)
 
     def plan_update(self, earlier: int, new: int) -> FitPlan:
@@ -121,11 +116,7 @@ class Schedule:
 
 @dataclass
 class FitReport:
-    """What a fit did; `to_dict` gives fit.json."""
+    """What a fit did; its fields are those of fit.json."""
 
     steps: int = 0
     gaussians: int = 0
-
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)

@@ -5,7 +5,6 @@ transparency), or the sky where the photo shows it. Each step first fits the pic
 change exposure. The ground's constraints apply to gradients and parameters.
 """
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
@@ -24,8 +23,6 @@ from dav_gswt.reconstruction.fitting.descent import Descent, TrainingState, Trai
 from dav_gswt.reconstruction.fitting.plan import FitPlan, FitReport, Schedule
 from dav_gswt.reconstruction.fitting.state import State
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
-
-_log = logging.getLogger(__name__)
 
 PROJECT_EVERY = 10  # steps: the constraints' projection of the parameters
 MIN_OPACITY = 0.02  # of a free Gaussian at the end of the fit
@@ -77,7 +74,7 @@ def fit_field(
     """
     if not views:
         raise ValueError("a fit needs at least one view")
-    views = _leave_out_blind(views, options.name)
+    views = [view for view in one_by_one(views) if view.weight.any()] or views
     begin = state.from_field(field)
     if begin.sh_degree > plan.sh_degree:
         begin.resize_sh(plan.sh_degree)
@@ -92,15 +89,6 @@ def fit_field(
             options.callback(run.step, run.state)
     descent.pull(run)
     return _finish(run, task)
-
-
-def _leave_out_blind(views: list[TrainingView], what: str) -> list[TrainingView]:
-    """The views with a pixel that counts; all, if none has one."""
-    seeing = [view for view in one_by_one(views) if view.weight.any()]
-    if seeing and len(seeing) < len(views):
-        blind = len(views) - len(seeing)
-        _log.info("%s: %d of %d photos have no pixel that counts and are left out", what, blind, len(views))
-    return seeing or views
 
 
 def _choose_descent(task: TrainingTask) -> Descent:
