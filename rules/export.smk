@@ -10,7 +10,6 @@ rule export_model:
     """All photos that a round's field was made of, with their cameras, as COLMAP has them."""
     input:
         captures=captures_until,
-        fits=fits_until,
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",
         model="<results>/<photos>/sparse",

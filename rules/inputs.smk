@@ -182,16 +182,6 @@ def source_field(wildcards):
     return existing(config["scenes"][wildcards.scene]["field"], f"scenes.{wildcards.scene}.field")
 
 
-def fits_until(wildcards):
-    """The reports of the updates of rounds 1 to t, by the preset that chose their photos."""
-    return [f"{chosen_round(wildcards, t)}/fit.json" for t in range(1, int(wildcards.t) + 1)]
-
-
-def fits_before(wildcards):
-    """The reports of the updates of rounds 1 to t - 1."""
-    return {"fits": fits_until(wildcards)[:-1]}
-
-
 def prior_weights(wildcards):
     """What scoring reads beside the field: the weights of the prior and of LPIPS."""
     if wildcards.prior == "none":
@@ -269,7 +259,6 @@ def story_of_field(wildcards):
         "model": "<results>/<photos>/sparse",
         "frame": "<results>/<photos>/ground.json",
         "captures": captures_until(wildcards),
-        "fits": fits_until(wildcards),
         "metrics": [*metrics_before(wildcards), f"{round_folder(t)}/metrics.json"],
     }
 

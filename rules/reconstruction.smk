@@ -1,7 +1,7 @@
 """Reconstruction: a ground layer and the objects on it, fitted to the photos; refitted in each round of view selection.
 
 In: photos, their model, views.json; of round t the photos captured so far. Out: field.ply (standard 3DGS), ground.exr
-(height, seen or not), fit.json (what the fit chose and why), metrics.json (the test photos, which nothing else sees).
+(height, seen or not), fit.json (its steps and Gaussians), metrics.json (the test photos, which nothing else sees).
 Round t starts from round t - 1, so T is only which round is asked for. With `choose_with` in the preset its rounds are
 another preset's, and fit_chosen_photos fits all of their photos at once.
 """
@@ -69,7 +69,6 @@ rule update_field:
     """Refit the field with the photos of this round, or fit all photos anew; without any it goes on as it is."""
     input:
         unpack(round_before),
-        unpack(fits_before),
         captures=captures_until,
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",
@@ -106,7 +105,6 @@ rule fit_chosen_photos:
     """Fit the field to the photos that another preset's rounds chose, all at once."""
     input:
         captures=captures_until,
-        fits=fits_until,
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",
         model="<results>/<photos>/sparse",

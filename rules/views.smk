@@ -67,7 +67,6 @@ rule select_poses:
     """Choose the k poses that the policy expects most of."""
     input:
         unpack(round_before),
-        unpack(fits_before),
         unpack(pictures_that_tell),
         captures=captures_before,
         views="<results>/<start>/views.json",

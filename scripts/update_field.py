@@ -3,25 +3,24 @@
 import numpy as np
 
 from dav_gswt.field import read_field, write_field
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import write_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
-from dav_gswt.reconstruction import ground, regression_guard, update
+from dav_gswt.reconstruction import ground, update
 
 with logging_to(snakemake.log[0]):
     paths, params, size = snakemake.input, snakemake.params, snakemake.params.preset["size"]
     captures, names = list(paths.captures), list(read_view_split(paths.views).start)
-    aside = regression_guard.list_rejected_photos(map(read_json, paths.fits))
     views = read_training_views(paths.images, paths.model, names, captures, size, params.keep)
     count = len(views) - len(read_capture_record(captures[-1]))
-    known, new = [view for view in views[:count] if view.name not in aside], views[count:]
     rng = np.random.default_rng([params.seed, params.t])
     last = read_field(paths.field), ground.read_ground(paths.ground), read_scene_frame(paths.frame)
     files = update.PhotoFiles(paths.model, paths.images, len(names), params.scene.get("whole", False))
-    updated = update.update_as_preset(update.UpdateInput(*last, known, new), params.preset, files, rng)
+    given = update.UpdateInput(*last, views[:count], views[count:])
+    updated = update.update_as_preset(given, params.preset, files, rng)
     write_field(updated.field, snakemake.output.field)
     ground.write_ground(updated.grid, snakemake.output.ground)
     write_json(snakemake.output.fit, vars(updated.report))

@@ -43,14 +43,10 @@ def folder(known, tmp_path_factory):
     return folder
 
 
-def list_photos(folder, known, left_out=()):
-    captures = [folder / "capture1", folder / "capture2"]
-    return list_taken_photos(folder / "images", known, SPLIT.start, captures, set(left_out))
-
-
 @pytest.fixture(scope="module")
 def taken(folder, known):
-    return list_photos(folder, known)
+    captures = [folder / "capture1", folder / "capture2"]
+    return list_taken_photos(folder / "images", known, SPLIT.start, captures)
 
 
 @pytest.fixture(scope="module")
@@ -104,10 +100,6 @@ def test_what_the_test_photos_see_leaves_no_trace(written, taken, folder, known,
     photo_model.write_photo_models(tmp_path / "other", folder / "images", moved, SPLIT, taken)
     for name in ("sparse/0/points3D.bin", "sparse/0/images.bin"):
         assert digest_files(written / name) == digest_files(tmp_path / "other" / name), name
-
-
-def test_a_photo_that_the_fit_left_out_is_left_out(folder, known):
-    assert [photo.name for photo in list_photos(folder, known, {"002.png"})] == [*SPLIT.start, "iter2_001.png"]
 
 
 def test_a_picture_of_another_size_or_a_name_that_leads_elsewhere_is_named_and_nothing_is_left(

@@ -137,17 +137,3 @@ def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_n
     np.testing.assert_allclose(field.means, crowd, atol=1e-6)
     taken = replace(flat, stands=inner(grid, 0.8, 1.3))
     assert not len(objects.make_isolated_points(grid, taken, points, np.full((7, 3), 0.5), band=1.0))
-
-
-def test_photos_of_ground_that_many_see_are_left_out_and_those_that_alone_see_theirs_are_kept(monkeypatch):
-    monkeypatch.setattr(plane_sweep, "ENOUGH_PHOTOS", 4)
-    shown, grid = photo([1.6, 1.6, 4.0], 24), made.grid(0.1)
-    above = [cameras.pinhole([1.6 + 0.01 * i, 1.6, 4.0], [1.6, 1.6, 0], 24, 24, 50.0) for i in range(12)]
-    from_above = [replace(shown, name=str(i), camera=camera) for i, camera in enumerate(above)]
-    kept = plane_sweep.leave_out_photos(grid, from_above)
-    assert len(kept) == 4
-    assert [view.name for view in kept][::3] == ["0", "11"]  # those farthest apart, in their order
-    monkeypatch.setattr(plane_sweep, "ENOUGH_PHOTOS", 1)
-    low = [cameras.pinhole([x, 1.6, 0.8], [x, 1.6, 0], 24, 24, 30.0) for x in (0.4, 1.2, 2.0, 2.8)]
-    apart = [replace(shown, camera=camera) for camera in low]
-    assert plane_sweep.leave_out_photos(grid, apart) == apart

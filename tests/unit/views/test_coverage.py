@@ -3,7 +3,6 @@
 That is the field's error in the photos so far, or the prior's maps.
 """
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -148,7 +147,7 @@ def files(tmp_path_factory):
     write_pose_maps(tmp_path / "maps.npz", PoseMaps(names, np.zeros((3, 4, 4), np.float32), None, cells), known)
     given = {name: tmp_path / f"{name}.{end}" for name, end in (("field", "ply"), ("ground", "exr"), ("maps", "npz"))}
     given |= {"frame": tmp_path / "ground.json", "images": tmp_path, "model": tmp_path / "sparse"}
-    return given | {"captures": [], "fits": []}
+    return given | {"captures": []}
 
 
 def build(policy, files):
@@ -162,12 +161,9 @@ def test_gains_are_in_the_order_of_the_scores(cells, files):
     assert (build("coverage", files).importance == 1).all()  # without a weight all cells count alike
 
 
-def test_ground_that_is_shown_wrong_matters_more_but_in_rejected_photos(cells, files, tmp_path):
+def test_ground_that_is_shown_wrong_matters_more(cells, files):
     found, east = build("coverage-error", files).importance, cells.middle[:, 0] > 1.6
     assert found[east].mean() > 5 * found[~east].mean() > 0
-    rejected = {"taken": False, "new_photos": list(SPLIT.start)}
-    (tmp_path / "fit.json").write_text(json.dumps(rejected))
-    assert (build("coverage-error", files | {"fits": [tmp_path / "fit.json"]}).importance == 1).all()
 
 
 def test_a_prior_counts_by_the_gaussians_over_a_cell(cells, files):

@@ -1,7 +1,6 @@
 """capture.json: the photos of a round, with the camera that was requested and the one that took each photo."""
 
-import logging
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,8 +12,6 @@ from dav_gswt.geometry.poses import Pose
 
 if TYPE_CHECKING:
     from dav_gswt.photos.colmap_model import ColmapModel  # loads pycolmap
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -81,9 +78,9 @@ class TakenPhoto:
 
 
 def list_taken_photos(
-    images: Path | str, known: "ColmapModel", start: Sequence[str], captures: Sequence, rejected: Collection[str] = ()
+    images: Path | str, known: "ColmapModel", start: Sequence[str], captures: Sequence
 ) -> list[TakenPhoto]:
-    """The start views, then the photos of every capture folder, in their order, without the rejected ones.
+    """The start views, then the photos of every capture folder, in their order.
 
     If a name is in use already, the number of the capture folder is put in front.
     Raises: InputError: see `read_capture_record`, or a start view that the model does not have.
@@ -92,9 +89,6 @@ def list_taken_photos(
     names = set(start)
     for number, folder in enumerate(captures, 1):
         for shot in read_capture_record(folder):
-            if shot.name in rejected:
-                _log.info("%s contradicted the other photos and is left out, as in the fit", shot.name)
-                continue
             name = f"iter{number}_{shot.name}" if shot.name in names else shot.name
             names.add(name)
             photos.append(TakenPhoto(name, Path(folder) / shot.name, shot.camera, number))

@@ -36,9 +36,9 @@ class Story:
 def tell_story(given: Mapping[str, Any]) -> Story | None:
     """The story of a round's field, or None for a finished field, which has no photos.
 
-    Args:   given: `views` (views.json), `images` and `model` of the scene, `frame` (ground.json), `captures` and
-            `fits` (fit.json) of the rounds, `metrics` (metrics.json) of the first fit and of each round, which may
-            be another preset's before the last; without `views`: a finished field.
+    Args:   given: `views` (views.json), `images` and `model` of the scene, `frame` (ground.json), `captures` of
+            the rounds, `metrics` (metrics.json) of the first fit and of each round, which may be another preset's
+            before the last; without `views`: a finished field.
     Raises: InputError: a file is missing or not of its kind.
     """
     if not given.get("views"):
@@ -69,12 +69,10 @@ def tell_story(given: Mapping[str, Any]) -> Story | None:
 
 def list_photos(given: Mapping[str, Any]) -> list[TakenPhoto]:
     """All photos of a round's field in the order they were taken. Raises: as `tell_story`."""
-    from dav_gswt.photos.colmap_model import read_colmap_model  # here, not above: they load pycolmap and PyTorch
-    from dav_gswt.reconstruction.regression_guard import list_rejected_photos
+    from dav_gswt.photos.colmap_model import read_colmap_model  # here, not above: it loads pycolmap
 
     start = read_view_split(given["views"]).start
-    rejected = list_rejected_photos(map(read_json, given["fits"]))
-    return list_taken_photos(given["images"], read_colmap_model(given["model"]), start, given["captures"], rejected)
+    return list_taken_photos(given["images"], read_colmap_model(given["model"]), start, given["captures"])
 
 
 def draw_sheet(smalls: Sequence[Float32[Array, "_ _ 3"]]) -> Float32[Array, "height width 3"]:

@@ -4,12 +4,11 @@ from jaxtyping import Float64
 from numpy import ndarray as Array
 
 from dav_gswt.field import read_field
-from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import ViewSplit
-from dav_gswt.reconstruction import ground, regression_guard
+from dav_gswt.reconstruction import ground
 from dav_gswt.views import pose_maps
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.coverage import ERROR_WIDTH, DirectionalCoverage, GroundCells, measure_cell_errors
@@ -17,7 +16,7 @@ from dav_gswt.views.policies import NEEDS_FIELD, NEEDS_PHOTOS, PRIOR_POLICIES
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import scoring_camera
 
-Files = dict  # of the rule's inputs: a path, or for `captures` and `fits` a list of paths
+Files = dict  # of the rule's inputs: a path, or for `captures` a list of paths
 
 
 def build_information_gain(
@@ -25,8 +24,8 @@ def build_information_gain(
 ) -> DirectionalCoverage | None:
     """Build the information gain for policies that need the field; None for others.
 
-    taken: cameras of the photos so far. files: `field`, `ground`, `maps` and `frame`; `images`, `model`, `captures` and
-    `fits` for policies that need photos. Candidates are in the order of the scores.
+    taken: cameras of the photos so far. files: `field`, `ground`, `maps` and `frame`; `images`, `model` and
+    `captures` for policies that need photos. Candidates are in the order of the scores.
     """
     if policy not in NEEDS_FIELD:
         return None
@@ -42,11 +41,10 @@ def _measure_importance(
     policy: str, cells: GroundCells, split: ViewSplit, files: Files
 ) -> Float64[Array, "cells"] | None:
     """How much each cell of the ground matters to a policy; None: all alike."""
-    if policy in NEEDS_PHOTOS:  # the photos so far, but for those that an update rejected
+    if policy in NEEDS_PHOTOS:
         views = read_training_views(files["images"], files["model"], split.start, list(files["captures"]), ERROR_WIDTH)
-        aside = regression_guard.list_rejected_photos(map(read_json, files["fits"]))
         corrected = read_scene_frame(files["frame"]).kind == "photos"  # photos differ in exposure
-        return measure_cell_errors(cells, [view for view in views if view.name not in aside], corrected)
+        return measure_cell_errors(cells, views, corrected)
     if policy in PRIOR_POLICIES:
         gaussians = pose_maps.read_pose_maps(files["maps"])[1]
         return cells.average(pose_maps.apply_uncertainty(cells.field, gaussians).uncertainty)
