@@ -70,7 +70,7 @@ def test_what_floats_far_above_a_material_is_left_out():
     low = np.concatenate([rng.uniform(1, 11, (400, 2)), rng.uniform(0.1, 0.4, (400, 1))], 1)
     crown = np.concatenate([rng.uniform(3, 4, (40, 2)), rng.uniform(3, 4, (40, 1))], 1)
     blobs = make_blobs(np.concatenate([low, crown]), np.full((440, 3), 0.3), np.full(440, 0.05))
-    maps, sources = build.measure_ground(field, grid), CellSources.identity(made.CELLS)
+    maps, sources = build.measure_ground(field, grid), CellSources(*np.mgrid[: made.CELLS, : made.CELLS])
     whole = np.ones((made.CELLS, made.CELLS), bool)
     kept, _ = extraction.extract_exemplar(concatenate_fields([field, blobs]), grid, maps, sources, whole)
     assert (kept.means[:, 2] > 0.05).sum() == 400
@@ -80,7 +80,7 @@ def test_what_floats_far_above_a_material_is_left_out():
 def test_copied_ground_follows_the_slope():
     field, grid = made.field(mixed=False, shrubs=False, slope=0.3), made.grid(0.3)
     maps = build.measure_ground(field, grid)
-    own, sources = np.ones((made.CELLS, made.CELLS), bool), CellSources.identity(made.CELLS)
+    own, sources = np.ones((made.CELLS, made.CELLS), bool), CellSources(*np.mgrid[: made.CELLS, : made.CELLS])
     own[40:60, 90:110] = False
     sources = CellSources(sources.rows, np.where(own, sources.columns, sources.columns - 60))
     made_field, made_grid = extraction.extract_exemplar(field, grid, maps, sources, own)

@@ -163,10 +163,9 @@ def _report(
     objects: list[ExtractedObject],
 ) -> FoundMaterials:
     """What was found, with a verdict on all of it, which is logged."""
-    strips = max(int(classes.kinds.max()) + 1 - classes.number, 0)
     verdicts = {each.info.name: each.verdict for each in materials}
     shares = {each.info.name: each.info.share for each in materials}
-    judged = judge_set(verdicts, shares, float(classes.excluded.mean()), strips)
+    judged = judge_set(verdicts, shares, float(classes.excluded.mean()))
     for name, each in verdicts.items():
         _log.info("%s: %s: %s", name, each.grade, each.reason)
     _log.info("%d objects; %s: %s", len(objects), judged.grade, judged.reason)
@@ -303,23 +302,18 @@ def judge_material(name: str, areas: float, filled: float) -> MaterialVerdict:
     return MaterialVerdict("no", f"{seen}{made}: repeats will be seen; {more}, or leave it out")
 
 
-def judge_set(
-    verdicts: dict[str, MaterialVerdict], shares: dict[str, float], excluded: float, strips: int
-) -> MaterialVerdict:
+def judge_set(verdicts: dict[str, MaterialVerdict], shares: dict[str, float], excluded: float) -> MaterialVerdict:
     """The verdict on all: that on the material that covers most. Materials of which there is too little are named.
 
     Args:
         verdicts, shares: by the materials' names.
-        excluded: share of ground that is shown nowhere.
-        strips: number of paths, roads and the like in it.
+        excluded: share of ground that is shown nowhere, paths and roads among it.
     """
     grade = verdicts[max(shares, key=lambda name: shares[name])].grade
     if excluded > 0.5 and grade == "good":
         reason = f"{excluded:.0%} of the ground is shade, rare or cut off, and shown nowhere"
         return MaterialVerdict("marginal", reason)
-    several = "a path, road or the like" if strips == 1 else f"{strips} paths, roads or the like"
-    crossing = f", {several} among it" if strips else ""
     many = "1 material" if len(verdicts) == 1 else f"{len(verdicts)} materials"
     scarce = [name for name, verdict in verdicts.items() if verdict.grade == "no"]
     lacking = f"; of {' and '.join(scarce)} there is too little" if scarce else ""
-    return MaterialVerdict(grade, f"{many}, {excluded:.0%} of the ground is shown nowhere{crossing}{lacking}")
+    return MaterialVerdict(grade, f"{many}, {excluded:.0%} of the ground is shown nowhere{lacking}")

@@ -167,7 +167,7 @@ def _find_outstanding(maps: GroundMaps, around: Surroundings) -> Bool[Array, "m 
         if number not in around.rough:
             found |= objects.find_outliers(around.features, maps, own & around.ground)
         things = things & ~own | found
-        if objects.is_dense(found & around.ground, own):
+        if (found & around.ground)[own].mean() > objects.DENSE:  # then they are its texture
             things = things & ~(own & around.ground)
     return things
 

@@ -10,7 +10,7 @@ from scipy.ndimage import binary_dilation, distance_transform_edt, gaussian_filt
 from dav_gswt.field import SH0, GaussianField, concatenate_fields
 from dav_gswt.materials.filling import CellSources
 from dav_gswt.materials.maps import GroundMaps
-from dav_gswt.materials.objects import Footprint
+from dav_gswt.materials.objects import Footprint, measure_size
 from dav_gswt.reconstruction import underlay
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import compose
@@ -93,7 +93,7 @@ def extract_object(
     Positions count from the middle of the footprint, on the plane of the ground around it. standing: `bin_standing`.
     """
     m, spacing = maps.cells, grid.spacing
-    width = max(3, round(SKIRT * max(footprint.size)))
+    width = max(3, round(SKIRT * measure_size(footprint.cells)))
     ring = binary_dilation(footprint.cells, iterations=width) & ~footprint.cells
     share = np.clip(1 - distance_transform_edt(~footprint.cells) / (width + 1), 0, 1)
     rows, columns = np.nonzero(footprint.cells)

@@ -30,11 +30,6 @@ class CellSources:
     rows: Int[Array, "m m"]
     columns: Int[Array, "m m"]
 
-    @classmethod
-    def identity(cls, cells: int) -> "CellSources":
-        rows, columns = np.mgrid[:cells, :cells]
-        return cls(rows, columns)
-
     @property
     def copied(self) -> Bool[Array, "m m"]:
         """Cells that show another one."""

@@ -5,6 +5,7 @@ Shade is neither: it may be other ground in less light.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -15,7 +16,6 @@ from scipy.ndimage import (
     binary_fill_holes,
     binary_opening,
     distance_transform_edt,
-    find_objects,
     gaussian_filter,
     label,
 )
@@ -57,12 +57,6 @@ class Footprint:
 
     cells: Bool[Array, "m m"]
     material: int
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Height and width of the bounding box, in cells."""
-        rows, columns = find_objects(self.cells.astype(int))[0]
-        return rows.stop - rows.start, columns.stop - columns.start
 
 
 def find_outliers(features: Float[Array, "m m k"], maps: GroundMaps, ground: Bool[Array, "m m"]) -> Bool[Array, "m m"]:
@@ -115,13 +109,13 @@ def find_footprints(
     """
     least = SMALLEST_STANDING * len(candidates)
     footprints, excluded = [], ~around.known
-    tall, flat = _join_rims([own for own in standing if _measure_size(own) >= least], candidates)
-    small = [own for own in flat if _measure_size(own) < least]
+    tall, flat = _join_rims([own for own in standing if measure_size(own) >= least], candidates)
+    small = [own for own in flat if measure_size(own) < least]
     for number, own in enumerate([*tall, *flat]):
         material = around.material_of(own)
         rough, stands = material in around.rough, number < len(tall)
         piece = not stands and around.pieces[own].mean() >= OTHER
-        if not stands and _measure_size(own) < (least if rough else SMALLEST * len(candidates)):
+        if not stands and measure_size(own) < (least if rough else SMALLEST * len(candidates)):
             continue
         many = rough and not stands and not piece and _is_one_of_many(own, material, small, around)
         if many or (rough and not piece and _is_texture(own, material, around)):
@@ -192,7 +186,7 @@ def split_things(cells: Bool[Array, "m m"]) -> list[Bool[Array, "m m"]]:
         own = pieces == k
         inner = gaussian_filter(distance_transform_edt(own), 1.0) * own
         peaks = peak_local_max(inner, min_distance=apart, labels=own.astype(int), exclude_border=False)
-        if len(peaks) < 2 or _measure_solidity(own) >= SPLIT_SOLIDITY:
+        if len(peaks) < 2 or _describe(own).solidity >= SPLIT_SOLIDITY:
             things.append(own)
             continue
         marks = np.zeros(own.shape, int)
@@ -240,26 +234,25 @@ def _is_texture(own: Bool[Array, "m m"], material: int, around: Surroundings) ->
     return bool((np.linalg.norm(colours - typical, axis=1) < NEAR * difference).mean() > COMMON)
 
 
-def _measure_size(cells: Bool[Array, "m m"]) -> int:
+def measure_size(cells: Bool[Array, "m m"]) -> int:
     """The longer side of the bounding box."""
-    return max(part.stop - part.start for part in find_objects(cells.astype(int))[0])
+    return max(_describe(cells).image.shape)
 
 
-def _measure_solidity(own: Bool[Array, "m m"]) -> float:
-    """Share of its convex hull that a thing fills."""
+def _describe(own: Bool[Array, "m m"]) -> Any:
+    """Box, area and solidity (share of the convex hull) of a thing."""
     from skimage.measure import regionprops  # here, not above: it takes half a second to load
 
-    return float(regionprops(own[find_objects(own.astype(int))[0]].astype(int))[0].solidity)
+    return regionprops(own.astype(np.uint8))[0]
 
 
 def _is_compact(own: Bool[Array, "m m"]) -> bool:
     """Whether a thing is whole, compact and not too large."""
-    m, box = len(own), find_objects(own.astype(int))[0]
-    sides = sorted(part.stop - part.start for part in box)
-    whole = min(part.start for part in box) >= BORDER and max(part.stop for part in box) <= m - BORDER
-    compact = sides[1] <= MAX_STRETCH * sides[0] and own.sum() >= MIN_FILL * sides[0] * sides[1]
-    solid = compact and _measure_solidity(own) >= MIN_SOLIDITY
-    return bool(whole and solid and sides[1] <= LARGEST * m)
+    m, thing = len(own), _describe(own)
+    short, long = sorted(thing.image.shape)
+    whole = min(thing.bbox) >= BORDER and max(thing.bbox) <= m - BORDER
+    compact = long <= MAX_STRETCH * short and thing.extent >= MIN_FILL and thing.solidity >= MIN_SOLIDITY
+    return bool(whole and compact and long <= LARGEST * m)
 
 
 def _clean(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"]:
@@ -270,11 +263,6 @@ def _clean(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"]:
     np.maximum.at(widest, holes.ravel(), 2 * distance_transform_edt(~whole).ravel())
     widest[0] = np.inf  # what is no hole
     return whole | (widest <= LARGEST * len(cells))[holes]
-
-
-def is_dense(things: Bool[Array, "m m"], ground: Bool[Array, "m m"]) -> bool:
-    """Whether so much of a material is covered that the things are its texture."""
-    return bool(ground.any() and things[ground].mean() > DENSE)
 
 
 def linear_light(colour: Float[Array, "n 3"]) -> Float[Array, "3"]:

@@ -76,22 +76,18 @@ def find_blobs(around: Surroundings) -> list[Blob]:
     m, found = len(around.rise), []
     for diameter in (share * m for share in DIAMETERS):
         up = _respond(around.rise, diameter)
-        colour = np.linalg.norm(
-            np.stack([_respond(layer, diameter) for layer in np.moveaxis(around.features, -1, 0)], -1), axis=-1
-        )
         up = _compare(up, around, LEAST_RISE)
-        colour = _compare(colour, around, LEAST_COLOUR)
+        colour = _compare(np.linalg.norm(_respond(around.features, diameter), axis=-1), around, LEAST_COLOUR)
         score = np.minimum(up, colour / COLOUR_SHARE)
         peaks = (score > 1) & (score == maximum_filter(score, size=max(3, int(diameter / 2))))
         found += [Blob(int(y), int(x), diameter, float(score[y, x])) for y, x in np.argwhere(peaks)]
     return sorted(found, key=lambda blob: -blob.score)
 
 
-def _respond(values: Float[Array, "m m"], diameter: float) -> Float[Array, "m m"]:
+def _respond(values: Float[Array, "m m *k"], diameter: float) -> Float[Array, "m m *k"]:
     """Mean over a blob's middle less that around it."""
-    return gaussian_filter(values, diameter / 4, mode="nearest") - gaussian_filter(
-        values, diameter / 1.5, mode="nearest"
-    )
+    middle, around = (gaussian_filter(values, diameter / n, mode="nearest", axes=(0, 1)) for n in (4, 1.5))
+    return middle - around
 
 
 def _compare(contrast: Float[Array, "m m"], around: Surroundings, least: float) -> Float[Array, "m m"]:

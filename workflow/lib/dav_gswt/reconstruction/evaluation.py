@@ -1,6 +1,5 @@
 """Evaluation of a field on the test photos, which no other step uses."""
 
-import logging
 from collections.abc import Mapping, Sequence
 from math import ceil
 
@@ -13,8 +12,6 @@ from dav_gswt.images import metrics
 from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
-
-_log = logging.getLogger(__name__)
 
 MEASURES = ("psnr", "psnr_colour_corrected", "ssim", "lpips")
 WORST = 0.1  # of the views, at least one
@@ -29,14 +26,9 @@ def evaluate_field(
     """Mean PSNR (raw, colour-corrected), SSIM and LPIPS over the test views, over the pixels that look at the ground.
 
     groups: names of views that are also averaged by themselves (low, oblique). weights: of LPIPS; without them it is
-    null, with a log message. `worst_decile`: the mean of the worst tenth.
+    null. `worst_decile`: the mean of the worst tenth.
     A value is null without test views, and PSNR is where pictures are equal.
     """
-    if weights is None:
-        _log.info(
-            "the config's `lpips` is none: metrics lack LPIPS; set it to `installed` or to a path "
-            "(docs/reference/config.md)"
-        )
     rows = [_evaluate_view(field, view, weights) for view in tests if view.weight.any()]
     named = {row["view"]: row for row in rows}
     parts = {group: [named[name] for name in names if name in named] for group, names in (groups or {}).items()}

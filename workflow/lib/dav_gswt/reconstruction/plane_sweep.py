@@ -39,13 +39,12 @@ OBJECT_STEPS = 2.0  # steps above the surface, beyond which a height belongs to 
 class Relief:
     """The result of the sweep, on a grid coarser than the ground's.
 
-    above: height over the surface. stands: whether an object is there. known: whether at least two photos look there.
+    above: height over the surface. stands: whether an object is there.
     """
 
     grid: Ground
     above: Float[Array, "rows columns"]
     stands: Bool[Array, "rows columns"]
-    known: Bool[Array, "rows columns"]
     step: float
 
     def onto(self, grid: Ground, values: Float[Array, "rows columns"]) -> Float[Array, "r c"]:
@@ -71,7 +70,7 @@ def sweep_heights(grid: Ground, views: list[TrainingView], flying_height: float,
     above = np.where(known, _refine_heights(summed, best, heights), 0)
     stands = reject_columns(sure & (above > OBJECT_STEPS * step), above, coarse.spacing)
     near = np.abs(above) <= OBJECT_STEPS * step
-    return Relief(coarse, np.where(stands | near, above, 0), stands, known, step)
+    return Relief(coarse, np.where(stands | near, above, 0), stands, step)
 
 
 def reject_columns(

@@ -90,11 +90,11 @@ def update_field(given: UpdateInput, settings: FitSettings, rng: np.random.Gener
     field, grid, new = given.field, given.grid, given.new
     if not new:
         return Reconstruction(field, grid, FitReport(gaussians=len(field)))
-    start = _prepare_start(given, settings, rng)
+    begin, grid, views, constraints = _prepare_start(given, settings, rng)
     plan, options = settings.plan_update(len(given.earlier), len(new)), FitOptions(f"fit {len(new)} new photos")
-    fit = trainer.fit_field(start.field, start.views, plan, start.constraints, rng, options)
+    fit = trainer.fit_field(begin, views, plan, constraints, rng, options)
     _warn_of_contradiction(given, fit.field)
-    return Reconstruction(*finish_field(fit.field, start.grid, start.views), fit.report)
+    return Reconstruction(*finish_field(fit.field, grid, views), fit.report)
 
 
 def _warn_of_contradiction(given: UpdateInput, after: GaussianField) -> None:
@@ -130,18 +130,11 @@ def _measure_psnr(field: GaussianField, view: TrainingView) -> float:
     return VISIBLE_PSNR if found is None else min(VISIBLE_PSNR, found)
 
 
-@dataclass(frozen=True)
-class _Start:
-    """What the fit of an update starts from. views: all photos, with weights as the fit takes them."""
-
-    field: GaussianField
-    grid: Ground
-    views: list[TrainingView]
-    constraints: GroundConstraints
-
-
-def _prepare_start(given: UpdateInput, settings: FitSettings, rng: np.random.Generator) -> _Start:
-    """The field with colours and objects that it lacks; its first Gaussians stay those of the grid."""
+def _prepare_start(
+    given: UpdateInput, settings: FitSettings, rng: np.random.Generator
+) -> tuple[GaussianField, Ground, list[TrainingView], GroundConstraints]:
+    """The field with colours and objects that it lacks, its grid, all photos with weights as the fit takes them, and
+    the constraints; the field's first Gaussians stay those of the grid."""
     field, grid, frame = given.field, given.grid, given.frame
     views, relief = observation.observe(frame, grid, given.earlier + given.new)
     occluders = field[grid.heights.size + underlay.count_gaussians(grid) :]
@@ -156,7 +149,7 @@ def _prepare_start(given: UpdateInput, settings: FitSettings, rng: np.random.Gen
     field = replace(field, sh=_colour_cells(field.sh, (known & ~grid.seen).ravel(), colour))
     grid = replace(grid, seen=known)
     masked = observation.mask_for_fit(views, grid)
-    return _Start(field, grid, masked, observation.make_constraints(grid, relief, occluders, frame))
+    return field, grid, masked, observation.make_constraints(grid, relief, occluders, frame)
 
 
 def _colour_cells(sh: Array, cells: Array, colour: Array) -> Array:

@@ -40,8 +40,6 @@ class TilingOptions:
         levels: of the tiles, a number or AUTO; None: as many as are given.
         corrected: steps across seams are spread out (`poisson_blending`).
         relabel: see `search.SearchProblem`.
-
-    Raises: ValueError: an unknown kind.
     """
 
     share: float | str = 0.5
@@ -56,10 +54,6 @@ class TilingOptions:
     levels: int | str | None = None
     corrected: bool = True
     relabel: search.Relabel | None = None
-
-    def __post_init__(self) -> None:
-        if self.kind not in energy.KINDS:
-            raise ValueError(f"{self.kind!r} is no energy of seams: {', '.join(energy.KINDS)}")
 
     @classmethod
     def from_config(
@@ -180,9 +174,6 @@ def cut_tiles(
     Raises: InputError: the exemplar is too small for a tile, a level has no Gaussian in it, or nothing is known of any
         cell.
     """
-    shape = (exemplar.cells, exemplar.cells)
-    if colour.shape[:2] != shape or uncertainty.shape != shape:
-        raise ValueError(f"maps of {colour.shape[:2]} and {uncertainty.shape} cells for an exemplar of {shape}")
     filled, uncertainty = _fill_holes(colour, uncertainty)
     scale = texture.measure_texture_scale(filled)
     plan = _plan_layout(options, scale, exemplar, len(levels))

@@ -5,7 +5,6 @@ weights of LPIPS, the mean of AlexNet's features. Two cells are as far apart as 
 segments are only names: other numbers for the same segments change nothing.
 """
 
-import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,8 +17,6 @@ from scipy.spatial.distance import pdist, squareform
 from dav_gswt.images import lpips_weights
 from dav_gswt.threads import one_thread
 from dav_gswt.tiles.energy import Cells, LayerScales, make_scales, safe_unit
-
-_log = logging.getLogger(__name__)
 
 SUPERPIXELS = 2000  # superpixels of an exemplar: their distances are a table
 MIN_WIDTH = 6.0  # cells
@@ -62,11 +59,6 @@ def make_semantic_layer(colour: Float[Array, "m m 3"], source: SemanticSource) -
         with one_thread():
             masks = sam2.predict_masks(sam2.load_model(source.sam2), colour)
         segments = overlay_masks(segments, masks)
-    if source.alexnet is None:
-        _log.info(
-            "the config's `lpips` is none: cuts know colours and superpixels only; set it to `installed` or to a path "
-            "(docs/reference/config.md)"
-        )
     return describe_segments(segments, colour, source.alexnet)
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Bool, Float32
+from kornia.filters import gaussian_blur2d
 from torch import Tensor
-from torch.nn import functional
 
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import cuda
@@ -131,8 +131,5 @@ class DeviceDescent(Descent):
 
 def smooth(values: Float32[Tensor, "rows columns"], cells: float) -> Float32[Tensor, "rows columns"]:
     """As `ground.smooth`: Gaussian blur over the grid; borders repeat."""
-    reach = int(4 * cells + 0.5)  # as SciPy's
-    taps = torch.exp(-0.5 * (torch.arange(-reach, reach + 1, device=values.device) / cells) ** 2)
-    taps = taps / taps.sum()
-    image = functional.pad(values[None, None], (reach,) * 4, mode="replicate")
-    return functional.conv2d(functional.conv2d(image, taps.reshape(1, 1, -1, 1)), taps.reshape(1, 1, 1, -1))[0, 0]
+    width = 2 * int(4 * cells + 0.5) + 1  # as SciPy's
+    return gaussian_blur2d(values[None, None], (width, width), (cells, cells), "replicate")[0, 0]

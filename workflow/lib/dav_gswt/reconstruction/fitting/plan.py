@@ -37,7 +37,7 @@ class FitSettings:
 
     size: longer side of the photos, pixels. spacing: of the discs, in sizes of a photo's pixel on the ground. steps: of
     the first fit. steps_per_photo: of the first fit for each photo beyond FEW_PHOTOS, and of an update for each
-    new photo. first_rate: of an update; not a key of presets.
+    new photo.
     """
 
     size: int
@@ -46,13 +46,11 @@ class FitSettings:
     steps: int
     steps_per_photo: int = 0
     sh_degree: int = 0
-    first_rate: float = UPDATE_RATE
 
     @staticmethod
     def from_preset(preset: Mapping[str, Any]) -> "FitSettings":
         """The settings of a preset, which may have keys for other stages."""
-        names = [each.name for each in fields(FitSettings) if each.name != "first_rate"]
-        return FitSettings(**{name: preset[name] for name in names if name in preset})
+        return FitSettings(**{each.name: preset[each.name] for each in fields(FitSettings) if each.name in preset})
 
     def from_scratch(self, start: int, photos: int) -> "FitSettings":
         """The settings of one fit with as many steps as a fit to `start` photos and updates to `photos` take."""
@@ -66,7 +64,7 @@ class FitSettings:
 
     def plan_update(self, earlier: int, new: int) -> FitPlan:
         """The plan of an update of a field from so many earlier photos with so many new ones."""
-        first_rate = self.first_rate if earlier else 1.0
+        first_rate = UPDATE_RATE if earlier else 1.0
         return FitPlan(self.steps_per_photo * new, self.max_gaussians, self.sh_degree, first_rate)
 
 
