@@ -28,7 +28,7 @@ def patches(*values):
     """Colours of an exemplar that shows patches side by side, gradients of each for itself; and where they lie."""
     h, w = values[0].shape[:2]
     slope = np.concatenate([energy.compute_gradients(v) for v in values], 1)
-    layer = ColourLayer(np.concatenate(values, 1), slope, UNIT)
+    layer = ColourLayer(slope, UNIT, np.concatenate(values, 1))
     return layer, [where(i * w, 0, h, w) for i in range(len(values))]
 
 
@@ -53,8 +53,8 @@ def test_a_gradient_across_an_edge_makes_only_that_edge_cheaper():
 def test_both_terms_are_weighed_above_and_below():
     nothing, (a, b) = patches(np.zeros((2, 2, 1)), np.zeros((2, 2, 1)))
     step = np.array([0.0, 0, 1, 1])[None, :, None]
-    one = ColourLayer(nothing.values + step, np.full((2, 4, 2), 0.5), LayerScales(2.0, 4.0))
-    other = ColourLayer(nothing.values + 3 * step, np.full((2, 4, 2), 1.0), LayerScales(3.0, 2.0))
+    one = ColourLayer(np.full((2, 4, 2), 0.5), LayerScales(2.0, 4.0), nothing.values + step)
+    other = ColourLayer(np.full((2, 4, 2), 1.0), LayerScales(3.0, 2.0), nothing.values + 3 * step)
     # D = 2 / 2 and 6 / 3, G = 4 * 0.5 / 4 and 4 * 1 / 2
     for cost in energy.compute_edge_costs([(0.25, one), (0.75, other)], a, b):
         np.testing.assert_allclose(cost, (0.25 * 1 + 0.75 * 2) / (0.25 * 0.5 + 0.75 * 2 + energy.EPS), rtol=1e-12)
@@ -129,7 +129,7 @@ def test_a_straight_seam_costs_what_it_crosses_and_no_less_than_the_cut():
     right, upper = rng.random((5, 5)), rng.random((4, 6))
     half = np.arange(6) >= 3
     labels = np.broadcast_to(half, (5, 6))
-    straight = energy.price_cut(right, upper, labels)
+    straight = energy.find_cut(right, upper, ~labels, labels)
     assert straight.energy == pytest.approx(right[:, 2].sum(), abs=5 * 2.0**-32)
     first, second = np.zeros((5, 6), bool), np.zeros((5, 6), bool)
     first[:, 0], second[:, -1] = True, True
@@ -141,8 +141,6 @@ def test_costs_that_mean_nothing_and_cells_forced_both_ways_are_refused(bad):
     costs, none, every = (np.array([[bad]]), np.zeros((0, 2))), np.zeros((1, 2), bool), np.ones((2, 2), bool)
     with pytest.raises(ValueError, match="finite"):
         energy.find_cut(*costs, none, none)
-    with pytest.raises(ValueError, match="finite"):
-        energy.price_cut(*costs, none)
     with pytest.raises(ValueError, match="both"):
         energy.find_cut(np.ones((2, 1)), np.ones((1, 2)), every, every)
 

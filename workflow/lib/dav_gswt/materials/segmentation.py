@@ -40,23 +40,13 @@ UNLIKELY = 20.0  # largest cost of a label
 
 @dataclass(frozen=True)
 class Difference:
-    """How unlike two classes are. grain: difference of their contrasts. cost: Ward's, of merging them."""
+    """How unlike two classes are. cost: Ward's, of merging them."""
 
     first: int
     second: int
-    distance: float
-    grain: float
-    separation: float
-    sharpness: float
+    is_small: bool
+    is_gradual: bool
     cost: float
-
-    @property
-    def is_small(self) -> bool:
-        return self.distance < (LEAST_DIFFERENCE if self.grain < OTHER_GRAIN else LEAST_WITH_GRAIN)
-
-    @property
-    def is_gradual(self) -> bool:
-        return self.separation < LEAST_SEPARATION or self.sharpness < LEAST_SHARPNESS
 
 
 Segmentation = tuple[Int[Array, "m m"], list[Bool[Array, "m m"]]]
@@ -144,7 +134,9 @@ def compare_classes(features: Float[Array, "m m k"], labels: Int[Array, "m m"], 
     share = one.mean() * two.mean() / (one.mean() + two.mean())
     sharpness = _measure_border(along, one, two) / max(distance, 1e-12)
     grain, separation = float(abs(step[-1]) / WEIGHTS[-1]), distance / max(spread, 1e-12)
-    return Difference(first, second, distance, grain, separation, sharpness, distance**2 * share)
+    is_small = distance < (LEAST_DIFFERENCE if grain < OTHER_GRAIN else LEAST_WITH_GRAIN)
+    is_gradual = separation < LEAST_SEPARATION or sharpness < LEAST_SHARPNESS
+    return Difference(first, second, is_small, is_gradual, distance**2 * share)
 
 
 def _measure_border(along: Float[Array, "m m"], one: Array, two: Array) -> float:

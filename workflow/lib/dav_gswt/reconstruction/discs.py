@@ -48,8 +48,6 @@ def fill_unknown(colours: Float[Array, "n 3"], known: Bool[Array, "rows columns"
     image = np.where(known[..., None], colours.reshape(*known.shape, 3), 0)
     if not known.any():
         return np.full((known.size, 3), 0.5, np.float32)
-    if known.all():
-        return image.reshape(-1, 3).astype(np.float32)
     nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
     spread = image[tuple(nearest)]
     soft = np.stack([gaussian_filter(spread[..., c], 3.0, mode="nearest") for c in range(3)], -1)

@@ -21,7 +21,7 @@ from dav_gswt.reconstruction.plane_sweep import Relief, sweep_heights
 _log = logging.getLogger(__name__)
 
 MIN_CEILING = 0.05  # flying heights above the surface that objects may reach though the sweep saw none
-EXPOSURE_POINTS = 20_000  # ground points, at most, that photos' exposures are compared at
+EXPOSURE_POINTS = 20_000  # ground points, at about most, evenly, that photos' exposures are compared at
 MIN_PHOTOS = 4  # that see a point, to tell a moving object (a kite's line, a shadow, a person) in one of them
 MAX_DEVIATIONS = 6.0  # median deviations from the median
 MIN_DIFFERENCE = 0.12  # of the range of colours
@@ -39,7 +39,8 @@ def observe(frame: SceneFrame, grid: Ground, views: list[TrainingView]) -> tuple
     Returns: the photos at one exposure, without moving objects; what rises above the ground.
     """
     if frame.kind == "photos":
-        views = exposure.equalize_exposure(views, thin_places(grid.centres))
+        places = grid.centres
+        views = exposure.equalize_exposure(views, places[:: max(1, len(places) // EXPOSURE_POINTS)])
     relief = sweep_heights(grid, views, frame.flying_height, pixel_size(frame, views))
     if frame.kind == "photos":
         open_ground = ~(relief.onto(grid, relief.stands.astype(float)) > 0.1)
@@ -83,11 +84,6 @@ def find_disagreeing(seen: Float[Array, "v n 3"]) -> Bool[Array, "v n"]:
     spread = nan_median(apart[..., None])[:, 0]
     with np.errstate(invalid="ignore"):
         return (count >= MIN_PHOTOS) & (apart > np.maximum(MAX_DEVIATIONS * spread, MIN_DIFFERENCE))
-
-
-def thin_places(places: Float[Array, "n 3"]) -> Float[Array, "m 3"]:
-    """Some EXPOSURE_POINTS of the places at most, evenly, which exposures are compared at."""
-    return places[:: max(1, len(places) // EXPOSURE_POINTS)]
 
 
 def ground_colours(

@@ -11,9 +11,10 @@ ground is certain. Cells hidden by occluders (`make_occluder_layer`) have a D of
 through a shrub would be cheap. W is symmetric in the patches, finite, not negative, and 0 where they are equal.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import maxflow
 import numpy as np
@@ -39,26 +40,22 @@ class LayerScales:
     gradient: float
 
 
-@runtime_checkable
-class CostLayer(Protocol):
+@dataclass(frozen=True)
+class CostLayer(ABC):
     """A description of an exemplar: distances between cells, the gradient along x and y in each, and their scales."""
 
-    @property
-    def slope(self) -> Float[Array, "h w 2"]: ...
+    slope: Float[Array, "h w 2"]
+    unit: LayerScales
 
-    @property
-    def unit(self) -> LayerScales: ...
-
+    @abstractmethod
     def distances(self, first: Cells, second: Cells) -> Float[Array, "..."]: ...
 
 
 @dataclass(frozen=True)
-class ColourLayer:
-    """Colours of the exemplar's cells, and their gradients; cells are as far apart as their colours (2-norm)."""
+class ColourLayer(CostLayer):
+    """Colours of the exemplar's cells; cells are as far apart as their colours (2-norm)."""
 
     values: Float[Array, "h w c"]
-    slope: Float[Array, "h w 2"]
-    unit: LayerScales
 
     def distances(self, first: Cells, second: Cells) -> Float[Array, "..."]:
         return np.linalg.norm(self.values[first] - self.values[second], axis=-1)
@@ -68,14 +65,14 @@ def make_colour_layer(values: Float[Array, "h w c"]) -> ColourLayer:
     """The layer of colours. Their scale of difference is the root mean square of D between two random places."""
     slope = compute_gradients(values)
     spread = float(np.sqrt(2 * values.reshape(-1, values.shape[-1]).var(0).sum()))
-    return ColourLayer(values, slope, make_scales(spread, slope))
+    return ColourLayer(slope, make_scales(spread, slope), values)
 
 
 def make_occluder_layer(cover: Float[Array, "h w"]) -> ColourLayer | None:
     """Share of each cell that occluders hide, in [0, 1], as a layer without gradient; None where nothing is hidden."""
     if not cover.any():
         return None
-    return ColourLayer(cover[..., None], np.zeros((*cover.shape, 2)), LayerScales(1.0, 1.0))
+    return ColourLayer(np.zeros((*cover.shape, 2)), LayerScales(1.0, 1.0), cover[..., None])
 
 
 def compute_gradients(values: Float[Array, "h w c"]) -> Float[Array, "h w 2"]:
@@ -182,7 +179,11 @@ def find_cut(
     """
     if (first & second).any():
         raise ValueError("a cell is forced to both patches")
-    right, upper, unit = _quantize(right, upper)
+    largest = max(right.max(initial=0), upper.max(initial=0))
+    if not (np.isfinite(largest) and min(right.min(initial=0), upper.min(initial=0)) >= 0):
+        raise ValueError("seam costs must be finite and not negative")
+    unit = QUANTA / largest if largest > 0 else 1.0  # quanta of a cost of one
+    right, upper = (np.rint(costs * unit).astype(np.int64) for costs in (right, upper))
     graph = maxflow.GraphInt()
     nodes = graph.add_grid_nodes(first.shape)
     connect_neighbours(graph, nodes, right, upper)
@@ -190,7 +191,8 @@ def find_cut(
     graph.add_grid_tedges(nodes, forced * first, forced * second)
     graph.maxflow()
     labels = graph.get_grid_segments(nodes)
-    return Cut(labels, _sum_costs(labels, right, upper) / unit)
+    crossed = right[labels[:, 1:] != labels[:, :-1]].sum() + upper[labels[1:] != labels[:-1]].sum()
+    return Cut(labels, int(crossed) / unit)
 
 
 def connect_neighbours(graph: Any, nodes: Array, right: Array, upper: Array) -> None:
@@ -199,22 +201,3 @@ def connect_neighbours(graph: Any, nodes: Array, right: Array, upper: Array) -> 
     east[1, 2] = north[2, 1] = 1
     graph.add_grid_edges(nodes, np.pad(right, ((0, 0), (0, 1))), east, symmetric=True)
     graph.add_grid_edges(nodes, np.pad(upper, ((0, 1), (0, 0))), north, symmetric=True)
-
-
-def price_cut(right: Float[Array, "h w1"], upper: Float[Array, "h1 w"], labels: Bool[Array, "h w"]) -> Cut:
-    """The cost of a given seam. Raises: ValueError: a cost is negative or not finite."""
-    right, upper, unit = _quantize(right, upper)
-    return Cut(labels, _sum_costs(labels, right, upper) / unit)
-
-
-def _quantize(right: Array, upper: Array) -> tuple[Array, Array, float]:
-    """Costs in whole quanta, and how many of them one is."""
-    largest = max(right.max(initial=0), upper.max(initial=0))
-    if not (np.isfinite(largest) and min(right.min(initial=0), upper.min(initial=0)) >= 0):
-        raise ValueError("seam costs must be finite and not negative")
-    unit = QUANTA / largest if largest > 0 else 1.0
-    return np.rint(right * unit).astype(np.int64), np.rint(upper * unit).astype(np.int64), unit
-
-
-def _sum_costs(labels: Array, right: Array, upper: Array) -> int:
-    return int(right[labels[:, 1:] != labels[:, :-1]].sum() + upper[labels[1:] != labels[:-1]].sum())

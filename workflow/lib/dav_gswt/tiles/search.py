@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.logs import progress
 from dav_gswt.tiles import layout, patches
-from dav_gswt.tiles.energy import Cells, Cut, OverlapZone, SeamEnergy, compute_edge_costs, find_cut, price_cut
+from dav_gswt.tiles.energy import Cells, Cut, OverlapZone, SeamEnergy, compute_edge_costs, find_cut
 from dav_gswt.tiles.layout import CENTRE, EDGES, Layout, PatchPlaces
 
 MIN_FITTING = 4  # times the number of tries: least number of fitting places
@@ -54,9 +54,8 @@ class SearchProblem:
         uncertainty = float(patches.patch_means(self.guide.uncertainty, place[None], size)[0])
         gamma = self.energy.gamma(uncertainty)
         costs = compute_edge_costs(self.energy.terms(gamma), shown, (y + place[1], x + place[0]))
-        straight = self.energy.kind == "none"
-        cut = price_cut(*costs, zone.straight) if straight else find_cut(*costs, zone.keep, zone.take)
-        return PlacedPatch(place, cut, gamma)
+        forced = (~zone.straight, zone.straight) if self.energy.kind == "none" else (zone.keep, zone.take)
+        return PlacedPatch(place, find_cut(*costs, *forced), gamma)
 
     def source_cells(self, labels: Array, shift: Int[Array, "k 2"]) -> Cells:
         """Rows and columns of the exemplar that a label map shows, clipped to the exemplar."""

@@ -16,7 +16,7 @@ from scipy.spatial.distance import pdist, squareform
 
 from dav_gswt.images import lpips_weights
 from dav_gswt.threads import one_thread
-from dav_gswt.tiles.energy import Cells, LayerScales, make_scales, safe_unit
+from dav_gswt.tiles.energy import Cells, CostLayer, make_scales, safe_unit
 
 SUPERPIXELS = 2000  # superpixels of an exemplar: their distances are a table
 MIN_WIDTH = 6.0  # cells
@@ -35,13 +35,11 @@ class SemanticSource:
 
 
 @dataclass(frozen=True)
-class SemanticLayer:
-    """An `energy.CostLayer`. distance: between two segments' features."""
+class SemanticLayer(CostLayer):
+    """Segments of the exemplar. distance: between two segments' features."""
 
     segments: Int[Array, "m m"]
     distance: Float32[Array, "s s"]
-    slope: Float[Array, "m m 2"]
-    unit: LayerScales
 
     def distances(self, first: Cells, second: Cells) -> Float[Array, "..."]:
         return self.distance[self.segments[first], self.segments[second]].astype(float)
@@ -95,7 +93,7 @@ def describe_segments(
     slope = np.stack([_feature_gradient(index.T, distance).T, _feature_gradient(index, distance)], -1)
     share = count / count.sum()
     spread = float(np.sqrt(share @ distance.astype(float) ** 2 @ share))
-    return SemanticLayer(index, distance, slope, make_scales(spread, slope))
+    return SemanticLayer(slope, make_scales(spread, slope), index, distance)
 
 
 def _subtract_kind(distance: Float[Array, "s s"], index: Int[Array, "m m"]) -> Float[Array, "s s"]:

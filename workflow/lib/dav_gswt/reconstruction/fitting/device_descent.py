@@ -30,7 +30,7 @@ from dav_gswt.reconstruction.fitting.descent import (
 )
 
 EPSILON = 1e-15  # of Adam, as in `interface.Adam`
-CACHE = 4e9  # bytes of photos kept on the device; others are copied at every step
+CACHE = 150e6  # pixels of photos kept on the device, of 28 bytes at most; others are copied at every step
 USED_BY_PERTURB = "means", "log_scales", "quats", "opacity_logits"
 
 
@@ -43,12 +43,6 @@ class Photo:
     behind: Float32[Tensor, "h w 3"] | None
     sample: exposure.Sample
 
-    @property
-    def size(self) -> int:
-        """Bytes."""
-        parts = self.image, self.weight, self.behind
-        return sum(part.nelement() * part.element_size() for part in parts if part is not None)
-
 
 class DeviceDescent(Descent):
     """Between `push` and `pull` the parameters are on the device."""
@@ -59,7 +53,6 @@ class DeviceDescent(Descent):
         self.first: dict[str, Tensor] = {}
         self.second: dict[str, Tensor] = {}
         self._photos: dict[int, Photo] = {}
-        self._cached = 0
 
     def pull(self, run: TrainingState, parts: Parts = PARTS) -> None:
         """See `Descent.pull`."""
@@ -123,9 +116,8 @@ class DeviceDescent(Descent):
             image, weight = (cuda.upload(np.ascontiguousarray(a), self.device) for a in (view.image, view.weight))
             behind = None if view.behind is None else cuda.upload(np.ascontiguousarray(view.behind), self.device)
             photo = Photo(image, weight, behind, exposure.sample_photo(view.image, view.weight))
-            if self._cached + photo.size <= CACHE:
+            if sum(each.weight.nelement() for each in self._photos.values()) + view.weight.size <= CACHE:
                 self._photos[index] = photo
-                self._cached += photo.size
         return photo
 
 

@@ -62,8 +62,6 @@ def equalize_exposure(views: list[TrainingView], points: Float[Array, "n 3"]) ->
     Gains and offsets count relative to their median over the photos, so that the set keeps the colours and the contrast
     of its typical photo. Photos that see too little of the ground stay as they are.
     """
-    if not len(points):
-        return views
     cell_of, sizes = _divide_ground(points)
     seen = np.stack([_average_cells(points, view, cell_of, sizes) for view in one_by_one(views)])
     compared = np.isfinite(seen[..., 0]).sum(1) >= LEAST_PAIRS

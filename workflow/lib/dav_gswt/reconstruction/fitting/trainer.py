@@ -68,12 +68,9 @@ def fit_field(
     """Fit a field to views.
 
     A view's weight says which of its pixels count. Views without any are left out, unless all are: their exposure
-    would count as that of a typical photo, and their steps would be lost.
+    would count as that of a typical photo, and their steps would be lost. There is at least one.
     Returns: the field, its first `constraints.fixed` Gaussians in their order, and the report.
-    Raises: ValueError: no view.
     """
-    if not views:
-        raise ValueError("a fit needs at least one view")
     views = [view for view in one_by_one(views) if view.weight.any()] or views
     begin = state.from_field(field)
     if begin.sh_degree > plan.sh_degree:
