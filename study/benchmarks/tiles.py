@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.lod import build as levels
-from dav_gswt.reconstruction import discs, top_view, underlay
+from dav_gswt.reconstruction import discs, top_view
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import build as tiles
 from dav_gswt.tiles.layout import Exemplar
@@ -35,7 +35,7 @@ def make_field() -> tuple[GaussianField, Ground]:
     heights = 0.4 * gaussian_filter(rng.normal(size=(CELLS, CELLS)), 12, mode="wrap")
     grid = Ground(0.0, 0.0, SPACING, 0, 0, CELLS, heights, np.ones((CELLS, CELLS), bool))
     layer = discs.make_ground_discs(grid, colour.reshape(-1, 3))
-    layer = concatenate_fields([layer, underlay.make_underlay(grid, layer)])
+    layer = concatenate_fields([layer, discs.make_underlay(grid, layer)])
     n = ALL - len(layer)
     place = np.concatenate([rng.uniform(0, CELLS * SPACING, (n, 2)), np.zeros((n, 1))], 1)
     place[:, 2] = grid.height_at(place) + SPACING * rng.uniform(1, 6, n)

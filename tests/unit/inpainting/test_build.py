@@ -13,7 +13,7 @@ from dav_gswt.inpainting import build
 from dav_gswt.prior.interface import DecodedViews
 from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.reconstruction import underlay
+from dav_gswt.reconstruction import discs
 from dav_gswt.views import pose_maps
 from dav_gswt.views.prior_sampling import PriorConfig
 
@@ -94,7 +94,7 @@ def test_unseen_ground_takes_the_colour_of_the_prior_and_all_else_keeps_its_byte
     assert same(field, before[0]) and np.array_equal(grid.seen, before[1])  # nothing is changed in place
     count = {"unseen": 32 * 12, "painted": 32 * 12}
     assert made.describe(grid) == {"cells": n, **count, "exemplar": count, "changed": True}
-    rows = underlay.find_rows(made.field, grid)
+    rows = discs.find_underlay(made.field, grid)
     under = made.field[rows].base_colours.reshape(16, 16, 3)  # the colour of the discs above it
     assert np.median(distance_to_bands(under[3:-3, 13:-2])) < 0.1
     assert np.array_equal(marked[rows].reshape(16, 16), np.tile(np.arange(16) >= FIRST // 2, (16, 1)))

@@ -11,9 +11,9 @@ from dav_gswt.geometry import cameras
 from dav_gswt.lod import build, merge, store
 from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.raster import render
+from dav_gswt.reconstruction.discs import find_underlay
 from dav_gswt.reconstruction.objects import make_blobs
 from dav_gswt.reconstruction.observation import mask_to_ground
-from dav_gswt.reconstruction.underlay import find_rows
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def test_a_level_is_as_uncertain_as_what_it_was_merged_from():
     n = coarse.heights.size
     np.testing.assert_allclose(level.uncertainty[:n], coarse.centres[:, 0] / 3.2, atol=1e-6)
     assert level.uncertainty[-2:].tolist() == [0.25, 0.75]  # the one below the ground is gone
-    under = find_rows(level, coarse)
+    under = find_underlay(level, coarse)
     np.testing.assert_allclose(level.uncertainty[under], level.means[under, 0] / 3.2, atol=0.07)  # a coarse cell's
 
 

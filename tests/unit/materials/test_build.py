@@ -9,7 +9,7 @@ from dav_gswt.field import concatenate_fields
 from dav_gswt.materials import build, extraction, store
 from dav_gswt.materials.filling import CellSources
 from dav_gswt.materials.objects import Footprint
-from dav_gswt.reconstruction import top_view, underlay
+from dav_gswt.reconstruction import discs, top_view
 from dav_gswt.reconstruction.objects import make_blobs
 
 
@@ -25,10 +25,10 @@ def test_an_exemplar_shows_its_material_alone_by_a_disc_a_cell_uncertain_if_fill
     grid, field = found.materials[number].grid, found.materials[number].field
     away = np.abs(top_view.render_exemplar(field, grid).colour - colour).max(-1)
     assert (away < 0.15).mean() > 0.99
-    discs, under = grid.cells**2, underlay.count_gaussians(grid)
-    assert grid.shape == (grid.cells, grid.cells) and field.ground.sum() == discs
-    assert underlay.find_rows(field, grid) == slice(discs, discs + under) and len(field) == discs + under
-    np.testing.assert_allclose(field.means[:discs, :2], grid.centres[:, :2], atol=1e-5)
+    count, under = grid.cells**2, discs.count_underlay(grid)
+    assert grid.shape == (grid.cells, grid.cells) and field.ground.sum() == count
+    assert discs.find_underlay(field, grid) == slice(count, count + under) and len(field) == count + under
+    np.testing.assert_allclose(field.means[:count, :2], grid.centres[:, :2], atol=1e-5)
     uncertain = field.uncertainty[field.ground]
     assert uncertain.max() == pytest.approx(extraction.FILLED)
     assert found.materials[number].filled == pytest.approx(np.mean(uncertain > 0), abs=1e-6)
@@ -59,8 +59,8 @@ def test_an_object_on_a_slope_stands_on_level_ground():
     r, c = made.SHRUBS[0]
     cells = (rows - r) ** 2 + (columns - c) ** 2 <= made.RADIUS**2
     own = extraction.extract_object(field, grid, maps, extraction.bin_standing(field, grid, maps), Footprint(cells, 0))
-    discs = own.means[own.ground]
-    assert np.abs(discs[:, 2] - extraction.LIFT * made.SPACING).max() < 0.02 * made.SPACING
+    ground = own.means[own.ground]
+    assert np.abs(ground[:, 2] - extraction.LIFT * made.SPACING).max() < 0.02 * made.SPACING
 
 
 def test_what_floats_far_above_a_material_is_left_out():

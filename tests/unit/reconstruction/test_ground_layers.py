@@ -10,7 +10,7 @@ from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
 from dav_gswt.raster import render
-from dav_gswt.reconstruction import discs, top_view, underlay
+from dav_gswt.reconstruction import discs, top_view
 from dav_gswt.reconstruction.coarse import estimate_uncertainty
 from dav_gswt.reconstruction.fitting import state
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
@@ -42,12 +42,12 @@ def test_discs_lie_on_the_surface_unseen_ones_are_uncertain_and_unknown_ones_tak
 def test_a_field_has_its_underlay_after_its_discs_and_no_thing_is_lost_with_it():
     grid, field = made.grid(), made.field()
     n = grid.heights.size
-    assert underlay.find_rows(field, grid) == slice(n, n + underlay.count_gaussians(grid))
-    alone = underlay.remove_underlay(field, grid)
+    assert discs.find_underlay(field, grid) == slice(n, n + discs.count_underlay(grid))
+    alone = discs.remove_underlay(field, grid)
     assert alone.ground.all() and len(alone) == grid.heights.size
-    assert underlay.find_rows(alone, grid).stop == grid.heights.size
+    assert discs.find_underlay(alone, grid).stop == grid.heights.size
     few = replace(field, ground=np.zeros(len(field), bool))[: grid.heights.size // 2]
-    assert underlay.remove_underlay(few, grid) is few
+    assert discs.remove_underlay(few, grid) is few
 
 
 def test_no_sky_shines_through_the_ground_between_shrunken_discs():
@@ -58,7 +58,7 @@ def test_no_sky_shines_through_the_ground_between_shrunken_discs():
     camera = cameras.pinhole([1.6, 0.0, 0.8], [1.6, 1.6, 0], 96, 96, 40.0)
     blank = TrainingView("", camera, np.zeros((96, 96, 3), np.float32), np.ones((96, 96), np.float32))
     counts = mask_outside_ground(blank, 0.4, 0.4, 2.8, 2.8).weight > 0
-    assert render(underlay.remove_underlay(grains, grid), camera).alpha[counts].min() < 0.5  # there were holes
+    assert render(discs.remove_underlay(grains, grid), camera).alpha[counts].min() < 0.5  # there were holes
     assert render(grains, camera).alpha[counts].min() > 0.95
 
 

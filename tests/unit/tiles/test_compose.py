@@ -10,7 +10,7 @@ from fixtures.tile_sets import splats
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import concatenate_fields
-from dav_gswt.reconstruction import discs, underlay
+from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import compose, store
 
@@ -132,7 +132,7 @@ def tile():
     layer = discs.make_ground_discs(grid, rng.uniform(0.2, 0.8, (CELLS**2, 3)))
     layer = replace(layer, uncertainty=rng.random(CELLS**2).astype(np.float32))
     things = splats(rng.random((200, 3)) * CELLS * SPACING, rng.random((200, 3)), [0.02, 0.02, 0.05], False)
-    whole = concatenate_fields([layer, underlay.make_underlay(grid, layer), things])
+    whole = concatenate_fields([layer, discs.make_underlay(grid, layer), things])
     return whole[rng.permutation(len(whole))]
 
 

@@ -20,7 +20,7 @@ from dav_gswt.prior import conditions
 from dav_gswt.prior.conditions import ReferencePhotos
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import make_rasterizer, to_raster_arrays
-from dav_gswt.reconstruction import underlay
+from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.threads import one_thread
 from dav_gswt.views import feasibility
@@ -167,10 +167,10 @@ def _sample_picture(picture: Float32[Array, "s s 3"], pixels: Float[Array, "n 2"
 
 def _colour_underlay(field: GaussianField, grid: Ground, marked: Bool[Array, "n"]) -> GaussianField:
     """The field with the colours of the marked discs on the marked part of its underlay."""
-    rows, n = underlay.find_rows(field, grid), grid.heights.size
+    rows, n = discs.find_underlay(field, grid), grid.heights.size
     if rows.stop == rows.start:
         return field
-    colours = underlay.place_underlay(grid, field.means[:n, 2], field.base_colours[:n])[2]
+    colours = discs.place_underlay(grid, field.means[:n, 2], field.base_colours[:n])[2]
     under, sh = np.flatnonzero(marked[rows]), field.sh.copy()
     sh[rows.start + under, :1] = rgb_to_sh(colours[under])
     return replace(field, sh=sh)
@@ -218,7 +218,7 @@ def select_gaussians(field: GaussianField, grid: Ground, cells: Bool[Array, "row
     """The discs of some cells, and the discs of the underlay that lie under such cells alone."""
     marked = np.zeros(len(field), bool)
     marked[: cells.size] = cells.ravel()
-    rows, s = underlay.find_rows(field, grid), underlay.STRIDE
+    rows, s = discs.find_underlay(field, grid), discs.STRIDE
     if rows.stop > rows.start:
         even = np.pad(cells, [(0, -size % s) for size in cells.shape], constant_values=True)
         blocks = even.reshape(even.shape[0] // s, s, even.shape[1] // s, s).all((1, 3))

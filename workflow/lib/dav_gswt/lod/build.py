@@ -20,7 +20,7 @@ from dav_gswt.lod.levels import AUTO, MAX_LEVELS, Levels
 from dav_gswt.lod.merge import crop_to_blocks, halve_resolution
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import to_raster_arrays
-from dav_gswt.reconstruction import underlay
+from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import FitPlan
 from dav_gswt.reconstruction.ground import Ground
@@ -87,7 +87,7 @@ def fit_coarser_level(
     options = trainer.FitOptions(f"fit level of {len(start)} Gaussians")
     fit = trainer.fit_field(start, views, plan, constraints, rng, options)
     level = replace(fit.field, uncertainty=start.uncertainty[fit.kept])
-    level = underlay.copy_uncertainty(level, coarse)
+    level = discs.copy_uncertainty(level, coarse)
     scales = mean_scale([field]), mean_scale([level])
     _log.info("mean scale %.4g to %.4g, %d to %d Gaussians", *scales, len(field), len(level))
     return level, coarse

@@ -8,7 +8,7 @@ from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
-from dav_gswt.reconstruction import discs, underlay
+from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.top_view import render_top_view
 
@@ -17,9 +17,9 @@ LEAST_WEIGHT = 1e-200  # of a Gaussian that is merged; sums of smaller ones lose
 
 def crop_to_blocks(field: GaussianField, grid: Ground, block: int) -> tuple[GaussianField, Ground]:
     """Field and grid cut down to whole blocks of cells that start at the exemplar's corner."""
-    rows_of_underlay = underlay.find_rows(field, grid)
+    rows_of_underlay = discs.find_underlay(field, grid)
     has_underlay = rows_of_underlay.stop > rows_of_underlay.start
-    field = underlay.remove_underlay(field, grid)
+    field = discs.remove_underlay(field, grid)
     rows, columns = grid.shape
     below, left = grid.first_row % block, grid.first_column % block
     ny, nx = (rows - below) // block * block, (columns - left) // block * block
@@ -37,7 +37,7 @@ def crop_to_blocks(field: GaussianField, grid: Ground, block: int) -> tuple[Gaus
     inside = np.flatnonzero(~field.ground)
     inside = inside[small.contains(field.means[inside])]
     ground_discs, objects = field[np.asarray(keep, int)], field[inside]
-    layers = [underlay.make_underlay(small, ground_discs)] if has_underlay else []
+    layers = [discs.make_underlay(small, ground_discs)] if has_underlay else []
     return concatenate_fields([ground_discs, *layers, objects]), small
 
 
@@ -58,7 +58,7 @@ def halve_resolution(field: GaussianField, grid: Ground) -> tuple[GaussianField,
     n = grid.heights.size
     if field.ground.any():
         colours = field.base_colours[:n].reshape(*grid.shape, 3)
-        uncertainty, objects = field.uncertainty[:n].reshape(grid.shape), underlay.remove_underlay(field, grid)[n:]
+        uncertainty, objects = field.uncertainty[:n].reshape(grid.shape), discs.remove_underlay(field, grid)[n:]
     else:  # an imported field: its ground is its top view, objects are what lies above the height of discs
         maps = render_top_view(field, grid)
         colours, uncertainty = maps.colour, maps.uncertainty
@@ -67,7 +67,7 @@ def halve_resolution(field: GaussianField, grid: Ground) -> tuple[GaussianField,
     base = discs.make_ground_discs(coarse, _mean4(colours.astype(float)).reshape(-1, 3))
     base = replace(base, uncertainty=_mean4(uncertainty.astype(float)).ravel().astype(np.float32))
     return concatenate_fields(
-        [base, underlay.make_underlay(coarse, base), merge_by_voxel(objects, coarse.spacing)]
+        [base, discs.make_underlay(coarse, base), merge_by_voxel(objects, coarse.spacing)]
     ), coarse
 
 

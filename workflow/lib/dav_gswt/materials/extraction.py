@@ -11,7 +11,7 @@ from dav_gswt.field import SH0, GaussianField, concatenate_fields
 from dav_gswt.materials.filling import CellSources
 from dav_gswt.materials.maps import GroundMaps
 from dav_gswt.materials.objects import Footprint, measure_size
-from dav_gswt.reconstruction import underlay
+from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import compose
 
@@ -43,14 +43,14 @@ def extract_exemplar(
     seen = grid.seen[block][sources.rows, sources.columns]
     small = Ground(west, south, spacing, 0, 0, m, heights, seen)
     number = np.arange(grid.heights.size).reshape(grid.shape)[block]
-    discs = field[number[sources.rows, sources.columns].ravel()]
+    ground = field[number[sources.rows, sources.columns].ravel()]
     rows, columns = np.mgrid[:m, :m]
     move = np.stack([columns - sources.columns, rows - sources.rows], -1) * spacing
-    discs = _move(discs, np.concatenate([move, lift[..., None]], -1).reshape(-1, 3))
-    discs = _tint(_mark_filled(discs, sources.copied.ravel()), tone.reshape(-1, 3))
-    parts = [discs]
-    if (under := underlay.find_rows(field, grid)).stop > under.start:
-        parts.append(underlay.make_underlay(small, discs))
+    ground = _move(ground, np.concatenate([move, lift[..., None]], -1).reshape(-1, 3))
+    ground = _tint(_mark_filled(ground, sources.copied.ravel()), tone.reshape(-1, 3))
+    parts = [ground]
+    if (under := discs.find_underlay(field, grid)).stop > under.start:
+        parts.append(discs.make_underlay(small, ground))
     standing = _drop_crowns(bin_standing(field, grid, maps), maps, own)
     return concatenate_fields([*parts, _copy_standing(standing, sources, np.dstack([lift, tone]))]), small
 
@@ -102,11 +102,11 @@ def extract_object(
     number = np.arange(grid.heights.size).reshape(grid.shape)
     number = number[grid.first_row : grid.first_row + m, grid.first_column : grid.first_column + m]
     near = footprint.cells | ring
-    discs = _scale_opacity(field[number[near]], share[near])
-    discs = replace(discs, means=discs.means + np.array([0, 0, LIFT * spacing], np.float32))
+    ground = _scale_opacity(field[number[near]], share[near])
+    ground = replace(ground, means=ground.means + np.array([0, 0, LIFT * spacing], np.float32))
     over = np.nonzero(binary_dilation(footprint.cells))
     index, _ = compose.gather_cells(standing, over[0][None], over[1][None])
-    parts = concatenate_fields([discs, standing.field[index]])
+    parts = concatenate_fields([ground, standing.field[index]])
     west, south, _ = grid.exemplar
     means = parts.means.astype(float) - [west + foot[0] * spacing, south + foot[1] * spacing, 0]
     means[:, 2] -= plane[0] + means[:, :2] @ plane[1:] / spacing
@@ -140,7 +140,7 @@ def _fit_plane(height: Float[Array, "m m"], cells: Bool[Array, "m m"], foot: Flo
 
 def bin_standing(field: GaussianField, grid: Ground, maps: GroundMaps) -> compose.BinnedLevel:
     """What stands on the ground: neither discs nor underlay, by the exemplar's cells."""
-    return compose.bin_gaussians(underlay.remove_underlay(field, grid)[grid.heights.size :], maps.exemplar, 1)
+    return compose.bin_gaussians(discs.remove_underlay(field, grid)[grid.heights.size :], maps.exemplar, 1)
 
 
 def _move(field: GaussianField, by: Float[Array, "n 3"]) -> GaussianField:

@@ -13,7 +13,7 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.colmap_model import read_colmap_model, triangulate_points
 from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.raster import make_rasterizer, to_raster_arrays
-from dav_gswt.reconstruction import discs, ground, objects, observation, underlay
+from dav_gswt.reconstruction import discs, ground, objects, observation
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import FitReport, FitSettings, limit_discs
 from dav_gswt.reconstruction.fitting.trainer import DEFAULT_OPTIONS, FitOptions
@@ -79,12 +79,12 @@ def fit_coarse_field(
     views, relief = observation.observe(frame, grid, views)
     shell = objects.make_shell(relief, views)
     isolated = objects.make_isolated_points(grid, relief, points, given.colours, BAND * frame.flying_height)
-    room = settings.max_gaussians - grid.heights.size - underlay.count_gaussians(grid)
+    room = settings.max_gaussians - grid.heights.size - discs.count_underlay(grid)
     occluders = observation.thin_at_random(concatenate_fields([isolated, shell]), room, rng)
     colour, known = observation.ground_colours(grid, views, occluders)
     grid = replace(grid, seen=known)
     layer = discs.make_ground_discs(grid, discs.fill_unknown(colour, known))
-    start = concatenate_fields([layer, underlay.make_underlay(grid, layer), occluders])
+    start = concatenate_fields([layer, discs.make_underlay(grid, layer), occluders])
     _log.info(
         "ground: %d x %d discs of %.4g %s, %.0f %% seen", *grid.shape, grid.spacing, frame.unit, 100 * known.mean()
     )
@@ -98,7 +98,7 @@ def fit_coarse_field(
 
 def finish_field(fitted: GaussianField, grid: Ground, views: list[TrainingView]) -> tuple[GaussianField, Ground]:
     """The fitted field with its uncertainty, and the grid with the heights of its discs."""
-    field = underlay.copy_uncertainty(estimate_uncertainty(fitted, views), grid)
+    field = discs.copy_uncertainty(estimate_uncertainty(fitted, views), grid)
     heights = field.means[: grid.heights.size, 2].reshape(grid.shape).astype(float)
     return field, replace(grid, heights=heights)
 

@@ -11,8 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
-from dav_gswt.reconstruction import underlay
-from dav_gswt.reconstruction.discs import THICKNESS, slopes_to_quaternions
+from dav_gswt.reconstruction.discs import THICKNESS, count_underlay, slopes_to_quaternions, update_underlay
 from dav_gswt.reconstruction.ground import Ground
 
 SMOOTHING = 0.5  # cells: blur of the gradients of heights
@@ -34,7 +33,7 @@ class GroundConstraints:
 
     def __init__(self, grid: Ground, ceiling: Float[Array, "rows columns"], smoothing: float | None = SMOOTHING):
         self.discs, self.detail = grid.heights.size, grid.spacing
-        self.fixed = self.discs + underlay.count_gaussians(grid)
+        self.fixed = self.discs + count_underlay(grid)
         self.shape: tuple[int, int] = grid.shape
         self.smoothing = smoothing
         self.grid, self.ceiling = grid, replace(grid, heights=ceiling)
@@ -49,7 +48,7 @@ class GroundConstraints:
         np.clip(scales[:n, :2], *np.log(np.multiply(DISC_SIZES, s)), out=scales[:n, :2])
         scales[:n, 2] = np.log(THICKNESS * s)
         np.clip(logits[:n], *DISC_LOGITS, out=logits[:n])
-        underlay.update_underlay(self.grid, values)
+        update_underlay(self.grid, values)
         clip_sizes(scales[self.fixed :], *np.multiply(OBJECT_SIZES, s))
         np.clip(logits[self.fixed :], *LOGITS, out=logits[self.fixed :])
 

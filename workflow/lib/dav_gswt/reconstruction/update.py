@@ -21,7 +21,7 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import metrics
 from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.raster import render
-from dav_gswt.reconstruction import objects, observation, underlay
+from dav_gswt.reconstruction import discs, objects, observation
 from dav_gswt.reconstruction.coarse import Reconstruction, finish_field, fit_coarse_field, read_start_views
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import FitReport, FitSettings
@@ -137,7 +137,7 @@ def _prepare_start(
     the constraints; the field's first Gaussians stay those of the grid."""
     field, grid, frame = given.field, given.grid, given.frame
     views, relief = observation.observe(frame, grid, given.earlier + given.new)
-    occluders = field[grid.heights.size + underlay.count_gaussians(grid) :]
+    occluders = field[grid.heights.size + discs.count_underlay(grid) :]
     added = _drop_near(objects.make_shell(relief, views), occluders, relief.grid.spacing)
     added = observation.thin_at_random(added, settings.max_gaussians - len(field), rng)
     sh = np.zeros((len(added), *field.sh.shape[1:]), np.float32)

@@ -14,7 +14,7 @@ from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.field import SH0, GaussianField, concatenate_fields
 from dav_gswt.lod.merge import merge_by_voxel
-from dav_gswt.reconstruction import discs, underlay
+from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.ground_constraints import DISC_SIZES
 from dav_gswt.tiles.layout import LABELS, Exemplar, source_cells
@@ -167,13 +167,13 @@ def merge_cells(tile: GaussianField, cells: int, spacing: float) -> GaussianFiel
         uncertainty=uncertainty.ravel().astype(np.float32),
     )
     parts = [layer[known.ravel()], merge_by_voxel(tile[~tile.ground & ~under], 2 * spacing)]
-    return concatenate_fields([parts[0], underlay.make_underlay(grid, layer), parts[1]] if under.any() else parts)
+    return concatenate_fields([parts[0], discs.make_underlay(grid, layer), parts[1]] if under.any() else parts)
 
 
 def find_underlay(tile: GaussianField, spacing: float) -> Bool[Array, "n"]:
     """Which Gaussians of a tile are underlay, in any order: opaque as nothing else is that is so large."""
-    large = tile.log_scales.max(1) > np.log(0.9 * underlay.WIDTH * underlay.STRIDE * spacing)
-    return ~tile.ground & (tile.opacity_logits == underlay.SOLID) & large
+    large = tile.log_scales.max(1) > np.log(0.9 * discs.UNDERLAY_WIDTH * discs.STRIDE * spacing)
+    return ~tile.ground & (tile.opacity_logits == discs.SOLID) & large
 
 
 def _average_discs(

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from dav_gswt.reconstruction import underlay
+from dav_gswt.reconstruction import discs
 
 FEW_PHOTOS = 8  # that the steps of a preset are for; each further photo has steps of its own
 FINAL_RATE = 0.1  # of the learning rates at the end of a fit, as a share of the full rates
@@ -70,7 +70,7 @@ class FitSettings:
 
 def limit_discs(max_gaussians: int) -> int:
     """Most cells of the ground's grid in a field of so many Gaussians."""
-    return int(GROUND_SHARE * max_gaussians / (1 + 1 / underlay.STRIDE**2))
+    return int(GROUND_SHARE * max_gaussians / (1 + 1 / discs.STRIDE**2))
 
 
 @dataclass(frozen=True)
