@@ -9,7 +9,7 @@ from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
 from dav_gswt.materials import objects, segmentation, standing
 from dav_gswt.materials.maps import NO_CLASS, GroundMaps, GroundMasks, Surroundings, unite
-from dav_gswt.materials.objects import Footprint, find_shade, is_shade, linear_light
+from dav_gswt.materials.objects import Footprint, is_shade, linear_light
 
 MAX_MATERIALS = 4
 LEAST_SHARE = 0.05  # of the exemplar, of a material
@@ -91,9 +91,6 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
     taken = unite([each.cells for each in footprints], known.shape) | excluded | around.strips
     if masks is None and around.rough == {0} and len(ground.chosen) == 1 and taken.mean() < LITTLE:
         return GroundClasses(around.materials, kinds, [], ~maps.known, ground.names)
-    shown_nowhere = excluded & maps.known
-    for number in sorted(around.rough):  # on smooth ground shade stands out as things do
-        excluded = excluded | find_shade(maps.colour, around.plain(number), shown_nowhere)
     wide = _widen(excluded & maps.known | around.strips, footprints) | ~maps.known
     return GroundClasses(around.materials, kinds, footprints, wide, ground.names)
 

@@ -45,10 +45,6 @@ OTHER = 0.5  # of what stands out, that is ground of another material: then it i
 DENSE = 0.25  # of a material that is covered by things: then they are texture
 SHADE = 0.75  # of a material's light, in every channel, at most: darker and bluer is its shade
 BLUER = 1.1  # ratio of blue light to red in the shade over that in the sun, at least
-RARE = 0.25  # of the ground, that its shade covers: more of it is texture
-LEAST_SHADE = 1.5e-3  # of the exemplar, of a piece of shade: what is between blades and stones is smaller
-BESIDE = 1 / 32  # of the side: as near to excluded ground dapples of its shade lie
-SOFT = 1 / 200  # of the side: blur of colours in which shade is sought
 
 
 @dataclass(frozen=True)
@@ -267,40 +263,10 @@ def _clean(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"]:
 
 def linear_light(colour: Float[Array, "n 3"]) -> Float[Array, "3"]:
     """Mean linear light of sRGB colours."""
-    return _to_linear(colour).mean(0)
+    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4).mean(0)
 
 
 def is_shade(light: Float[Array, "3"], other: Float[Array, "3"]) -> bool:
     """Whether ground of this light may be the other in shade: darker in all channels, and bluer, as the sky is."""
-    return bool(_is_shaded_light(light[None] / np.maximum(other, 1e-6))[0])
-
-
-def find_shade(
-    colour: Float[Array, "m m 3"], ground: Bool[Array, "m m"], excluded: Bool[Array, "m m"]
-) -> Bool[Array, "m m"]:
-    """Cells of some ground that look like its shade: the dapples beside larger shade.
-
-    Small pieces are texture, and so is shade that is everywhere or has no excluded ground beside it, as
-    between tall grass. colour: sRGB in [0, 1]. excluded: ground that is shown nowhere already.
-    """
-    if not (ground.any() and excluded.any()):
-        return np.zeros_like(ground)
-    soft = gaussian_filter(colour, (SOFT * len(colour), SOFT * len(colour), 0), mode="nearest")
-    shade = ground & _is_shaded_light(_to_linear(soft) / np.maximum(np.median(_to_linear(soft[ground]), 0), 1e-6))
-    pieces, _ = label(binary_closing(shade))
-    near = binary_dilation(excluded, iterations=max(1, round(BESIDE * len(colour))))
-    large = np.bincount(pieces.ravel()) >= LEAST_SHADE * shade.size
-    large &= np.isin(np.arange(len(large)), pieces[near])
-    large[0] = False
-    found = large[pieces] & ground
-    return found if found.sum() < RARE * ground.sum() else np.zeros_like(ground)
-
-
-def _is_shaded_light(ratio: Float[Array, "... 3"]) -> Bool[Array, "..."]:
-    """Whether ratios of light are those of shade to sunlight."""
-    return (ratio.max(-1) < SHADE) & (ratio[..., 2] >= BLUER * ratio[..., 0]) & (ratio[..., 1] >= ratio[..., 0])
-
-
-def _to_linear(colour: Float[Array, "... 3"]) -> Float[Array, "... 3"]:
-    """Linear light of sRGB colours."""
-    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+    red, green, blue = light / np.maximum(other, 1e-6)
+    return bool(max(red, green, blue) < SHADE and blue >= BLUER * red and green >= red)

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.reconstruction.discs import OBJECT_HEIGHT
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.photo_colours import median_colours
 from dav_gswt.reconstruction.plane_sweep import Relief
@@ -17,7 +18,6 @@ WALL_SPACING = 1.2  # cells between the Gaussians of a wall, vertically
 OPAQUE = 2.0  # opacity logit of a shell before the first step
 CLEARANCE = 2.0  # cells of the sweep that an object may extend beyond what the sweep saw
 MAX_ISOLATION = 4.0  # spacings to its neighbours, beyond which a point in the air is a wrong match
-MIN_HEIGHT = 1.5  # spacings above the surface, beyond which a point belongs to an object
 
 
 def make_shell(relief: Relief, views: list[TrainingView]) -> GaussianField:
@@ -47,7 +47,7 @@ def make_isolated_points(
     known = relief.grid.contains(points)
     covered = np.zeros(len(points), bool)
     covered[known] = maximum_filter(relief.stands, 3)[_cell(relief.grid, points[known])]
-    raised = (above > MIN_HEIGHT * grid.spacing) & (above < band) & ~covered
+    raised = (above > OBJECT_HEIGHT * grid.spacing) & (above < band) & ~covered
     points, colours = points[raised], colours[raised]
     apart = np.full(len(points), np.inf)
     if len(points) > 3:

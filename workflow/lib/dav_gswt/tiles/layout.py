@@ -18,7 +18,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Int, Integer, UInt8
 from numpy import ndarray as Array
-from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.errors import InputError
 from dav_gswt.lod.levels import AUTO, MAX_LEVELS
@@ -208,12 +207,6 @@ def frame_labels(
     labels[ends, :b] = np.where(vertical[west][ends, b:], np.where(rows, NW, SW), W)
     labels[ends, n - b :] = np.where(vertical[east][ends, :b], np.where(rows, NE, SE), E)
     return labels
-
-
-def extend_frame(labels: UInt8[Array, "side side"]) -> UInt8[Array, "side side"]:
-    """A frame's labels (`frame_labels`) with those of the nearest cells of the frame in the place of the centre."""
-    rows, columns = distance_transform_edt(labels == CENTRE, return_distances=False, return_indices=True)
-    return labels[rows, columns]
 
 
 def source_cells(

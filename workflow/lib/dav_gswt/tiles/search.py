@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from numpy import ndarray as Array
+from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.logs import progress
 from dav_gswt.tiles import layout, patches
@@ -162,7 +163,8 @@ def _search_centres(
         frame_labels = layout.frame_labels(plan, masks[0], masks[1], tile)
         shift = layout.label_shifts(plan, places, tile)
         # a seam along the frame's inner rim is priced by what the strips would show beyond it
-        shown = problem.source_cells(layout.extend_frame(frame_labels), shift)
+        nearest = distance_transform_edt(frame_labels == CENTRE, return_distances=False, return_indices=True)
+        shown = problem.source_cells(frame_labels[tuple(nearest)], shift)
         order = _rank_centres(problem, places, shown, drawn, overlay, centres)
         placed = (problem.place(shown, place, size, overlap) for place in order[: problem.tries])
         centre = min(placed, key=lambda patch: patch.seam.energy)
