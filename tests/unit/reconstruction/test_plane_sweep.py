@@ -86,15 +86,6 @@ def test_nothing_is_a_column():
     assert not plane_sweep.reject_columns(np.zeros((4, 4), bool), np.zeros((4, 4)), 0.1).any()
 
 
-def test_a_wider_grid_goes_on_as_high_as_its_border():
-    grid = replace(made.grid(0.1), heights=np.random.default_rng(0).random(made.grid(0.1).shape))
-    wide = plane_sweep.pad_grid(grid, 3)
-    assert wide.shape == tuple(n + 6 for n in grid.shape) and not wide.seen[:3].any()
-    np.testing.assert_allclose(wide.exemplar, grid.exemplar, atol=1e-12)
-    at = np.array([[0.7, 1.3], [2.05, 0.4], [-0.2, 1.0]])
-    np.testing.assert_allclose(wide.height_at(at), grid.height_at(at), atol=1e-12)
-
-
 def test_ground_that_fewer_than_two_photos_see_is_not_known(photos):
     alone = plane_sweep.sweep_heights(made.grid(0.1), photos[:1], flying_height=4.0, pixel=0.08)
     assert not alone.known.any() and not alone.stands.any() and not alone.above.any()

@@ -40,20 +40,6 @@ def test_all_materials_have_tiles_of_one_size_and_mean_height_and_as_many_levels
     assert heights[0] == pytest.approx(heights[1], abs=1e-5)
 
 
-@pytest.mark.parametrize("tile_side", [28.1, 55.0])
-def test_rounding_of_the_tile_side_parts_no_levels(sets, tile_side):
-    """The number of levels follows from the side: it is decided once, for the first material."""
-    cut = build.cut_materials(sets, OPTIONS, tile_side, np.random.default_rng)
-    assert len({(own.side, len(own.fields)) for own in cut}) == 1
-
-
-def test_one_material_has_the_tiles_of_cut_levels(sets):
-    alone = build.cut_materials(sets[:1], OPTIONS, None, np.random.default_rng)
-    wanted = build.cut_levels(sets[0], replace(OPTIONS, levels=AUTO), np.random.default_rng(0))
-    np.testing.assert_array_equal(alone[0].labels, wanted.labels)
-    np.testing.assert_array_equal(alone[0].fields[0][0].means, wanted.fields[0][0].means)
-
-
 def test_tiles_that_a_material_has_no_room_for_are_refused(sets):
     small = replace(sets[1].grids[0], cells=64)
     narrow = [sets[0], replace(sets[1], grids=[small])]

@@ -57,12 +57,6 @@ def test_a_vertical_strip_goes_on_from_a_tile_into_its_right_neighbour():
         np.testing.assert_array_equal(right[W] + [step - 1, y], PLACES.vertical[1] + [1 + step, y])
 
 
-def test_a_horizontal_strip_goes_on_from_a_tile_into_the_one_above():
-    below, above = layout.label_shifts(PLAN, PLACES, 4), layout.label_shifts(PLAN, PLACES, 1)
-    np.testing.assert_array_equal(below[N] + [3, PLAN.side - 1], PLACES.horizontal[1] + [3, 1])
-    np.testing.assert_array_equal(above[S] + [3, 0], PLACES.horizontal[1] + [3, 2])
-
-
 def test_the_corner_patch_is_whole_where_four_tiles_meet():
     shift = layout.label_shifts(PLAN, PLACES, 0)
     n, middle = PLAN.side, PLACES.corner + PLAN.corner

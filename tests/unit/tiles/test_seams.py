@@ -109,12 +109,6 @@ def test_cut_of_a_small_grid_is_as_cheap_as_the_best_of_all_partitions(seed):
     assert not found.labels[first].any() and found.labels[second].all()
 
 
-def test_cut_without_free_cells_costs_its_forced_border():
-    forced = np.array([[True, False]])
-    found = energy.find_cut(np.array([[0.7]]), np.zeros((0, 2)), forced, ~forced)
-    assert found.energy == pytest.approx(0.7)
-
-
 @pytest.mark.parametrize("forced", [0, 1])
 def test_where_only_one_patch_is_forced_all_is_that_patch_and_there_is_no_seam(forced):
     sides = [np.zeros((3, 4), bool), np.zeros((3, 4), bool)]

@@ -92,13 +92,6 @@ def test_sizes_are_those_of_a_plain_loop():
     np.testing.assert_array_equal(sizes, expected)
 
 
-def test_a_needle_becomes_as_thick_as_is_allowed():
-    sizes = np.log(np.array([[1.0, 0.02, 0.02], [1.0, 0.5, 0.01]], np.float32))
-    clip_sizes(sizes, LEAST, MOST)
-    np.testing.assert_allclose(np.sort(np.exp(sizes), 1), [[0.1, 1 / 3, 1], [0.1, 0.5, 1]], rtol=1e-6)
-    clip_sizes(np.zeros((0, 3), np.float32), LEAST, MOST)
-
-
 def grown(plan, start):
     """Steps at which a fit grows, and how many Gaussians it ends with."""
     schedule, now, at = Schedule(plan, start), start, []
@@ -127,11 +120,6 @@ def test_events_are_even_and_counted_down_to_and_pruning_comes_after_them(steps)
     assert len(set(np.diff(at))) <= 1 and EVENTS <= len(at) <= 2 * EVENTS
     (pruned,) = (step for step in range(1, steps + 1) if schedule.prunes(step))
     assert at[-1] < pruned == int(PRUNE_AT * steps) < steps
-
-
-def test_a_field_that_is_as_large_as_it_may_be_stays_as_it_is():
-    assert grown(FitPlan(100, 50), 50) == ([], 50)
-    assert not any(Schedule(FitPlan(100, 50), 50).prunes(step) for step in range(101))
 
 
 @pytest.mark.parametrize("first", [1.0, 0.3])

@@ -9,8 +9,8 @@ from fixtures import ground as made
 from dav_gswt.field import concatenate_fields, rgb_to_sh
 from dav_gswt.reconstruction import top_view
 from dav_gswt.reconstruction.evaluation import evaluate_field
-from dav_gswt.reconstruction.fitting import descent, trainer
-from dav_gswt.reconstruction.fitting.descent import Descent, TrainingState
+from dav_gswt.reconstruction.fitting import trainer
+from dav_gswt.reconstruction.fitting.descent import TrainingState
 from dav_gswt.reconstruction.fitting.plan import FitPlan
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 from dav_gswt.reconstruction.objects import make_blobs
@@ -104,23 +104,6 @@ def test_what_hardly_shows_in_any_photo_goes_before_the_end():
     found = fitted(field, FitPlan(10, len(field) + 1)).field.means[len(made.field()) :]
     firm, faint = (np.linalg.norm(found - point, axis=1).min(initial=9.0) for point in points)
     assert firm < 0.1 < faint
-
-
-def test_errors_are_noted_in_the_last_steps_before_each_growth_alone(monkeypatch):
-    noted, grown = [], []
-    descend = Descent.descend
-    monkeypatch.setattr(descent, "ERROR_PHOTOS", 2)
-    monkeypatch.setattr(TrainingState, "add_errors", lambda *_: noted.append(now[0]))
-    now = [0]
-
-    def counting(self, run, task, index):
-        now[0] = run.step
-        descend(self, run, task, index)
-
-    monkeypatch.setattr(Descent, "descend", counting)
-    monkeypatch.setattr(trainer, "_grow", lambda run, task: grown.append(run.step))
-    fitted(plan=FitPlan(50, 10**4))
-    assert len(grown) >= 10 and noted == [step for at in grown for step in (at - 2, at - 1)]
 
 
 def test_errors_of_the_photos_add_up_and_pixels_that_do_not_count_say_nothing(monkeypatch):

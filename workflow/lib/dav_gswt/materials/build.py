@@ -149,9 +149,7 @@ def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMa
     colour = [float(value) for value in maps.colour.mean((0, 1))]
     info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, colour, None, None)
     judged = judge_material(info.name, (maps.cells / side) ** 2, 0.0)
-    classes = GroundClasses(
-        np.zeros(maps.known.shape, int), np.zeros(maps.known.shape, int), [], nothing, ["material0"]
-    )
+    classes = GroundClasses(nothing.astype(int), nothing.astype(int), [], nothing, [info.name])
     return _report(maps, classes, None, [Material(info, field, grid, 0.0, judged)], [])
 
 

@@ -34,7 +34,7 @@ class TilingOptions:
         trend: width of the low-pass that is removed, in tile sides.
         candidates: places that a search compares.
         tries: the best of them that are cut before one is taken.
-        kind: the energy of seams, one of `energy.KINDS`.
+        kind: the energy of seams, see `energy.SeamEnergy`.
         slope: of the weight of colour as a function of uncertainty.
         source: what the semantics are made of.
         levels: of the tiles, a number or AUTO; None: as many as are given.

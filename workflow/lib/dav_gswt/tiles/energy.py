@@ -23,7 +23,6 @@ from numpy import ndarray as Array
 
 from dav_gswt.views.uncertainty import gamma
 
-KINDS = ("none", "colour", "semantic", "semantic-nogamma")
 OCCLUDER_WEIGHT = 2.0  # D of a hidden cell beside bare ground, in units of two random colours
 EPS = 1.0  # of the mean gradient: with less, a cut through a bush (steep everywhere) is as cheap as one through sand
 ROUNDING = 1e-9  # of colours, which are about 1
@@ -95,7 +94,7 @@ class SeamEnergy:
     """How seams are cut and priced.
 
     Attributes:
-        kind: one of KINDS.
+        kind: `none` (straight), `colour`, `semantic` or `semantic-nogamma`.
         slope: of gamma as a function of uncertainty; the paper's is 2.
         colours, semantics: layers; semantics are None for colour alone.
         occluders: share of each cell that is hidden; None for nothing.
