@@ -147,7 +147,7 @@ def fit_surface(grid: Ground, points: Float[Array, "n 3"]) -> Float[Array, "rows
     u = np.clip((points[:, 0] - grid.west) / (columns * grid.spacing) * (nx - 1), 0, nx - 1.000001)
     sample = _bilinear(v, u, ny, nx)
     first, second = ([np.diff(np.eye(n), order, axis=0) for n in (ny, nx)] for order in (1, 2))
-    bend = kron(identity(ny), second[1]), kron(second[0], identity(nx)), 2 * kron(*first)
+    bend = kron(identity(ny), second[1]), kron(second[0], identity(nx)), 2 * kron(first[0], first[1])
     stiff = STIFFNESS * reduce(add, (b.T @ b for b in bend)) + 1e-9 * identity(ny * nx)
     z, weight, knots = points[:, 2], np.ones(len(points)), np.zeros(ny * nx)
     for _ in range(5):
