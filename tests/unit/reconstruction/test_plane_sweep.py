@@ -86,9 +86,9 @@ def test_nothing_is_a_column():
     assert not plane_sweep.reject_columns(np.zeros((4, 4), bool), np.zeros((4, 4)), 0.1).any()
 
 
-def test_ground_that_fewer_than_two_photos_see_is_not_known(photos):
+def test_on_ground_that_fewer_than_two_photos_see_nothing_stands(photos):
     alone = plane_sweep.sweep_heights(made.grid(0.1), photos[:1], flying_height=4.0, pixel=0.08)
-    assert not alone.known.any() and not alone.stands.any() and not alone.above.any()
+    assert not alone.stands.any() and not alone.above.any()
 
 
 def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
@@ -121,7 +121,7 @@ def test_costs_add_up_over_paths_from_four_sides_by_a_plain_loop():
 
 def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_nothing():
     grid = made.grid()
-    flat = plane_sweep.Relief(grid, np.zeros(grid.shape), np.zeros(grid.shape, bool), np.ones(grid.shape, bool), 0.1)
+    flat = plane_sweep.Relief(grid, np.zeros(grid.shape), np.zeros(grid.shape, bool), 0.1)
     crowd = np.array([[1.0, 1.0, 0.5], [1.1, 1.0, 0.5], [1.0, 1.1, 0.5], [1.1, 1.1, 0.55]])
     points = np.concatenate([crowd, [[2.5, 2.5, 0.5], [1.0, 1.05, 3.0], [1.0, 1.0, 0.05]]])
     field = objects.make_isolated_points(grid, flat, points, np.full((7, 3), 0.5), band=1.0)
