@@ -173,12 +173,18 @@ def test_every_object_has_a_closed_hull_that_holds_what_is_drawn(exported, facts
         assert outside.max() < 0.05 and hull.volume < 1
 
 
-def test_a_hull_reaches_one_deviation_of_what_is_solid_and_what_is_flat_has_none():
+def test_a_hull_reaches_one_deviation_of_what_is_solid():
     ball = gaussians([[1.0, 2, 3], [9, 9, 9]], LEAF, [0.3, 0.2, 0.1])
     points = ground_surface.find_outermost(replace(ball, opacity_logits=np.float32([4, -4])))
     np.testing.assert_allclose(np.linalg.norm((points - [1, 2, 3]) / [0.3, 0.2, 0.1], axis=1), 1, rtol=1e-5)
     np.testing.assert_allclose(np.ptp(points, axis=0), [0.6, 0.4, 0.2], atol=0.015)
-    assert ground_surface.wrap(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]])) is None
+
+
+def test_what_is_flat_has_no_hull(cover_terrain):
+    leaf = gaussians([[0.0, 0, 0]], LEAF, [0.3, 0.2, 1e-12])
+    flat = replace(cover_terrain, objects=[[leaf] * 2], heights=endless.FlatSurface())
+    assert cover_terrain.scatter is not None
+    assert not list(ground_surface.collect_hulls(flat, AREA, find_origin(flat, AREA)))
 
 
 def test_mujoco_loads_the_model_and_its_rays_meet_the_heights(exported, facts, surface):
