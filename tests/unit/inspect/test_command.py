@@ -13,7 +13,7 @@ from dav_gswt.inspect import plot, readers
     "where, shown",
     [
         ("{round}", "Gaussians"),
-        ("{round}/levels", "level 1"),
+        ("{round}/levels", "level 0, level 1 of 2"),
         ("{scored}", "12 candidates; 0 chosen"),
         ("{photos}", "3 cameras"),
         ("{start}/views.json", "3 cameras"),
