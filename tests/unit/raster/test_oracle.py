@@ -80,6 +80,6 @@ def test_no_pixel_of_a_thin_or_tilted_splat_is_left_out(raster):
     tensors = {name: torch.tensor(values, dtype=torch.float64) for name, values in arrays.items()}
     splats = oracle.project(**tensors, camera=camera)
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    wanted = int((oracle.weights(splats, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1))) > 0).sum())
+    wanted = int((oracle.weights(splats.shapes, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1))) > 0).sum())
     raster.forward(**arrays, camera=camera)
     assert wanted > 10_000 and abs(raster.count_pairs() - wanted) <= 1e-4 * wanted + 1
