@@ -46,22 +46,10 @@ def test_other_programs_see_points_of_the_right_colour(field, file):
     assert colour["normalized"] and colour["componentType"] == 5121
 
 
-@pytest.mark.parametrize(
-    "size, parts, message",
-    [(2**32, [], "more than a GLB holds"), (48, [np.zeros((2, 4), np.float32)], "32 bytes where 48")],
-)
-def test_lengths_that_do_not_fit_leave_no_file(tmp_path, size, parts, message):
-    with pytest.raises(ValueError, match=message):
-        glb.write_glb(tmp_path / "a.glb", {}, [(size, parts)])
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_opacities_stay_within_the_unit_interval_and_colours_that_depend_on_the_view_are_refused(tmp_path):
+def test_opacities_stay_within_the_unit_interval(tmp_path):
     field = replace(random_field(3), opacity_logits=np.float32([-800, 0, 800]))
     with Spool(tmp_path / "spool") as placed, np.errstate(over="raise"):
         placed.append(field)
-        with pytest.raises(ValueError, match="degree 0"):
-            placed.append(random_field(3, degree=1))
     glb.write_splats(placed, tmp_path / "a.glb", {})
     document, values = read_glb(tmp_path / "a.glb")
     which = document["meshes"][0]["primitives"][0]["attributes"]["KHR_gaussian_splatting:OPACITY"]

@@ -49,11 +49,6 @@ def test_too_much_is_refused_with_how_much_smaller_it_must_be(cover_terrain, mon
             check(count - 1)
 
 
-def test_a_level_that_is_not_there_is_named(cover_terrain):
-    with pytest.raises(InputError, match=r"export\.level: there is no level 2; the last one is 1"):
-        terrain_files.check_level(cover_terrain, 2)
-
-
 def test_a_set_of_all_levels_is_counted_by_the_finest(cover_terrain, monkeypatch):
     area, both = Area(-1, -1, 3, 2), {name: FORMATS[name] for name in ("ply", "3dtiles")}
     count = int(finite.count_cells(cover_terrain, area, 0).sum())

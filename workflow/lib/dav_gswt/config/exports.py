@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from dav_gswt.config.base import ConfigModel, key
 from dav_gswt.export.formats import FORMATS
@@ -39,9 +39,3 @@ class Export(ConfigModel):
         min_length=1,
         max_length=len(FORMATS),
     )
-
-    @model_validator(mode="after")
-    def _require_sense(self) -> "Export":
-        if len(set(self.formats)) < len(self.formats):
-            raise ValueError("formats has one twice")
-        return self

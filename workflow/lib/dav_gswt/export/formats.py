@@ -26,7 +26,7 @@ class Format:
 FORMATS = {
     "ply": Format("y-down", 68),  # the standard 3DGS PLY
     "spz": Format("y-up", 20, gaussians=10_000_000),  # version 3
-    "glb": Format("y-up", 60, gaussians=(2**32 - 65_536) // 60),  # lengths in the file have 32 bits
+    "glb": Format("y-up", 60),
     "sog": Format("y-down", 68),  # made from a PLY
     "3dtiles": Format("z-up", 2 * 19, all_levels=True),
 }

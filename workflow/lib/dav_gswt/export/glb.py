@@ -7,7 +7,8 @@ https://github.com/CesiumGS/glTF/tree/draft-splat-spz/extensions/2.0/Khronos (a 
 
 import io
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -23,20 +24,17 @@ from dav_gswt.export.spool import Spool
 from dav_gswt.field import SH0
 from dav_gswt.files import atomic_file
 
-MAX_BYTES = 2**32 - 1  # of the whole file: lengths have 32 bits
 ARRAY_BUFFER = 34962
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 COMPONENTS = {"<f4": 5126, "|u1": 5121}
 EXTENSION = "KHR_gaussian_splatting"
 COMPRESSION = "KHR_gaussian_splatting_compression_spz_2"
 
-Part = tuple[int, Iterable[Array]]  # of a file's binary data: a number of bytes, a multiple of four, and the arrays
-
 
 def write_splats(spool: Spool, path: Path | str, extras: dict[str, Any], compressed: bool = False) -> None:
     """Write Gaussians as one primitive, y up. extras: of its node.
 
-    Raises: ValueError: more than a GLB holds; compressed: none, or more than an SPZ holds.
+    Raises: ValueError: compressed: none, or more than an SPZ holds.
     """
     scales = (np.exp(v.astype(float)).astype(np.float32) for v in spool.read("log_scales"))
     quats = (turn_quats(v, Y_UP)[:, [1, 2, 3, 0]] for v in spool.read("quats"))
@@ -50,16 +48,16 @@ def write_splats(spool: Spool, path: Path | str, extras: dict[str, Any], compres
     if not compressed:
         columns[f"{EXTENSION}:OPACITY"] = map(_to_opacity, spool.read("opacity_logits")), 1, "<f4", {}
         columns[f"{EXTENSION}:SH_DEGREE_0_COEF_0"] = spool.read("dc"), 3, "<f4", {}
-    accessors, views, binary, offset = [], [], [], 0
-    for parts, width, kind, more in columns.values():
+    accessors, views, length = [], [], 0
+    for _, width, kind, more in columns.values():
         accessor = {"componentType": COMPONENTS[kind], "count": len(spool), "type": TYPES[width]} | more
         if not compressed:
             size = len(spool) * width * np.dtype(kind).itemsize
             accessor = {"bufferView": len(views)} | accessor
-            views.append({"buffer": 0, "byteOffset": offset, "byteLength": size, "target": ARRAY_BUFFER})
-            binary.append((size, parts))
-            offset += size
+            views.append({"buffer": 0, "byteOffset": length, "byteLength": size, "target": ARRAY_BUFFER})
+            length += size
         accessors.append(accessor)
+    binary = chain.from_iterable(parts for parts, _, _, _ in columns.values())
     splats: dict[str, Any] = {
         "kernel": "ellipse",
         "colorSpace": "srgb_rec709_display",
@@ -73,8 +71,8 @@ def write_splats(spool: Spool, path: Path | str, extras: dict[str, Any], compres
         packed = io.BytesIO()
         pack_spz(spool, packed, 2)
         packed.write(bytes(-packed.tell() % 4))  # readers stop at the end of the gzip
-        views = [{"buffer": 0, "byteOffset": 0, "byteLength": packed.tell()}]
-        binary = [(packed.tell(), [np.frombuffer(packed.getbuffer(), np.uint8)])]
+        length, binary = packed.tell(), [np.frombuffer(packed.getbuffer(), np.uint8)]
+        views = [{"buffer": 0, "byteOffset": 0, "byteLength": length}]
     attributes = {name: number for number, name in enumerate(columns)}
     primitive = {"mode": 0, "attributes": attributes, "extensions": {EXTENSION: splats}}
     document = {
@@ -85,29 +83,22 @@ def write_splats(spool: Spool, path: Path | str, extras: dict[str, Any], compres
         "meshes": [{"name": "terrain", "primitives": [primitive]}],
         "accessors": accessors,
         "bufferViews": views,
+        "buffers": [{"byteLength": length}],
     }
-    write_glb(path, document, binary)
+    _write_glb(path, document, length, binary)
 
 
-def write_glb(path: Path | str, document: dict[str, Any], binary: Sequence[Part]) -> None:
-    """Write a glTF asset with one buffer, whole or not at all.
-
-    document: its JSON without the asset and the buffer. Raises: ValueError: it would be longer than MAX_BYTES.
-    """
+def _write_glb(path: Path | str, document: dict[str, Any], length: int, binary: Iterable[Array]) -> None:
+    """Write a glTF asset, whole or not at all. document: without the asset. binary: arrays of `length` bytes."""
     asset = {"version": "2.0", "generator": f"DAV-GSWT {dav_gswt.__version__}"}
-    length = sum(size for size, _ in binary)
-    document = {"asset": asset} | document | {"buffers": [{"byteLength": length}]}
-    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+    text = json.dumps({"asset": asset} | document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
     total = 12 + 8 + len(text) + 8 + length
-    if total > MAX_BYTES:
-        raise ValueError(f"{path}: {total} bytes are more than a GLB holds")
     with atomic_file(path) as part, part.open("wb") as file:
         file.write(b"glTF" + np.array([2, total, len(text)], "<u4").tobytes() + b"JSON" + text)
         file.write(np.array([length], "<u4").tobytes() + b"BIN\0")
-        for size, parts in binary:
-            if (written := sum(file.write(np.ascontiguousarray(v).tobytes()) for v in parts)) != size:
-                raise ValueError(f"{written} bytes where {size} were announced")
+        for values in binary:
+            file.write(np.ascontiguousarray(values).tobytes())
 
 
 def _to_opacity(logits: Float32[Array, "n 1"]) -> Float32[Array, "n 1"]:

@@ -82,16 +82,13 @@ def measure_tiles(sets: Sequence[TileSet]) -> TileSurfaces:
         for each in progress(sets, "measure the tiles' ground")
         for tile in range(len(each.fields[0]))
     ]
-    return TileSurfaces(steps, _find_spacing(sets), np.stack(heights))
+    return TileSurfaces(steps, min(each.spacing for each in sets), np.stack(heights))
 
 
 def choose_steps(sets: Sequence[TileSet]) -> int:
     """Steps of the lattice in a tile's side: a point or more a ground cell."""
-    return min(MAX_STEPS, 1 << max(1, int(np.ceil(np.log2(sets[0].side / _find_spacing(sets) - 1e-6)))))
-
-
-def _find_spacing(sets: Sequence[TileSet]) -> float:
-    return min(each.spacing for each in sets)
+    spacing = min(each.spacing for each in sets)
+    return min(MAX_STEPS, 1 << max(1, int(np.ceil(np.log2(sets[0].side / spacing - 1e-6)))))
 
 
 def _surround(tiles: TileSet, tile: int) -> GaussianField:

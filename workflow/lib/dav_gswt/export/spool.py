@@ -46,9 +46,7 @@ class Spool:
         return self.count
 
     def append(self, field: GaussianField) -> None:
-        """Add Gaussians. Raises: ValueError: their colours depend on the view."""
-        if field.sh_degree:
-            raise ValueError("a spool holds colours of degree 0")
+        """Add Gaussians whose colours do not depend on the view."""
         for name, file in self._files.items():
             values = field.sh[:, 0] if name == "dc" else getattr(field, name)
             file.write(np.ascontiguousarray(values, "<f4").tobytes())

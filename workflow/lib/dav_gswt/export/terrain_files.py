@@ -48,22 +48,9 @@ def choose_area(settings: Mapping[str, Any]) -> Area:
     return Area(west, south, columns, rows)
 
 
-def find_metres(manifest: Manifest, reference: Georeference | None) -> float | None:
-    """Metres per unit, if they are known."""
-    if reference:
-        return reference.metres_per_unit
-    return 1.0 if manifest.unit == "metre" else None
-
-
 def find_origin(terrain: EndlessTerrain, area: Area) -> Float[Array, "3"]:
     """The world position from which the coordinates of an area's files count: its middle, on the plane z = 0."""
     return np.array([area.west + area.columns / 2, area.south + area.rows / 2, 0.0]) * terrain.side
-
-
-def check_level(terrain: EndlessTerrain, level: int) -> None:
-    """Raises: InputError: the terrain has no such level."""
-    if level >= len(terrain.switches):
-        raise InputError(f"export.level: there is no level {level}; the last one is {len(terrain.switches) - 1}")
 
 
 def check_size(terrain: EndlessTerrain, area: Area, level: int, formats: Mapping[str, Format]) -> None:
@@ -102,9 +89,11 @@ def export_terrain(
     Raises: InputError: more than a file may have, no such level, or a program that a format needs is not installed.
     """
     area, level = choose_area(settings), settings["level"]
+    metres = 1.0 if manifest.unit == "metre" else None
     origin = find_origin(terrain, area)
     formats = {name: FORMATS[name] for name in settings["formats"]}
-    check_level(terrain, level)
+    if level >= len(terrain.switches):
+        raise InputError(f"export.level: there is no level {level}; the last one is {len(terrain.switches) - 1}")
     check_size(terrain, area, level, formats)
     if "sog" in formats:
         splat_files.find_npx()
@@ -121,7 +110,7 @@ def export_terrain(
         with place(area, level) as placed:
             facts: dict[str, Any] = {
                 "unit": manifest.unit,
-                "metres_per_unit": find_metres(manifest, reference),
+                "metres_per_unit": reference.metres_per_unit if reference else metres,
                 "tile_side": terrain.side,
                 "cells": vars(area),
                 "origin": origin.tolist(),

@@ -31,7 +31,6 @@ POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' blob:; worker-src blob:; connect-src blob: data:; "
     "img-src blob: data:; style-src 'unsafe-inline'"
 )
-ADDRESS = r'(?<=")[0-9a-f]{16}(?=["-])|(?<=\$\{)[0-9a-f]{16}(?=[}-])'  # in names of VTK's objects
 ICON = "https://kitware.github.io/vtk-js/icon/favicon-"  # the viewer would request it
 STAGE = '<div class="content" style="position:fixed;inset:0"></div>'  # the viewer fills it
 OVERLAY = Path(__file__).with_name("overlay.html")  # Jinja2 template
@@ -175,7 +174,7 @@ def format_page(scene: Scene, render_window: Any) -> str:
 
 
 def _pack_scene(render_window: Any) -> bytes:
-    """The scene as VTK's viewer reads it: the same bytes for the same scene."""
+    """The scene as VTK's viewer reads it."""
     from trame_vtk.modules.vtk import serializers as vtk
 
     vtk.initialize_serializers()
@@ -185,13 +184,7 @@ def _pack_scene(render_window: Any) -> bytes:
         entry["hash"]: entry | {"content": context.get_cached_data_array(entry["hash"], False)}
         for entry in vtk.extract_array_hash(state)
     }
-    # Objects are numbered in order of appearance instead of by address, and have no times of change.
-    numbers: dict[str, str] = {}
-    text = re.sub(ADDRESS, lambda m: numbers.setdefault(m[0], f"{len(numbers):016x}"), json.dumps(state))
-    state = json.loads(re.sub(r'"mtime": \d+', '"mtime": 1', text))
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w") as archive:
-        entry = zipfile.ZipInfo("index.json", (1980, 1, 1, 0, 0, 0))
-        entry.compress_type = zipfile.ZIP_DEFLATED
-        archive.writestr(entry, json.dumps({"hashes": arrays, "scene": state}))
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("index.json", json.dumps({"hashes": arrays, "scene": state}))
     return packed.getvalue()

@@ -36,7 +36,7 @@ from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import EDGES, LABELS, arrange_torus
 from dav_gswt.views import pose_maps
 from dav_gswt.views.policies import candidate_values
-from dav_gswt.views.scores import Scores, read_scores
+from dav_gswt.views.scores import read_scores
 from dav_gswt.views.selection import read_pose_selection
 
 Reader = Callable[..., Scene]
@@ -117,18 +117,12 @@ def choose(option: str, value: str | None, names: tuple[str, ...], path: Path) -
     return value or names[0]
 
 
-def choose_level(level: int, count: int, path: Path) -> int:
-    """The value of the option of this name. Raises: InputError: there is no such level."""
-    if not 0 <= level < count:
-        raise InputError(f"--level {level}: {path} has the levels 0 to {count - 1}")
-    return level
-
-
 @reader("levels.json")
 def read_levels(path: Path, *, most: int, colour: str | None = None, level: int | None = None) -> Scene:
     """All levels of detail side by side, the finest in the west, or one of them."""
     fields = levels.read_levels(path.parent).fields
-    numbers = range(len(fields)) if level is None else [choose_level(level, len(fields), path)]
+    known = tuple(f"{number}" for number in range(len(fields)))
+    numbers = range(len(fields)) if level is None else [int(choose("level", f"{level}", known, path))]
     step = (1 + GAP) * float(np.ptp(np.quantile(fields[0].means[:, 0], [0.002, 0.998])))
     placed = {f"level {k}": (fields[k], np.array([i * step, 0, 0])) for i, k in enumerate(numbers)}
     scene = show_fields(path, placed, choose("colour", colour, COLOURS, path), most)
@@ -238,7 +232,7 @@ def _show_tiles(
     cut: TileSet | None = None,
 ) -> Scene:
     """All tiles of a level, so that neighbours match."""
-    shown = fields[choose_level(level, len(fields), path)]
+    shown = fields[int(choose("level", f"{level}", tuple(f"{number}" for number in range(len(fields))), path))]
     placed = {f"{tile}": (shown[tile], corner) for tile, corner in place_tiles(len(shown), side * (1 + GAP))}
     scene = show_fields(path, placed, by, most, cut)
     scene.notes.append(f"{len(shown)} tiles, {len(fields)} levels, {side:.4g} wide; level {level}")
@@ -334,7 +328,10 @@ def read_poses(path: Path, *, most: int, colour: str | None = None) -> Scene:
     bar, middle = fit_bar(values), frame.exemplar.centre
     tint, at = map_colours(bar, values), middle + np.array([pose_offset(pose) for pose in table.poses])
     radius = float(np.median(np.linalg.norm(at - middle, axis=1)))
-    chosen = find_chosen(path, table) if path.name == "poses.json" else []
+    names = [pose.name for pose in read_pose_selection(path).poses] if path.name == "poses.json" else []
+    if unknown := set(names) - set(table.names):
+        raise InputError(f"{path}: {min(unknown)} is not among the scored poses; give the poses of the round after")
+    chosen = [table.names.index(name) for name in names]
     notes = [f"{len(table)} candidates; {len(chosen)} chosen, numbered in order"]
     scene = Scene(str(path), notes + ([f"{title}: {unit}"] if unit else []), bars={title: bar})
     rest = np.setdiff1d(np.arange(len(table)), chosen)
@@ -352,14 +349,6 @@ def read_poses(path: Path, *, most: int, colour: str | None = None) -> Scene:
     return scene
 
 
-def find_chosen(path: Path, table: Scores) -> list[int]:
-    """The rows of a poses.json among the candidates, in order. Raises: InputError: they are of other candidates."""
-    names = [pose.name for pose in read_pose_selection(path).poses]
-    if unknown := set(names) - set(table.names):
-        raise InputError(f"{path}: {min(unknown)} is not among the scored poses; give the poses of the round after")
-    return [table.names.index(name) for name in names]
-
-
 def find_scores(poses: Path) -> Path:
     """The scores that a round's poses were chosen by, of another preset if that chose them.
 
@@ -371,10 +360,7 @@ def find_scores(poses: Path) -> Path:
         raise InputError(f"{poses}: lies in no round of the result tree; give its scores.csv")
     by = read_pose_selection(poses).chosen_with
     of = ({"preset": by} if by else {}) | ({} if number == 1 else {"t": number - 1})
-    scores = related_folder(poses, "scored" if number == 1 else "round", **of) / "scores.csv"
-    if not scores.is_file():
-        raise InputError(f"{poses}: the scores by which they were chosen are missing ({scores}); make them again")
-    return scores
+    return related_folder(poses, "scored" if number == 1 else "round", **of) / "scores.csv"
 
 
 @reader("maps.npz")
@@ -387,10 +373,7 @@ def read_pose_maps(
         known = {"opacity": maps.opacity} | ({} if maps.w2_sq is None else {"w2_sq": maps.w2_sq})
         parts = {name: {key: values[i] for key, values in known.items()} for i, name in enumerate(maps.names)}
         return _show_pictures(path, parts, part, channel)
-    file = find_above(path, "field.ply", "whose Gaussians it describes", folders=2)
-    field = read_field(file)
-    if uncertainty.ndim != 1 or len(uncertainty) > len(field) or not np.isfinite(uncertainty).all():
-        raise InputError(f"{path}: describes other Gaussians than {file} has; score the poses again")
+    field = read_field(find_above(path, "field.ply", "whose Gaussians it describes", folders=2))
     field = pose_maps.apply_uncertainty(field, uncertainty.astype(np.float32))
     by = choose("colour", colour or "uncertainty", COLOURS, path)
     return show_fields(path, {"": (field, np.zeros(3))}, by, most)
@@ -446,8 +429,6 @@ def _show_surface(path: Path, grid: Ground, channels: dict[str, Array], channel:
     first = next((name for name in ("Z", "uncertainty") if name in channels), next(iter(channels)))
     name = choose("channel", channel, (first, *sorted(set(channels) - {first})), path)
     values = channels[name]
-    if values.shape != grid.shape:
-        raise InputError(f"{path}: has {values.shape} cells and the ground beside it {grid.shape}; score again")
     bar = make_bar(0.0, 1.0) if name in ("uncertainty", "seen") else fit_bar(values, _choose_map(name))
     step = ceil((values.size / most) ** 0.5) if values.size > most else 1
     notes = [f"{grid.shape[1]} x {grid.shape[0]} cells of {grid.spacing:.4g}, by {name}"]

@@ -6,8 +6,6 @@ The backward pass blends again, so that no intermediate values are kept. Results
 of threads.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32, Int
@@ -32,41 +30,27 @@ BATCH = 1 << 19  # splats times pixels that are blended at a time: a few MB an i
 LARGEST = 1e12  # pixels of a centre, and one over pixels of a root: float32 ends at 3e38
 
 
-@dataclass(frozen=True)
-class SquareGroup:
-    """Squares of the picture that are blended together.
-
-    pixels: row times the padded width plus column. rows: the splats' rows in their tables, front to back; shorter lists
-    are padded with the last row, which is empty.
-    """
-
-    pixels: Int[Tensor, "b p"]
-    rows: Int[Tensor, "b length"]
-
-
-@dataclass(frozen=True)
-class BinnedSplats:
-    """The splats of a forward pass by squares. index: which Gaussian each is."""
-
-    groups: list[SquareGroup]
-    index: Int[Tensor, "m"]
+# Squares of the picture that are blended together. Their pixels: row times the padded width plus column. The rows of
+# their splats' tables, front to back; shorter lists are padded with the last row, which is empty.
+Squares = tuple[Int[Tensor, "b p"], Int[Tensor, "b length"]]
+Binned = tuple[list[Squares], Int[Tensor, "m"]]  # the splats of a forward pass, and which Gaussian each is
 
 
 class Rasterizer(interface.Rasterizer):
     """See `interface.Rasterizer`. The number of threads is PyTorch's own (torch.set_num_threads)."""
 
-    def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, BinnedSplats]:
+    def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Binned]:
         gaussians.check_values()
         with torch.no_grad():
             splats, shapes, values = self._project(to_leaves(gaussians), camera)
             groups = _group_squares(splats, camera)
             picture = _pad(torch.zeros(camera.height, camera.width, values.shape[1]))
-            for group in groups:
-                weight = oracle.weights(shapes[group.rows], _place(group.pixels, picture.shape[1]))
-                picture.view(-1, values.shape[1])[group.pixels] = weight @ values[group.rows]
+            for pixels, rows in groups:
+                weight = oracle.weights(shapes[rows], _place(pixels, picture.shape[1]))
+                picture.view(-1, values.shape[1])[pixels] = weight @ values[rows]
         array = picture[: camera.height, : camera.width].numpy()
         parts = array[..., :-2], array[..., -2], array[..., -1]
-        return Rendering(*(np.ascontiguousarray(part) for part in parts)), BinnedSplats(groups, splats.index)
+        return Rendering(*(np.ascontiguousarray(part) for part in parts)), (groups, splats.index)
 
     @torch.enable_grad()
     def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
@@ -74,37 +58,39 @@ class Rasterizer(interface.Rasterizer):
         leaves = {name: leaf.requires_grad_() for name, leaf in to_leaves(last.gaussians).items()}
         _, *tables = self._project(leaves, last.camera)
         by_tables = [torch.zeros_like(table) for table in tables]
-        for group in last.state.groups:
-            shapes, values = (table.detach()[group.rows].requires_grad_() for table in tables)
-            blended = oracle.weights(shapes, _place(group.pixels, by_picture.shape[1])) @ values
-            parts = torch.autograd.grad(blended, (shapes, values), by_picture.flatten(0, 1)[group.pixels])
+        for pixels, rows in last.state[0]:
+            shapes, values = (table.detach()[rows].requires_grad_() for table in tables)
+            blended = oracle.weights(shapes, _place(pixels, by_picture.shape[1])) @ values
+            parts = torch.autograd.grad(blended, (shapes, values), by_picture.flatten(0, 1)[pixels])
             for total, part in zip(by_tables, parts, strict=True):
-                total.index_add_(0, group.rows.flatten(), part.flatten(0, 1))
+                total.index_add_(0, rows.flatten(), part.flatten(0, 1))
         found = torch.autograd.grad(tables, list(leaves.values()), by_tables, materialize_grads=True)
         arrays = (np.ascontiguousarray(gradient.numpy(), np.float32) for gradient in found)
         return Gradients(**dict(zip(leaves, arrays, strict=True)))
 
     def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
+        groups, index = last.state
         inside = np.ones((*weights.shape[:2], 1), np.float32)  # the padding beyond the picture counts for nothing
         maps = _pad(torch.as_tensor(np.concatenate([inside, weights], 2)))
         with torch.no_grad():
             _, shapes, _ = self._project(to_leaves(last.gaussians), last.camera)
             sums = torch.zeros(len(shapes), maps.shape[2])
             maximum = torch.zeros(len(shapes))
-            for group in last.state.groups:
-                at, seen = group.rows.flatten(), maps.flatten(0, 1)[group.pixels]
-                w = oracle.weights(shapes[group.rows], _place(group.pixels, maps.shape[1])) * seen[..., :1]
+            for pixels, rows in groups:
+                at, seen = rows.flatten(), maps.flatten(0, 1)[pixels]
+                w = oracle.weights(shapes[rows], _place(pixels, maps.shape[1])) * seen[..., :1]
                 sums.index_add_(0, at, (w.mT @ seen).flatten(0, 1))
                 maximum.scatter_reduce_(0, at, w.amax(1).flatten(), "amax")
         found = torch.zeros(len(last.gaussians.means), maps.shape[2] + 1)
-        found[last.state.index] = torch.cat([sums, maximum[:, None]], 1)[:-1]
+        found[index] = torch.cat([sums, maximum[:, None]], 1)[:-1]
         return Contributions(*(np.ascontiguousarray(found[:, i]) for i in (0, -1, slice(1, -1))))
 
     def _visible(self, last: Forward) -> Bool[Array, "n"]:
+        groups, index = last.state
         visible = np.zeros(len(last.gaussians.means) + 1, bool)
-        where = torch.cat([last.state.index, torch.tensor([len(visible) - 1])])
-        for group in last.state.groups:
-            visible[where[group.rows.flatten()].numpy()] = True
+        where = torch.cat([index, torch.tensor([len(visible) - 1])])
+        for _, rows in groups:
+            visible[where[rows.flatten()].numpy()] = True
         return visible[:-1]
 
     def _project(self, leaves: dict[str, Tensor], camera: Camera):
@@ -143,7 +129,7 @@ def _place(pixels: Int[Tensor, "b p"], width: int) -> Float32[Tensor, "b p 2"]:
     return torch.stack([pixels % width, pixels // width], -1) + 0.5
 
 
-def _group_squares(splats: Splats, camera: Camera) -> list[SquareGroup]:
+def _group_squares(splats: Splats, camera: Camera) -> list[Squares]:
     """The squares of the picture that splats meet, in groups with similar numbers of splats."""
     low, high = (bound // SIDE for bound in _bound_boxes(splats, camera))
     size = (high - low + 1).clamp(min=0)
@@ -166,7 +152,7 @@ def _group_squares(splats: Splats, camera: Camera) -> list[SquareGroup]:
         at = (first[some, None] + place).clamp(max=len(rows) - 1)
         theirs = torch.where(place < lengths[some, None], rows[at], len(count))
         first_pixel = (some // width * width * SIDE + some % width) * SIDE
-        groups.append(SquareGroup(first_pixel[:, None] + inside, theirs))
+        groups.append((first_pixel[:, None] + inside, theirs))
         done += len(some)
     return groups
 
