@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.finite_cells import collect_cells
 from fixtures.land_covers import LEAF, cover_content, gaussians
 from fixtures.splat_files import read_glb
 from scipy.ndimage import map_coordinates
@@ -73,7 +74,7 @@ def sample_surface(surface, x, y):
 def test_heights_are_those_that_a_camera_above_sees(cover_terrain, surface):
     """Of the whole terrain without its objects: the blades of the grass are thin."""
     bare = replace(cover_terrain, scatter=None, objects=[])
-    field = finite.collect_cells(bare, *(AREA.west, AREA.south, AREA.columns, AREA.rows), 0)
+    field = collect_cells(bare, *(AREA.west, AREA.south, AREA.columns, AREA.rows), 0)
     pixel = surface.cell
     size = [int(n * cover_terrain.side / pixel) for n in (AREA.columns, AREA.rows)]
     seen = render(field, cameras.top_down(0.0, 0.0, *size, pixel, 10.0))  # `collect_cells` counts from the corner
@@ -159,8 +160,8 @@ def test_every_object_has_a_closed_hull_that_holds_what_is_drawn(exported, facts
     found = cover_terrain.scatter.instances_in(i, j)
     meshes = list(read_meshes(exported / "objects.glb"))
     assert len(meshes) == len(found) == facts["objects"] > 0
-    bare = len(finite.collect_cells(replace(cover_terrain, scatter=None, objects=[]), 0, -1, 6, 5, 0))
-    drawn = finite.collect_cells(cover_terrain, 0, -1, 6, 5, 0)[bare:].means.reshape(len(found), -1, 3)
+    bare = len(collect_cells(replace(cover_terrain, scatter=None, objects=[]), 0, -1, 6, 5, 0))
+    drawn = collect_cells(cover_terrain, 0, -1, 6, 5, 0)[bare:].means.reshape(len(found), -1, 3)
     corner = np.array([0, -cover_terrain.side, 0]) - find_origin(cover_terrain, AREA)
     for (node, vertices, triangles), centres in zip(meshes, drawn, strict=True):
         assert node["name"].startswith("shrub") and node["extras"]["convex"]

@@ -5,6 +5,7 @@ from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
+from fixtures.finite_cells import collect_cells
 from fixtures.splat_files import read_glb_splats, read_spz
 
 from dav_gswt.errors import InputError
@@ -31,7 +32,7 @@ def test_every_file_shows_what_the_terrain_shows(cover_bundle, cover_terrain, ex
     there, here = (cameras.pinhole(at, at + ahead, SIZE, SIZE, 40.0) for at in (eye, eye - facts["origin"]))
     manifest = cover_bundle.manifest
     wanted = stills.render_view(cover_terrain, there, manifest.sky, manifest.ground_colour)
-    exact = finite.collect_cells(cover_terrain, -3, -3, 6, 6, 0)
+    exact = collect_cells(cover_terrain, -3, -3, 6, 6, 0)
     exact = replace(exact, means=exact.means - np.float32([3 * cover_terrain.side, 3 * cover_terrain.side, 0]))
     same = render(exact, here).colour
     for name, read in READERS.items():
@@ -69,7 +70,7 @@ def test_the_converter_is_given_a_ply(cover_terrain, export, tmp_path, monkeypat
     monkeypatch.setattr(splat_files.shutil, "which", lambda name: "/bin/npx")
     monkeypatch.setattr(splat_files.subprocess, "run", run)
     facts = export(formats=["sog", "3dtiles"])
-    counts = [len(finite.collect_cells(cover_terrain, -1, -1, 3, 2, level)) for level in (0, 1)]
+    counts = [len(collect_cells(cover_terrain, -1, -1, 3, 2, level)) for level in (0, 1)]
     assert asked == [facts["gaussians"]]
     assert facts["gaussians_by_format"] == {"sog": facts["gaussians"], "3dtiles": sum(counts)}
     assert facts["files"] == {"sog": "y-down", "3dtiles": "z-up"}

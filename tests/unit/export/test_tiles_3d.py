@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.finite_cells import collect_cells
 from fixtures.random_field import random_field
 from fixtures.splat_files import read_glb_spz
 from pyproj import Transformer
@@ -15,7 +16,6 @@ from dav_gswt.export.axes import Y_UP, turn_field
 from dav_gswt.export.spool import ExportJob, Spool
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.terrain import finite
 from dav_gswt.terrain.finite import Area
 
 PLACE = Georeference(47.1, 11.3, 600.0, 20.0, metres_per_unit=1.5)
@@ -77,7 +77,7 @@ def test_every_level_has_the_gaussians_of_the_terrain(write, cover_terrain):
     for level in (0, 1):
         parts = [read_glb_spz(path) for path in sorted(folder.glob(f"{level}/*.glb"))]
         found = turn_field(concatenate_fields(parts), Y_UP.T)
-        wanted = finite.collect_cells(cover_terrain, west, south, 5, 3, level)
+        wanted = collect_cells(cover_terrain, west, south, 5, 3, level)
         np.testing.assert_allclose(np.sort(found.means, 0), np.sort(wanted.means + corner, 0), atol=1e-3)
         np.testing.assert_allclose(np.sort(found.log_scales, 0), np.sort(wanted.log_scales, 0), atol=1 / 32 + 1e-4)
     extension = tileset["extensions"]["3DTILES_content_gltf"]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fixtures.finite_cells import collect_cells
 from fixtures.land_covers import SIDE, write_cover_bundle
 
 from dav_gswt.bundle import store
@@ -75,7 +76,7 @@ def bundle(tmp_path_factory, root):
 def test_it_looks_as_the_terrain_does(bundle, surface, corner):
     terrain = endless.terrain_from_bundle(bundle, surface)
     west, south = corner
-    field = finite.collect_cells(terrain, west - 4, south - 4, 9, 9, 0)
+    field = collect_cells(terrain, west - 4, south - 4, 9, 9, 0)
     x, y = (west + 0.5) * SIDE, (south + 0.5) * SIDE
     ground = float(terrain.heights.at(np.array([x]), np.array([y]))[0][0])
     eye = np.array([x, y, ground + 2 * SIDE])

@@ -76,15 +76,6 @@ def count_cells(terrain: EndlessTerrain, area: Area, level: int) -> Ints:
     return np.concatenate([np.zeros(0, np.int64), *(count_gaussians(kept, some) for some in slices)])
 
 
-def collect_cells(terrain: EndlessTerrain, west: int, south: int, columns: int, rows: int, level: int) -> GaussianField:
-    """Gaussians of `columns` x `rows` cells and of the objects whose feet lie in them, on the surface.
-
-    Positions count from the south-western corner of the cell (west, south), so float32 resolves them far out.
-    """
-    corner = np.array([west * terrain.side, south * terrain.side, 0.0])
-    return place_block(terrain, list_grid(terrain, Area(west, south, columns, rows)), level, corner)()
-
-
 def list_blocks(terrain: EndlessTerrain, area: Area, level: int) -> list[GridCells]:
     """The cells of an area in blocks of about BLOCK Gaussians of a level, row by row."""
     cells = list_grid(terrain, area)
