@@ -1,7 +1,7 @@
 """A rover drives over an exported ground in MuJoCo; what its camera sees is drawn by our renderer on the CPU.
 
     .venv/bin/pip install mujoco
-    .venv/bin/dav-gswt export results/desert --columns 14 --rows 14 --format ply --format ground -o out
+    .venv/bin/dav-gswt export results/desert --columns 14 --rows 14 --formats ply ground -o out
     .venv/bin/python examples/rover/rover.py out rover.webp
 
 MuJoCo has the height field and the objects' hulls of out/ground; the pictures are the Gaussians of out/terrain. Both

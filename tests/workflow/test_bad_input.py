@@ -134,15 +134,6 @@ def test_photos_of_mixed_sizes_find_their_places(snakemake, some_of_the_beach):
     assert all(left["reason"] for left in frame["left_out"])
 
 
-def test_a_photo_cut_short_stops_before_any_is_used(refused, photo_sets, tmp_path):
-    (tmp_path / "photos").mkdir()
-    for path in image_files.list_photos(photo_sets / "brighton_beach/images")[:4]:
-        shutil.copy(path, tmp_path / "photos")
-    whole = path.read_bytes()
-    (tmp_path / "photos" / path.name).write_bytes(whole[: len(whole) // 3])
-    assert refused(PHOTOS)[-1].startswith(f"photos/{path.name}: damaged or cut short")
-
-
 def test_a_missing_folder_of_photos_is_named(run, checkout, tmp_path):
     (tmp_path / "missing.yaml").write_text("scenes: {copr_dunes: {folder: photos/of_nothing}}\n")
     done = run(checkout(tmp_path / "clone"), "--scene", "copr_dunes", "--configfile", tmp_path / "missing.yaml")

@@ -88,7 +88,7 @@ def test_a_run_leaves_for_other_programs(tiny, snakemake, tmp_path):
     folder = shutil.copytree(tiny.folder, tmp_path / "exported")
     bundle, side = tiny.bundle.relative_to(tiny.folder), read_json(tiny.bundle / "davgswt.json")["tile_side"]
     model = tiny.round.relative_to(tiny.folder) / "exports/model"
-    export = "export={columns: 3, rows: 2, level: by_distance, formats: [ply, glb, 3dtiles]}"
+    export = "export={columns: 3, rows: 2, level: 1, formats: [ply, glb, 3dtiles]}"
     targets = [str(model), *(str(bundle / f"exports/{name}") for name in ("terrain", "ground"))]
     snakemake(folder, *targets, "--cores", "2", "--config", export, configs=CONFIGS)
 

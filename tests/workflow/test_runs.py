@@ -74,11 +74,6 @@ def test_photos_and_their_cameras_are_there(tiny, tiny_config):
         assert image_files.read_size(tiny.photos / "images" / name) == (scene["size"], scene["size"])
 
 
-def test_no_photo_both_tests_and_is_fitted(tiny):
-    views = read_json(tiny.start / "views.json")
-    assert views["test"] and not set(views["test"]) & set(views["start"] + views["pool"])
-
-
 def test_fields_lie_on_their_grids(tiny):
     """One disc a cell, first and in the grid's order: what levels and tiles rest on."""
     levels = [(tiny.round / f"levels/level{level}.ply", tiny.round / f"levels/level{level}.exr") for level in (0, 1)]

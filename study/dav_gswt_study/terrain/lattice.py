@@ -19,7 +19,7 @@ from scipy.ndimage import gaussian_filter
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import render
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.finite import collect_cells
+from dav_gswt.terrain.finite import Area, list_grid, place_block
 from dav_gswt_study.seams.repetition import autocorrelate
 
 TILES = 20  # a side of the picture
@@ -52,7 +52,8 @@ def render_from_above(
     strips = []
     for row in range(0, tiles, STRIP):
         rows = min(STRIP, tiles - row)
-        field = collect_cells(terrain, -1, row - 1, tiles + 2, rows + 2, level)  # what reaches over the edges, too
+        cells = list_grid(terrain, Area(-1, row - 1, tiles + 2, rows + 2))  # what reaches over the edges, too
+        field = place_block(terrain, cells, level, np.array([-terrain.side, (row - 1) * terrain.side, 0.0]))()
         top = float(field.means[:, 2].max()) + 10 * terrain.side
         camera = cameras.top_down(terrain.side, terrain.side, tiles * pixels, rows * pixels, step, top)
         strips.append(render(field, camera).colour)

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from dav_gswt.export import spool
 from dav_gswt.export.axes import Y_DOWN, Y_UP, turn_field, turn_points
-from dav_gswt.export.spool import Spool, unite_boxes
+from dav_gswt.export.spool import Spool
 from dav_gswt.raster.interface import RIM
 
 ANY = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
@@ -58,10 +58,3 @@ def test_rims_touch_the_box_and_do_not_leave_it(tmp_path, monkeypatch):
     )
     assert (rims >= low - 1e-4).all() and (rims <= high + 1e-4).all()
     np.testing.assert_allclose([rims.min(0), rims.max(0)], [low, high], atol=0.02 * np.ptp(rims))
-
-
-def test_nothing_has_no_box_and_a_union_holds_its_parts(tmp_path):
-    with Spool(tmp_path / "spool") as placed, pytest.raises(ValueError):
-        placed.find_box()
-    boxes = [(np.zeros(3), np.array([1.0, 2, 3])), (np.array([-1.0, 1, 1]), np.array([0.5, 4, 2]))]
-    np.testing.assert_array_equal(unite_boxes(boxes), [[-1, 0, 0], [1, 4, 3]])

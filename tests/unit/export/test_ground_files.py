@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.finite_cells import collect_cells
 from fixtures.land_covers import LEAF, cover_content, gaussians
 from fixtures.splat_files import read_glb
 from scipy.ndimage import map_coordinates
@@ -73,7 +74,7 @@ def sample_surface(surface, x, y):
 def test_heights_are_those_that_a_camera_above_sees(cover_terrain, surface):
     """Of the whole terrain without its objects: the blades of the grass are thin."""
     bare = replace(cover_terrain, scatter=None, objects=[])
-    field = finite.collect_cells(bare, *(AREA.west, AREA.south, AREA.columns, AREA.rows), 0)
+    field = collect_cells(bare, *(AREA.west, AREA.south, AREA.columns, AREA.rows), 0)
     pixel = surface.cell
     size = [int(n * cover_terrain.side / pixel) for n in (AREA.columns, AREA.rows)]
     seen = render(field, cameras.top_down(0.0, 0.0, *size, pixel, 10.0))  # `collect_cells` counts from the corner
@@ -159,8 +160,8 @@ def test_every_object_has_a_closed_hull_that_holds_what_is_drawn(exported, facts
     found = cover_terrain.scatter.instances_in(i, j)
     meshes = list(read_meshes(exported / "objects.glb"))
     assert len(meshes) == len(found) == facts["objects"] > 0
-    bare = len(finite.collect_cells(replace(cover_terrain, scatter=None, objects=[]), 0, -1, 6, 5, 0))
-    drawn = finite.collect_cells(cover_terrain, 0, -1, 6, 5, 0)[bare:].means.reshape(len(found), -1, 3)
+    bare = len(collect_cells(replace(cover_terrain, scatter=None, objects=[]), 0, -1, 6, 5, 0))
+    drawn = collect_cells(cover_terrain, 0, -1, 6, 5, 0)[bare:].means.reshape(len(found), -1, 3)
     corner = np.array([0, -cover_terrain.side, 0]) - find_origin(cover_terrain, AREA)
     for (node, vertices, triangles), centres in zip(meshes, drawn, strict=True):
         assert node["name"].startswith("shrub") and node["extras"]["convex"]
@@ -173,12 +174,18 @@ def test_every_object_has_a_closed_hull_that_holds_what_is_drawn(exported, facts
         assert outside.max() < 0.05 and hull.volume < 1
 
 
-def test_a_hull_reaches_one_deviation_of_what_is_solid_and_what_is_flat_has_none():
+def test_a_hull_reaches_one_deviation_of_what_is_solid():
     ball = gaussians([[1.0, 2, 3], [9, 9, 9]], LEAF, [0.3, 0.2, 0.1])
     points = ground_surface.find_outermost(replace(ball, opacity_logits=np.float32([4, -4])))
     np.testing.assert_allclose(np.linalg.norm((points - [1, 2, 3]) / [0.3, 0.2, 0.1], axis=1), 1, rtol=1e-5)
     np.testing.assert_allclose(np.ptp(points, axis=0), [0.6, 0.4, 0.2], atol=0.015)
-    assert ground_surface.wrap(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]])) is None
+
+
+def test_what_is_flat_has_no_hull(cover_terrain):
+    leaf = gaussians([[0.0, 0, 0]], LEAF, [0.3, 0.2, 1e-12])
+    flat = replace(cover_terrain, objects=[[leaf] * 2], heights=endless.FlatSurface())
+    assert cover_terrain.scatter is not None
+    assert not list(ground_surface.collect_hulls(flat, AREA, find_origin(flat, AREA)))
 
 
 def test_mujoco_loads_the_model_and_its_rays_meet_the_heights(exported, facts, surface):

@@ -47,13 +47,6 @@ def test_larger_tolerances_need_fewer_triangles_and_a_plane_two_a_block():
     assert len(triangles) == 4 and len(points) == 6
 
 
-def test_the_bound_holds_in_a_block_beside_the_first():
-    y, x = np.mgrid[: BLOCK + 1, : 2 * BLOCK + 1]
-    heights = np.minimum(np.maximum(x - BLOCK, 0) + y, BLOCK).astype(np.float32)  # a fold across the eastern block
-    points, triangles = simplify_heights(heights, BLOCK, 0.01)
-    np.testing.assert_allclose(fill(heights, points, triangles), heights, atol=0.01)
-
-
 @pytest.mark.parametrize("at", [(7, 12), (16, 16), (0, 8)])
 def test_one_spike_is_kept_and_makes_no_crack(at):
     heights = np.zeros((2 * BLOCK + 1, 3 * BLOCK + 1), np.float32)
@@ -61,9 +54,3 @@ def test_one_spike_is_kept_and_makes_no_crack(at):
     points, triangles = simplify_heights(heights, BLOCK, 0.01)
     np.testing.assert_allclose(fill(heights, points, triangles), heights, atol=1e-9)
     assert len(triangles) < 200
-
-
-@pytest.mark.parametrize("shape, block", [((16, 17), 16), ((17, 17), 12), ((1, 17), 16), ((17, 17), 1)])
-def test_fields_that_are_not_of_whole_blocks_are_refused(shape, block):
-    with pytest.raises(ValueError, match="is not of blocks"):
-        simplify_heights(np.zeros(shape, np.float32), block, 0.1)

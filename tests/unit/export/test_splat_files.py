@@ -10,7 +10,7 @@ from fixtures.splat_files import read_glb, read_glb_splats, read_spz
 
 from dav_gswt.export import glb, splat_files
 from dav_gswt.export.axes import Y_UP, turn_field
-from dav_gswt.export.formats import EXPORTERS
+from dav_gswt.export.formats import FORMATS
 from dav_gswt.export.spool import Spool
 
 
@@ -28,7 +28,7 @@ def test_a_glb_has_every_gaussian_with_y_up_in_the_announced_size(field, file):
     np.testing.assert_allclose(read.opacity_logits, wanted.opacity_logits, atol=1e-4)
     np.testing.assert_allclose(read.quats, wanted.quats, atol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(read.quats, axis=1), 1, atol=1e-6)
-    assert 0 <= file.stat().st_size - len(field) * EXPORTERS["glb"].bytes <= 65_536
+    assert 0 <= file.stat().st_size - len(field) * FORMATS["glb"].bytes <= 65_536
 
 
 def test_other_programs_see_points_of_the_right_colour(field, file):
@@ -46,24 +46,10 @@ def test_other_programs_see_points_of_the_right_colour(field, file):
     assert colour["normalized"] and colour["componentType"] == 5121
 
 
-@pytest.mark.parametrize(
-    "parts, count, message",
-    [([], 2**28, "more than a GLB holds"), ([np.zeros((2, 4), np.float32)], 3, "32 bytes where 48")],
-)
-def test_lengths_that_do_not_fit_leave_no_file(tmp_path, parts, count, message):
-    writer = glb.GlbWriter({})
-    writer.add(parts, count, 4)
-    with pytest.raises(ValueError, match=message):
-        writer.write(tmp_path / "a.glb")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_opacities_stay_within_the_unit_interval_and_colours_that_depend_on_the_view_are_refused(tmp_path):
+def test_opacities_stay_within_the_unit_interval(tmp_path):
     field = replace(random_field(3), opacity_logits=np.float32([-800, 0, 800]))
     with Spool(tmp_path / "spool") as placed, np.errstate(over="raise"):
         placed.append(field)
-        with pytest.raises(ValueError, match="degree 0"):
-            placed.append(random_field(3, degree=1))
     glb.write_splats(placed, tmp_path / "a.glb", {})
     document, values = read_glb(tmp_path / "a.glb")
     which = document["meshes"][0]["primitives"][0]["attributes"]["KHR_gaussian_splatting:OPACITY"]
@@ -112,7 +98,7 @@ def test_a_wide_terrain_gives_bits_after_the_point_for_those_before_it(small, tm
     np.testing.assert_allclose(read_spz(tmp_path / "a.spz").means[-1], [30_000, 0, 30_000], atol=2**-8)
 
 
-@pytest.mark.parametrize("version, count", [(4, 5), (3, 0), (3, EXPORTERS["spz"].gaussians + 1)])
+@pytest.mark.parametrize("version, count", [(4, 5), (3, 0), (3, FORMATS["spz"].gaussians + 1)])
 def test_what_an_spz_cannot_hold_is_not_written(spool, tmp_path, version, count):
     spool.count = count
     with pytest.raises(ValueError, match="is not written"):

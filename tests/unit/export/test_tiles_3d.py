@@ -6,22 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.finite_cells import collect_cells
 from fixtures.random_field import random_field
-from fixtures.splat_files import read_glb_splats, read_glb_spz
+from fixtures.splat_files import read_glb_spz
 from pyproj import Transformer
 
 from dav_gswt.export import tiles_3d
 from dav_gswt.export.axes import Y_UP, turn_field
-from dav_gswt.export.spool import Spool
-from dav_gswt.export.terrain_files import ExportJob
+from dav_gswt.export.spool import ExportJob, Spool
 from dav_gswt.field import concatenate_fields
-from dav_gswt.files import digest_files
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.terrain import finite
 from dav_gswt.terrain.finite import Area
 
 PLACE = Georeference(47.1, 11.3, 600.0, 20.0, metres_per_unit=1.5)
-FEW = {"columns": 2, "rows": 1}
 
 
 def list_tiles(tile, parent=None):
@@ -45,9 +42,9 @@ def assert_inside(inner, outer):
 def write(export, tmp_path):
     """A function that exports 5 x 3 cells; the folder of tileset.json and what is in it."""
 
-    def write(name="out", kind="3dtiles_plain", **changes):
-        export(name, **({"columns": 5, "rows": 3, "formats": [kind]} | changes))
-        folder = tmp_path / name / f"terrain_{kind}"
+    def write(**changes):
+        export("out", **({"columns": 5, "rows": 3, "formats": ["3dtiles"]} | changes))
+        folder = tmp_path / "out/terrain_3dtiles"
         return folder, json.loads((folder / "tileset.json").read_text())
 
     return write
@@ -68,7 +65,7 @@ def test_the_tree_keeps_the_rules_of_the_specification(write):
     there = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.glb"))
     assert sorted(uris) == there and len(there) == 15 + 3 * 2
     for tile, _ in tiles[1:]:
-        points = turn_field(read_glb_splats(folder / tile["content"]["uri"]), Y_UP.T).means
+        points = turn_field(read_glb_spz(folder / tile["content"]["uri"]), Y_UP.T).means
         low, high = find_ends(tile["content"]["boundingVolume"])
         assert (points > low).all() and (points < high).all()
 
@@ -78,27 +75,17 @@ def test_every_level_has_the_gaussians_of_the_terrain(write, cover_terrain):
     west, south = tileset["extras"]["cells"]["west"], tileset["extras"]["cells"]["south"]
     corner = np.array([west, south, 0]) * cover_terrain.side - tileset["extras"]["origin"]
     for level in (0, 1):
-        parts = [read_glb_splats(path) for path in sorted(folder.glob(f"{level}/*.glb"))]
+        parts = [read_glb_spz(path) for path in sorted(folder.glob(f"{level}/*.glb"))]
         found = turn_field(concatenate_fields(parts), Y_UP.T)
-        wanted = finite.collect_cells(cover_terrain, west, south, 5, 3, level)
-        assert np.sort(found.sh.ravel()).tolist() == np.sort(wanted.sh.ravel()).tolist()
-        np.testing.assert_allclose(np.sort(found.means, 0), np.sort(wanted.means + corner, 0), atol=2e-5)
-
-
-def test_compressed_contents_are_those_without_to_the_steps_of_spz(write):
-    (plain, _), (packed, tileset) = write("plain", **FEW), write("packed", "3dtiles", **FEW)
-    names = sorted(path.relative_to(plain) for path in plain.rglob("*.glb"))
-    assert names == sorted(path.relative_to(packed) for path in packed.rglob("*.glb"))
-    for name in names:
-        wanted, read = read_glb_splats(plain / name), read_glb_spz(packed / name)
-        np.testing.assert_allclose(read.means, wanted.means, atol=1e-3)
-        np.testing.assert_allclose(read.log_scales, wanted.log_scales, atol=1 / 32 + 1e-4)
+        wanted = collect_cells(cover_terrain, west, south, 5, 3, level)
+        np.testing.assert_allclose(np.sort(found.means, 0), np.sort(wanted.means + corner, 0), atol=1e-3)
+        np.testing.assert_allclose(np.sort(found.log_scales, 0), np.sort(wanted.log_scales, 0), atol=1 / 32 + 1e-4)
     extension = tileset["extensions"]["3DTILES_content_gltf"]
     assert extension["extensionsRequired"] == ["KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"]
 
 
 def test_a_georeferenced_tileset_stands_where_pyproj_puts_it(write):
-    _, tileset = write(reference=PLACE, centre=[7.0, -3.0], **FEW)
+    _, tileset = write(reference=PLACE, centre=[7.0, -3.0], columns=2, rows=1)
     matrix = np.array(tileset["root"]["transform"]).reshape(4, 4).T
     origin = np.array(tileset["extras"]["origin"])
     assert np.abs(origin[:2]).max() > 5
@@ -106,14 +93,6 @@ def test_a_georeferenced_tileset_stands_where_pyproj_puts_it(write):
     for local in np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]]):
         wanted = project.transform(*PLACE.to_earth((origin + local)[None])[0])
         np.testing.assert_allclose(matrix @ [*local, 1.0], [*wanted, 1.0], atol=1e-6)
-
-
-def test_threads_and_other_formats_change_no_byte(write):
-    (first, _), (second, _) = write("a"), write("b", threads=3, formats=["ply", "3dtiles_plain"])
-    names = [sorted(path.relative_to(folder) for path in folder.rglob("*.*")) for folder in (first, second)]
-    assert names[0] == names[1]
-    for name in names[0]:
-        assert digest_files(first / name) == digest_files(second / name)
 
 
 def test_a_level_is_refined_where_its_gaussians_lie_more_than_a_pixel_apart_and_no_error_falls(cover_terrain):
@@ -124,8 +103,7 @@ def test_a_level_is_refined_where_its_gaussians_lie_more_than_a_pixel_apart_and_
     assert errors == [0.0, expected, expected]
 
 
-@pytest.mark.parametrize("compressed", [False, True])
-def test_what_has_no_gaussian_has_no_tile(cover_terrain, tmp_path, compressed):
+def test_what_has_no_gaussian_has_no_tile(cover_terrain, tmp_path):
     """A cell without Gaussians at any level, and one that has them at the finest alone."""
 
     @contextmanager
@@ -136,8 +114,8 @@ def test_what_has_no_gaussian_has_no_tile(cover_terrain, tmp_path, compressed):
 
     with Spool(tmp_path / "spool") as nothing:
         about = ({"unit": "metre"}, cover_terrain, Area(0, 0, 4, 1), place, None)
-        job = ExportJob(tmp_path / "a", nothing, *about)
-        assert tiles_3d.write_tileset(job, tmp_path / "out", compressed) == 3 * 5
+        job = ExportJob(nothing, *about)
+        assert tiles_3d.write_tileset(job, tmp_path / "out") == 3 * 5
     root = json.loads((tmp_path / "out/tileset.json").read_text())["root"]
     west, east = root["children"]
     assert "content" not in west and [tile["content"]["uri"] for tile in west["children"]] == ["0/1_0.glb"]

@@ -5,21 +5,18 @@ import shutil
 import numpy as np
 import pytest
 from fixtures import result_tree
-from matplotlib import colormaps
 from scipy.spatial.transform import Rotation
 
 from dav_gswt import field as fields
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.files import read_json, write_json
-from dav_gswt.geometry.cameras import camera_to_json
 from dav_gswt.geometry.poses import pose_offset
 from dav_gswt.images import image_files
 from dav_gswt.inspect import plot, readers
-from dav_gswt.inspect.plot import Bar, Scene
+from dav_gswt.inspect.plot import Scene
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import store
-from dav_gswt.tiles.layout import edge_colours
 
 POSES = result_tree.poses()
 MOST = 300_000
@@ -72,7 +69,10 @@ def test_faint_gaussians_are_left_out_and_large_fields_are_thinned_evenly():
 
 def test_a_field_is_coloured_by_what_is_asked_or_says_why_it_cannot_be(tmp_path):
     fields.write_field(one(uncertainty=1.0), tmp_path / "a.ply")
-    for by, colour in (("colour", [51, 102, 153]), ("uncertainty", Bar("").map(np.ones(1))[0])):
+    for by, colour in (
+        ("colour", [51, 102, 153]),
+        ("uncertainty", plot.map_colours(plot.make_bar(0.0, 1.0), np.ones(1))[0]),
+    ):
         ((mesh, _),) = readers.read_scene(tmp_path / "a.ply", MOST, colour=by).meshes
         np.testing.assert_array_equal(mesh.cell_data["rgb"][0], colour)
     with pytest.raises(InputError, match="--colour hue: .* has colour, uncertainty"):
@@ -83,38 +83,37 @@ def test_a_field_is_coloured_by_what_is_asked_or_says_why_it_cannot_be(tmp_path)
 
 
 def test_levels_stand_side_by_side_from_the_west(tree):
-    first, second = (mesh.points for mesh, _ in readers.read_scene(tree.round / "levels", MOST).meshes[::2])
+    shown = readers.read_scene(tree.round / "levels", MOST)
+    first, second = (mesh.points for mesh, _ in shown.meshes[::3])
     assert np.quantile(first[:, 0], 0.99) < np.quantile(second[:, 0], 0.01)
     alone = readers.read_scene(tree.round / "levels", MOST, level=1)
-    assert len(alone.notes) == 1 and "level 1" in alone.notes[0]
+    assert (shown.notes[1], alone.notes[1]) == ("level 0, level 1 of 2 levels", "level 1 of 2 levels")
 
 
 def test_colours_run_from_one_end_of_a_bar_to_the_other_and_what_is_no_number_is_grey():
-    found = Bar("", 2.0, 4.0).map(np.array([2.0, -9.0, 4.0, 99.0, 3.0, np.nan, np.inf]))
-    cool, warm = (plot.to_bytes(np.array(colormaps["coolwarm"](x)[:3])) for x in (0, 255))
-    np.testing.assert_array_equal(found[:4], [cool, cool, warm, warm])
+    found = plot.map_colours(plot.make_bar(2.0, 4.0), np.array([2.0, -9.0, 4.0, 99.0, 3.0, np.nan, np.inf]))
+    cool, warm = found[[0, 2]].astype(int)
+    assert cool[2] > cool[0] + 100 and warm[0] > warm[2] + 100
+    np.testing.assert_array_equal(found[[1, 3]], found[[0, 2]])
     assert np.ptp(found[4].astype(int)) < 10  # grey in the middle
     np.testing.assert_array_equal(found[5:], [plot.UNKNOWN] * 2)
-    assert Bar.of_values("a", np.full(3, 7.0)) == Bar("a", 7.0, 8.0)
-    assert Bar.of_values("a", np.array([np.nan])) == Bar("a", 0.0, 1.0)
+    assert plot.fit_bar(np.full(3, 7.0)).scalar_range == (7.0, 8.0)
+    assert plot.fit_bar(np.array([np.nan])).scalar_range == (0.0, 1.0)
 
 
 def test_a_ground_is_a_surface_through_its_cells():
     heights = np.array([[0.0, 0, 0], [1.0, 1, 1]])
     grid = Ground(10.0, 20.0, 0.5, 0, 0, 2, heights, np.ones((2, 3), bool))
     mesh = readers.make_surface(grid, 1)
-    assert mesh.n_points == 12 and mesh.n_cells == 6
-    np.testing.assert_allclose(mesh.cell_centers().points[5][:2], [11.25, 20.75])  # the north-eastern one
-    np.testing.assert_allclose(np.unique(mesh.points[:, 2]), [0, 0.5, 1])
-    thin = readers.make_surface(grid, 2)  # a cell of two by two, and the rest
-    assert thin.n_cells == 2
-    np.testing.assert_array_equal(thin.points.max(0)[:2], [12, 21])
+    assert mesh.n_points == 6 and mesh.n_cells == 2
+    np.testing.assert_allclose(mesh.points[5], [11.25, 20.75, 1])  # the north-eastern one
+    np.testing.assert_allclose(readers.make_surface(grid, 2).points, [[10.25, 20.25, 0], [11.25, 20.25, 0]])
 
 
 def test_the_part_above_lies_over_the_ground_with_its_first_row_in_the_north_and_all_are_pictures_upright(tree):
     ((mesh, _),) = readers.read_scene(tree.round / "uncertainty.exr", MOST, part="above").meshes
-    warm = mesh.cell_data["rgb"][:, 0] > mesh.cell_data["rgb"][:, 2]
-    y = mesh.cell_centers().points[:, 1]
+    warm = mesh.point_data["rgb"][:, 0] > mesh.point_data["rgb"][:, 2]
+    y = mesh.points[:, 1]
     assert warm.sum() == 96 and y[warm].min() > y[~warm].max()
     shown = readers.read_scene(tree.round / "uncertainty.exr", MOST)
     (corners, how), _, (other, _), _ = shown.meshes  # each with its letters
@@ -122,7 +121,7 @@ def test_the_part_above_lies_over_the_ground_with_its_first_row_in_the_north_and
     assert rows[0, 0, 0] > rows[-1, 0, 0]  # the northern row is warm, and on top
     np.testing.assert_allclose(corners.points, [[0, 0, 0], [1, 0, 0], [1, -1, 0], [0, -1, 0]])
     np.testing.assert_allclose(corners.active_texture_coordinates, [[0, 1], [1, 1], [1, 0], [0, 0]])
-    assert other.points[0, 0] > 1 and [bar.title for bar in shown.bars] == ["uncertainty", "opacity"]
+    assert other.points[0, 0] > 1 and list(shown.bars) == ["uncertainty", "opacity"]
 
 
 def test_parts_channels_grounds_and_headers_that_do_not_fit_are_refused(tree, tmp_path):
@@ -143,7 +142,8 @@ def test_parts_channels_grounds_and_headers_that_do_not_fit_are_refused(tree, tm
 def test_a_folder_of_materials_shows_its_map_whose_holes_are_grey(tmp_path):
     layers = {"material": np.array([[np.inf, 1], [2, 3]], np.float32), "object": np.eye(2, dtype=np.float32)}
     image_files.write_exr(tmp_path / "materials.exr", layers, {"west": "0.0"})
-    shown = readers.read_materials(tmp_path / "materials.json", most=MOST)
+    (tmp_path / "materials.json").touch()
+    shown = readers.read_scene(tmp_path, MOST)
     assert shown.notes == ["parts: 1; pictures: 2 of 2; grey: not a number"]
     np.testing.assert_array_equal(shown.meshes[0][1]["texture"].to_array()[0, 0], [150, 150, 150])
 
@@ -159,13 +159,13 @@ def test_candidates_stand_where_they_are_in_the_policy_s_colours_and_the_chosen_
     np.testing.assert_allclose(middles, at[list(result_tree.CHOSEN)], atol=1e-4)
     stems = [mesh.points for mesh, _ in marks[:4:2]]
     np.testing.assert_allclose(stems, [[result_tree.MIDDLE, at[i]] for i in result_tree.CHOSEN], atol=1e-5)
-    assert "W2" in by_scores.bars[0].title
+    assert "W2" in next(iter(by_scores.bars))
     opacity = readers.read_scene(tree.scored / "scores.csv", MOST, colour="opacity")
     (warm, _, cold), (cool, _, hot) = (s.meshes[0][0].point_data["rgb"][0] for s in (by_scores, opacity))
     assert warm > cold and hot > cool  # the first candidate has the most of the one and the least of the other
 
 
-def test_poses_of_other_scores_or_outside_the_result_tree_are_refused(tree, tmp_path):
+def test_poses_of_other_scores_or_outside_the_result_tree_are_refused(tree, tmp_path, monkeypatch):
     scores, mine = tree.scored / "scores.csv", tmp_path / "poses.json"
     with pytest.raises(InputError, match="--colour hue: .* has opacity, w2_sq"):
         readers.read_scene(scores, MOST, colour="hue")
@@ -175,10 +175,10 @@ def test_poses_of_other_scores_or_outside_the_result_tree_are_refused(tree, tmp_
     shutil.copy(scores, tmp_path)
     with pytest.raises(InputError, match="leave it in its result tree"):
         readers.read_scene(tmp_path / "scores.csv", MOST)
-    for content, said in ((mine.read_text().replace("pose_0", "pose_9"), "is not among"), ('{"poses": 3}', "not as")):
-        mine.write_text(content)
-        with pytest.raises(InputError, match=f"poses.json: .*{said}"):
-            readers._arrange_poses(scores, mine, None, MOST)
+    monkeypatch.setattr(readers, "find_scores", lambda path: scores)
+    mine.write_text(mine.read_text().replace("pose_0", "pose_9"))
+    with pytest.raises(InputError, match="poses.json: .*is not among"):
+        readers.read_scene(mine, MOST)
 
 
 def test_a_camera_is_a_pyramid_whose_base_fills_its_picture():
@@ -194,18 +194,10 @@ def test_a_camera_is_a_pyramid_whose_base_fills_its_picture():
 
 
 def test_photos_hang_in_their_pyramids_upright(tree):
-    shown = readers.read_scene(tree.photos, MOST)
+    shown = readers.read_scene(tree.start / "views.json", MOST)
     hung = [(mesh, how["texture"].to_array()) for mesh, how in shown.meshes if "texture" in how]
     assert [int(rows[0, 0, 0]) for _, rows in hung] == [204, 51, 128]  # test_00, view_00, view_01
     assert set(shown.names) == {"start", "test", "exemplar", "seen by a photo"}
-
-
-def test_names_that_lead_out_of_the_folder_are_refused(tmp_path):
-    camera = camera_to_json(result_tree.camera(POSES[0]))
-    for got, said in (({}, "not as the workflow writes it"), (camera, "is no file's name")):
-        write_json(tmp_path / "capture.json", {"shots": [{"name": "../../secret.png", "got": got}]})
-        with pytest.raises(InputError, match=said):
-            readers.read_shots(tmp_path / "capture.json")
 
 
 @pytest.fixture(scope="module")
@@ -213,21 +205,13 @@ def cut(tree):
     return store.read_tiles(tree.tiles / "tiles", tree.tiles / "seams.json")
 
 
-def test_neighbours_meet_at_edges_of_one_colour():
-    at = {tuple(np.rint(corner[:2]).astype(int)): tile for tile, corner in readers.place_tiles(16, 1.0)}
-    assert sorted(at.values()) == list(range(16))
-    for (x, y), tile in at.items():
-        west, south = at[(x - 1) % 4, y], at[x, (y - 1) % 4]
-        assert edge_colours(west)[2] == edge_colours(tile)[0] and edge_colours(south)[1] == edge_colours(tile)[3]
-
-
 def test_gaussians_have_the_patch_of_their_cell(cut):
     some = cut.fields[0][3]
-    found = readers.find_patches(some, cut, 3)
+    found = readers.colour_patches(some, cut, 3)
     inside = (some.means[:, :2] >= 0).all(1) & (some.means[:, :2] < cut.side).all(1)
     for i in np.flatnonzero(inside)[::97]:
         x, y = (some.means[i, :2] / cut.spacing).astype(int)
-        assert found[i] == cut.labels[3][y, x]
+        assert tuple(found[i]) == readers.PATCH_COLOURS[cut.labels[3][y, x]]
 
 
 def test_tiles_that_are_not_what_seams_json_says_are_refused(tree, tmp_path):

@@ -41,17 +41,6 @@ def test_the_chosen_backend_renders_and_stands_in_the_provenance(monkeypatch, na
     assert record_provenance({}, {})["renderer"]["backend"] == name
 
 
-def test_loss_and_adam_are_those_of_the_backend_in_use(monkeypatch):
-    monkeypatch.setenv(backends.VARIABLE, "torch")
-    called, zeros = [], np.zeros((4, 4, 3), np.float32)
-    torch = backends.load_backend("torch")
-    monkeypatch.setattr(torch, "compute_loss", lambda *a: called.append("loss") or (0.0, zeros))
-    monkeypatch.setattr(torch, "step_adam", lambda step: called.append("adam"))
-    raster.loss(zeros, zeros)
-    raster.adam(zeros, zeros, zeros, zeros, rate=0.1, step=1)
-    assert called == ["loss", "adam"]
-
-
 def test_a_backend_that_is_unknown_or_not_here_is_refused_with_what_to_do(monkeypatch):
     monkeypatch.setenv(backends.VARIABLE, "gpu")
     with pytest.raises(InputError, match="DAV_GSWT_BACKEND=gpu: choose from cpu, torch, cuda"):

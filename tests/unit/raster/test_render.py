@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from fixtures.raster_scenes import CAMERAS, gaussians
 
 from dav_gswt.field import GaussianField, rgb_to_sh
@@ -62,13 +61,11 @@ def test_harmonics_have_the_signs_that_3dgs_gives_them():
 
 
 def test_degree_zero_looks_the_same_from_everywhere_and_colour_is_never_negative():
-    sh = np.array([[[-5.0, 0, 1]]], np.float32)
-    found = harmonics.colours(sh, np.array([[0.0, 0, 1]]))
+    sh, camera = np.array([[[-5.0, 0, 1]]], np.float32), cameras.pinhole((0, 0, 4), (0, 0, 0), 8, 8, 60.0)
+    found = harmonics.seen_colours(sh, np.array([[0.0, 0, 1]]), camera)
     np.testing.assert_allclose(found, [[0, 0.5, 0.5 + 0.28209479]], rtol=1e-6)
     padded = np.concatenate([sh, np.zeros((1, 15, 3), np.float32)], 1)
-    np.testing.assert_allclose(harmonics.colours(padded, np.array([[0.6, 0, 0.8]])), found, rtol=1e-6)
-    with pytest.raises(ValueError, match="sh has 5 coefficients"):
-        harmonics.colours(padded[:, :5], np.array([[0.6, 0, 0.8]]))
+    np.testing.assert_allclose(harmonics.seen_colours(padded, np.array([[0.6, 0, 0.8]]), camera), found, rtol=1e-6)
 
 
 def test_directions_run_from_the_camera_to_the_gaussian():

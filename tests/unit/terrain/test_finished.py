@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fixtures.finite_cells import collect_cells
 from fixtures.land_covers import SIDE, write_cover_bundle
 
 from dav_gswt.bundle import store
@@ -75,7 +76,7 @@ def bundle(tmp_path_factory, root):
 def test_it_looks_as_the_terrain_does(bundle, surface, corner):
     terrain = endless.terrain_from_bundle(bundle, surface)
     west, south = corner
-    field = finite.collect_cells(terrain, west - 4, south - 4, 9, 9, 0)
+    field = collect_cells(terrain, west - 4, south - 4, 9, 9, 0)
     x, y = (west + 0.5) * SIDE, (south + 0.5) * SIDE
     ground = float(terrain.heights.at(np.array([x]), np.array([y]))[0][0])
     eye = np.array([x, y, ground + 2 * SIDE])
@@ -89,13 +90,13 @@ def test_it_looks_as_the_terrain_does(bundle, surface, corner):
 
 def test_a_wide_area_is_counted_in_slices(bundle, monkeypatch):
     """The same counts and blocks, while no more cells are known at a time than a slice has."""
-    area, eye = finite.Area(-7, 3, 8, 7), np.array([0.0, 0.0, 2.0])
+    area = finite.Area(-7, 3, 8, 7)
     whole = endless.terrain_from_bundle(bundle, HILLS)
-    counts = finite.count_gaussians(whole, finite.list_grid(whole, area, eye))
+    counts = finite.count_cells(whole, area, 0)
     monkeypatch.setattr(finite, "SLICE", 20)
     monkeypatch.setattr(scatter, "CACHED", 40)
     sliced = endless.terrain_from_bundle(bundle, HILLS)
-    np.testing.assert_array_equal(finite.count_cells(sliced, area, eye), counts)
+    np.testing.assert_array_equal(finite.count_cells(sliced, area, 0), counts)
     assert len(sliced.scatter._known) <= 40
-    blocks = finite.list_blocks(sliced, area, eye)
+    blocks = finite.list_blocks(sliced, area, 0)
     assert sum(map(len, blocks)) == len(counts) and len(sliced.scatter._known) <= 40

@@ -2,19 +2,17 @@
 
 import argparse
 import logging
-import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, get_args
 
 from dav_gswt.bundle.manifest import NAME as MANIFEST
 from dav_gswt.config.exports import Export, Format
-from dav_gswt.config.load import REFERENCE, check_model
+from dav_gswt.config.load import check_model
 from dav_gswt.errors import InputError
 
 GROUND = "ground"  # beside the formats of `export.formats`: the files of exports/ground
-SHORT = {"centre": "--at", "formats": "--format"}  # other names of options
-LISTS = {"centre": {"nargs": 2}, "formats": {"action": "append"}}
+LISTS = {"centre": {"nargs": 2, "metavar": ("X", "Y")}, "formats": {"nargs": "+", "action": "extend"}}
 
 
 def add_command(commands) -> None:
@@ -27,9 +25,8 @@ def add_command(commands) -> None:
         about = (field.description or "").replace("%", "%%")
         if name == "formats":
             about = f"any of {', '.join(get_args(Format))} and {GROUND}; {about}"
-        flags = [f"--{name.replace('_', '-')}", *([SHORT[name]] if name in SHORT else [])]
-        metavar = "VALUE" if LISTS.get(name, {}).get("nargs") is None else ("X", "Y")
-        parser.add_argument(*flags, type=_parse_value, dest=name, metavar=metavar, help=about, **LISTS.get(name, {}))
+        how = LISTS.get(name, {}) | {"help": about}
+        parser.add_argument(f"--{name}", type=_parse_value, **how)
     parser.add_argument("--threads", type=int, default=2)
     parser.set_defaults(run=run_export)
 
@@ -37,15 +34,39 @@ def add_command(commands) -> None:
 def run_export(options: argparse.Namespace) -> None:
     """Write the requested files.
 
-    Raises: InputError: options exclude one another, the path has no terrain, or a folder that this command did not
+    Raises: InputError: an option makes no sense, the path has no terrain, or a folder that this command did not
         write is in the way; see also `terrain_files.export_terrain` and `ground_files.export_ground`.
     """
+    from dav_gswt.bundle import store  # here, not above: these modules are slow to load
+    from dav_gswt.export import ground_files, terrain_files
+    from dav_gswt.geometry.scene_frame import read_scene_frame
+    from dav_gswt.terrain.endless import terrain_from_page
+    from dav_gswt.tiles.store import read_material_tiles
+
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    try:
-        settings, ground = read_settings(options)
-        _export(options, settings, ground)
-    except InputError as error:
-        raise InputError(name_options(str(error))) from error
+    settings, ground = read_settings(options)
+    source, sets = find_terrain(options.path), []
+    wanted = ["terrain"] * bool(settings["formats"]) + ["ground"] * ground
+    for name in wanted:
+        check_target(options.out / name, f"{name}.json")
+    parents = source.resolve().parents
+    if ground:
+        result = next((folder for folder in parents if (folder / "seams.json").is_file()), None)
+        if result is None:
+            raise InputError(f"--formats {GROUND} needs the tiles of a bundle; name a folder of results/, not {source}")
+        sets = read_material_tiles(result / "tiles", result / "seams.json")
+    frame = next((file for folder in parents if (file := folder / "photos/ground.json").is_file()), None)
+    reference = read_scene_frame(frame).georeference if frame else None
+    bundle = store.read_bundle(source)
+    terrain, manifest = terrain_from_page(bundle), bundle.manifest
+    if ground:
+        ground_files.check_ground(terrain, sets, settings)
+    if settings["formats"]:
+        terrain_files.export_terrain(terrain, manifest, settings, options.out / "terrain", options.threads, reference)
+    if ground:
+        ground_files.export_ground(terrain, manifest, sets, settings, options.out / "ground")
+    for name in wanted:
+        print(options.out / name)
 
 
 def read_settings(options: argparse.Namespace) -> tuple[dict[str, Any], bool]:
@@ -57,16 +78,6 @@ def read_settings(options: argparse.Namespace) -> tuple[dict[str, Any], bool]:
     wanted = [name for name in formats if name != GROUND]
     checked = check_model(Export, given | ({"formats": wanted} if wanted else {}), "export")
     return checked.model_dump(mode="json", exclude_none=True) | {"formats": wanted}, GROUND in formats
-
-
-def name_options(message: str) -> str:
-    """A message about keys of the config as one about options of this command."""
-    message = message.removeprefix("config: ").removesuffix(f" ({REFERENCE})")
-
-    def rename(match: re.Match[str]) -> str:
-        return SHORT.get(match[1], f"--{match[1].replace('_', '-')}")
-
-    return re.sub(rf"\bexport\.({'|'.join(Export.model_fields)})\b", rename, message)
 
 
 def find_terrain(path: Path) -> Path:
@@ -81,37 +92,6 @@ def find_terrain(path: Path) -> Path:
         if found := sorted(path.glob(pattern), key=lambda file: file.stat().st_mtime):
             return found[-1].parent
     raise InputError(f"{path}: no terrain here ({MANIFEST} is missing); `make run` makes one")
-
-
-def _export(options: argparse.Namespace, settings: dict[str, Any], ground: bool) -> None:
-    from dav_gswt.bundle import store  # here, not above: these modules are slow to load
-    from dav_gswt.export import ground_files, terrain_files
-    from dav_gswt.geometry.scene_frame import read_scene_frame
-    from dav_gswt.terrain.endless import terrain_from_page
-    from dav_gswt.tiles.store import read_material_tiles
-
-    source, sets = find_terrain(options.path), []
-    wanted = ["terrain"] * bool(settings["formats"]) + ["ground"] * ground
-    for name in wanted:
-        check_target(options.out / name, f"{name}.json")
-    parents = source.resolve().parents
-    if ground:
-        result = next((folder for folder in parents if (folder / "seams.json").is_file()), None)
-        if result is None:
-            raise InputError(f"--format {GROUND} needs the tiles of a bundle; name a folder of results/, not {source}")
-        sets = read_material_tiles(result / "tiles", result / "seams.json")
-    frame = next((file for folder in parents if (file := folder / "photos/ground.json").is_file()), None)
-    reference = read_scene_frame(frame).georeference if frame else None
-    bundle = store.read_bundle(source)
-    terrain, manifest = terrain_from_page(bundle), bundle.manifest
-    if ground:
-        ground_files.check_ground(terrain, sets, settings)
-    if settings["formats"]:
-        terrain_files.export_terrain(terrain, manifest, settings, options.out / "terrain", options.threads, reference)
-    if ground:
-        ground_files.export_ground(terrain, manifest, sets, settings, options.out / "ground")
-    for name in wanted:
-        print(options.out / name)
 
 
 def check_target(folder: Path, mark: str) -> None:

@@ -2,16 +2,16 @@
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from dav_gswt.config.base import ConfigModel, key
-from dav_gswt.export.formats import EXPORTERS
+from dav_gswt.export.formats import FORMATS
 
 Coordinate = Annotated[float, Field(ge=-(2**30), le=2**30)]
 if TYPE_CHECKING:
     Format = str
 else:
-    Format = Literal[tuple(EXPORTERS)]
+    Format = Literal[tuple(FORMATS)]
 
 
 TERRAIN, GROUND = ("export_terrain",), ("export_ground",)
@@ -31,21 +31,11 @@ class Export(ConfigModel):
         min_length=2,
         max_length=2,
     )
-    level: Annotated[int, Field(ge=0, le=15)] | Literal["by_distance"] = key(
-        "level of detail, 0 the finest; `by_distance`: as seen from the centre, an eye floor above the surface",
-        0,
-        read_by=TERRAIN,
-    )
+    level: int = key("level of detail, 0 the finest", 0, read_by=TERRAIN, ge=0, le=15)
     formats: list[Format] = key(
-        "`3dtiles`, `3dtiles_plain`: all levels in chunks, which CesiumJS and three.js draw; `sog` needs Node.js",
+        "`3dtiles`: all levels in chunks, which CesiumJS draws; `sog` needs Node.js",
         ["glb"],
         read_by=TERRAIN,
         min_length=1,
-        max_length=len(EXPORTERS),
+        max_length=len(FORMATS),
     )
-
-    @model_validator(mode="after")
-    def _require_sense(self) -> "Export":
-        if len(set(self.formats)) < len(self.formats):
-            raise ValueError("formats has one twice")
-        return self

@@ -7,8 +7,8 @@ https://github.com/CesiumGS/glTF/tree/draft-splat-spz/extensions/2.0/Khronos (a 
 
 import io
 import json
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -24,84 +24,11 @@ from dav_gswt.export.spool import Spool
 from dav_gswt.field import SH0
 from dav_gswt.files import atomic_file
 
-MAX_BYTES = 2**32 - 1  # of the whole file: lengths have 32 bits
-ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+ARRAY_BUFFER = 34962
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
-COMPONENTS = {"<f4": 5126, "<u4": 5125, "|u1": 5121}
+COMPONENTS = {"<f4": 5126, "|u1": 5121}
 EXTENSION = "KHR_gaussian_splatting"
 COMPRESSION = "KHR_gaussian_splatting_compression_spz_2"
-
-Bounds = tuple[Sequence[float | int], Sequence[float | int]]  # the smallest and the largest value of each column
-
-
-@dataclass
-class GlbWriter:
-    """A glTF asset under construction. document: its JSON without accessors, buffer views and the buffer."""
-
-    document: dict[str, Any]
-    _accessors: list[dict[str, Any]] = field(default_factory=list)
-    _views: list[dict[str, Any]] = field(default_factory=list)
-    _sources: list[tuple[int, Iterable[Array]]] = field(default_factory=list)
-
-    def add(
-        self,
-        parts: Iterable[Array] | None,
-        count: int,
-        width: int,
-        kind: str = "<f4",
-        *,
-        bounds: Bounds | None = None,
-        normalized: bool = False,
-        target: int = ARRAY_BUFFER,
-    ) -> int:
-        """Add an accessor of `count` rows of `width` values; returns its number.
-
-        Args:   parts: arrays of `kind` that hold all rows in order; read once, when the file is written. None: an
-                extension knows where the values are. bounds: required for positions.
-        """
-        accessor: dict[str, Any] = {}
-        if parts is not None:
-            accessor["bufferView"] = self.add_view(parts, count * width * np.dtype(kind).itemsize, target)
-        accessor |= {"componentType": COMPONENTS[kind], "count": count, "type": TYPES[width]}
-        if normalized:
-            accessor["normalized"] = True
-        if bounds:
-            accessor["min"], accessor["max"] = map(list, bounds)
-        self._accessors.append(accessor)
-        return len(self._accessors) - 1
-
-    def add_view(self, parts: Iterable[Array], size: int, target: int | None = None) -> int:
-        """Add a buffer view of `size` bytes, a multiple of four; returns its number. parts: as in `add`."""
-        offset = sum(size for size, _ in self._sources)
-        view = {"buffer": 0, "byteOffset": offset, "byteLength": size}
-        self._views.append(view | ({"target": target} if target else {}))
-        self._sources.append((size, parts))
-        return len(self._views) - 1
-
-    def add_array(self, values: Array, *, target: int = ARRAY_BUFFER) -> int:
-        """Add an accessor of an array of float32 (n k) or uint32 (n), with its bounds."""
-        rows = values.reshape(len(values), -1)
-        bounds = rows.min(0).tolist(), rows.max(0).tolist()
-        kind = values.dtype.newbyteorder("<").str
-        return self.add([values], len(rows), rows.shape[1], kind, bounds=bounds, target=target)
-
-    def write(self, path: Path | str) -> None:
-        """Write the file, whole or not at all. Raises: ValueError: it would be longer than MAX_BYTES."""
-        length = sum(size for size, _ in self._sources)
-        asset = {"version": "2.0", "generator": f"DAV-GSWT {dav_gswt.__version__}"}
-        document = {"asset": asset} | self.document
-        document |= {"accessors": self._accessors, "bufferViews": self._views, "buffers": [{"byteLength": length}]}
-        text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
-        text += b" " * (-len(text) % 4)
-        total = 12 + 8 + len(text) + 8 + length
-        if total > MAX_BYTES:
-            raise ValueError(f"{path}: {total} bytes are more than a GLB holds")
-        with atomic_file(path) as part, part.open("wb") as file:
-            file.write(b"glTF" + np.array([2, total, len(text)], "<u4").tobytes() + b"JSON" + text)
-            file.write(np.array([length], "<u4").tobytes() + b"BIN\0")
-            for size, parts in self._sources:
-                if (written := sum(file.write(np.ascontiguousarray(v).tobytes()) for v in parts)) != size:
-                    raise ValueError(f"{written} bytes where {size} were announced")
 
 
 def write_splats(spool: Spool, path: Path | str, extras: dict[str, Any], compressed: bool = False) -> None:
@@ -109,6 +36,28 @@ def write_splats(spool: Spool, path: Path | str, extras: dict[str, Any], compres
 
     Raises: ValueError: compressed: none, or more than an SPZ holds.
     """
+    scales = (np.exp(v.astype(float)).astype(np.float32) for v in spool.read("log_scales"))
+    quats = (turn_quats(v, Y_UP)[:, [1, 2, 3, 0]] for v in spool.read("quats"))
+    points = (turn_points(v, Y_UP) for v in spool.read("means"))
+    columns: dict[str, tuple[Iterable[Array], int, str, dict[str, Any]]] = {
+        "POSITION": (points, 3, "<f4", _find_bounds(spool)),
+        "COLOR_0": (_read_fallback(spool), 4, "|u1", {"normalized": True}),
+        f"{EXTENSION}:SCALE": (scales, 3, "<f4", {}),
+        f"{EXTENSION}:ROTATION": (quats, 4, "<f4", {}),
+    }
+    if not compressed:
+        columns[f"{EXTENSION}:OPACITY"] = map(_to_opacity, spool.read("opacity_logits")), 1, "<f4", {}
+        columns[f"{EXTENSION}:SH_DEGREE_0_COEF_0"] = spool.read("dc"), 3, "<f4", {}
+    accessors, views, length = [], [], 0
+    for _, width, kind, more in columns.values():
+        accessor = {"componentType": COMPONENTS[kind], "count": len(spool), "type": TYPES[width]} | more
+        if not compressed:
+            size = len(spool) * width * np.dtype(kind).itemsize
+            accessor = {"bufferView": len(views)} | accessor
+            views.append({"buffer": 0, "byteOffset": length, "byteLength": size, "target": ARRAY_BUFFER})
+            length += size
+        accessors.append(accessor)
+    binary = chain.from_iterable(parts for parts, _, _, _ in columns.values())
     splats: dict[str, Any] = {
         "kernel": "ellipse",
         "colorSpace": "srgb_rec709_display",
@@ -119,40 +68,48 @@ def write_splats(spool: Spool, path: Path | str, extras: dict[str, Any], compres
     if compressed:
         splats["extensions"] = {COMPRESSION: {"bufferView": 0}}
         used = {name: [EXTENSION, COMPRESSION] for name in ("extensionsUsed", "extensionsRequired")}
-    attributes: dict[str, int] = {}
-    primitive = {"mode": 0, "attributes": attributes, "extensions": {EXTENSION: splats}}
-    nodes = {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "name": "terrain", "extras": extras}]}
-    glb = GlbWriter(used | nodes | {"meshes": [{"name": "terrain", "primitives": [primitive]}]})
-    if compressed:
         packed = io.BytesIO()
         pack_spz(spool, packed, 2)
         packed.write(bytes(-packed.tell() % 4))  # readers stop at the end of the gzip
-        glb.add_view([np.frombuffer(packed.getbuffer(), np.uint8)], packed.tell())
+        length, binary = packed.tell(), [np.frombuffer(packed.getbuffer(), np.uint8)]
+        views = [{"buffer": 0, "byteOffset": 0, "byteLength": length}]
+    attributes = {name: number for number, name in enumerate(columns)}
+    primitive = {"mode": 0, "attributes": attributes, "extensions": {EXTENSION: splats}}
+    document = {
+        **used,
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": "terrain", "extras": extras}],
+        "meshes": [{"name": "terrain", "primitives": [primitive]}],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": length}],
+    }
+    _write_glb(path, document, length, binary)
 
-    def add(name: str, parts: Iterable[Array], width: int, kind: str = "<f4", **more: Any) -> None:
-        attributes[name] = glb.add(None if compressed else parts, len(spool), width, kind, **more)
 
-    scales = (np.exp(v.astype(float)).astype(np.float32) for v in spool.read("log_scales"))
-    quats = (turn_quats(v, Y_UP)[:, [1, 2, 3, 0]] for v in spool.read("quats"))
-    points = (turn_points(v, Y_UP) for v in spool.read("means"))
-    add("POSITION", points, 3, bounds=_find_bounds(spool))
-    add("COLOR_0", _read_fallback(spool), 4, "|u1", normalized=True)
-    add(f"{EXTENSION}:SCALE", scales, 3)
-    add(f"{EXTENSION}:ROTATION", quats, 4)
-    if not compressed:
-        add(f"{EXTENSION}:OPACITY", map(_to_opacity, spool.read("opacity_logits")), 1)
-        add(f"{EXTENSION}:SH_DEGREE_0_COEF_0", spool.read("dc"), 3)
-    glb.write(path)
+def _write_glb(path: Path | str, document: dict[str, Any], length: int, binary: Iterable[Array]) -> None:
+    """Write a glTF asset, whole or not at all. document: without the asset. binary: arrays of `length` bytes."""
+    asset = {"version": "2.0", "generator": f"DAV-GSWT {dav_gswt.__version__}"}
+    text = json.dumps({"asset": asset} | document, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    total = 12 + 8 + len(text) + 8 + length
+    with atomic_file(path) as part, part.open("wb") as file:
+        file.write(b"glTF" + np.array([2, total, len(text)], "<u4").tobytes() + b"JSON" + text)
+        file.write(np.array([length], "<u4").tobytes() + b"BIN\0")
+        for values in binary:
+            file.write(np.ascontiguousarray(values).tobytes())
 
 
 def _to_opacity(logits: Float32[Array, "n 1"]) -> Float32[Array, "n 1"]:
     return expit(logits.astype(float)).astype(np.float32)
 
 
-def _find_bounds(spool: Spool) -> Bounds:
+def _find_bounds(spool: Spool) -> dict[str, list[float]]:
     """The smallest and the largest of each coordinate, as it is stored."""
     ends = [(p.min(0), p.max(0)) for p in (turn_points(v, Y_UP) for v in spool.read("means"))]
-    return np.min([low for low, _ in ends], 0).tolist(), np.max([high for _, high in ends], 0).tolist()
+    low, high = zip(*ends, strict=True)
+    return {"min": np.min(low, 0).tolist(), "max": np.max(high, 0).tolist()}
 
 
 def _read_fallback(spool: Spool) -> Iterator[Array]:

@@ -12,13 +12,13 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
+from trimesh import Scene, Trimesh
+from trimesh.exchange.gltf import export_glb
 
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.export.axes import Y_UP, turn_points
-from dav_gswt.export.glb import ELEMENT_ARRAY_BUFFER, GlbWriter
 from dav_gswt.export.ground_surface import (
     GroundSurface,
-    Hull,
     check_points,
     choose_steps,
     collect_hulls,
@@ -36,8 +36,6 @@ from dav_gswt.tiles.build import TileSet
 WHITE = 65535
 MESH_ERROR = 0.25  # ground cells: most that the collision mesh is off the height field
 FLOOR = 0.5  # thickness of MuJoCo's ground below the lowest point, in tile sides: nothing thin falls through
-
-Mesh = tuple[str, Array, Array, dict[str, Any]]  # name, vertices, triangles, extras
 
 
 def export_ground(
@@ -59,21 +57,20 @@ def export_ground(
     row, column = points.T
     x, y = surface.west + column * surface.step, surface.south + row * surface.step
     vertices = np.stack([x, y, surface.heights[row, column]], 1) - origin
-    hulls = list(collect_hulls(terrain, area, origin))
+    mesh, hulls = Trimesh(vertices, triangles, process=False), dict(collect_hulls(terrain, area, origin))
     facts = {
         "unit": manifest.unit,
-        "cells": {"west": area.west, "south": area.south, "columns": area.columns, "rows": area.rows},
+        "cells": vars(area),
         "origin": origin.tolist(),
         "ground_cell": surface.cell,
         "mesh": {"error": error, "vertices": len(points), "triangles": len(triangles)},
         "objects": len(hulls),
     }
     extras = {key: facts[key] for key in ("unit", "origin", "ground_cell")} | {"error": error}
-    convex = {"unit": manifest.unit, "convex": True}
     with atomic_folder(out) as folder:
-        write_meshes([("ground", vertices, triangles, extras)], folder / "ground.glb")
+        write_meshes({"ground": mesh}, extras, folder / "ground.glb")
         if hulls:
-            write_meshes([(h.name, h.vertices, h.triangles, convex) for h in hulls], folder / "objects.glb")
+            write_meshes(hulls, {"unit": manifest.unit, "convex": True}, folder / "objects.glb")
         facts["heights"] = _write_heights(surface, folder, origin)
         _write_mujoco(surface, hulls, origin, folder)
         write_json(folder / "ground.json", facts)
@@ -87,16 +84,14 @@ def check_ground(terrain: EndlessTerrain, sets: Sequence[TileSet], settings: Map
     return area
 
 
-def write_meshes(meshes: Sequence[Mesh], path: Path | str) -> None:
-    """Write triangle meshes of our axes as nodes of a GLB, y up."""
-    glb = GlbWriter({"scene": 0, "scenes": [{"nodes": list(range(len(meshes)))}], "nodes": [], "meshes": []})
-    for number, (name, vertices, triangles, extras) in enumerate(meshes):
-        position = glb.add_array(turn_points(vertices, Y_UP))
-        index = glb.add_array(triangles.astype("<u4").ravel(), target=ELEMENT_ARRAY_BUFFER)
-        primitive = {"mode": 4, "attributes": {"POSITION": position}, "indices": index}
-        glb.document["nodes"].append({"mesh": number, "name": name, "extras": extras})
-        glb.document["meshes"].append({"name": name, "primitives": [primitive]})
-    glb.write(path)
+def write_meshes(meshes: Mapping[str, Trimesh], extras: dict[str, Any], path: Path) -> None:
+    """Write triangle meshes of our axes as nodes of a GLB, y up. extras: of each node."""
+    scene = Scene()
+    for name, mesh in meshes.items():
+        turned = Trimesh(turn_points(mesh.vertices, Y_UP), mesh.faces, process=False)
+        scene.add_geometry(turned, node_name=name, geom_name=name, metadata=extras)
+    with atomic_file(path) as part:
+        part.write_bytes(export_glb(scene, include_normals=False))
 
 
 def _write_heights(surface: GroundSurface, folder: Path, origin: Float[Array, "3"]) -> dict[str, Any]:
@@ -117,7 +112,9 @@ def _write_heights(surface: GroundSurface, folder: Path, origin: Float[Array, "3
     }
 
 
-def _write_mujoco(surface: GroundSurface, hulls: Sequence[Hull], origin: Float[Array, "3"], folder: Path) -> None:
+def _write_mujoco(
+    surface: GroundSurface, hulls: Mapping[str, Trimesh], origin: Float[Array, "3"], folder: Path
+) -> None:
     """Write ground.hfield (rows and columns as int32, heights from south to north) and ground.xml, a model of it."""
     heights = surface.heights
     with atomic_file(folder / "ground.hfield") as part, part.open("wb") as file:
@@ -128,10 +125,10 @@ def _write_mujoco(surface: GroundSurface, hulls: Sequence[Hull], origin: Float[A
     middle = [*(np.array([surface.west, surface.south]) + half - origin[:2]).tolist(), low - float(origin[2])]
     assets = [f'    <hfield name="ground" file="ground.hfield" size="{_numbers(size)}"/>']
     geoms = [f'    <geom name="ground" type="hfield" hfield="ground" pos="{_numbers(middle)}"/>']
-    for hull in hulls:
-        name = quoteattr(hull.name)
-        assets.append(f'    <mesh name={name} vertex="{_numbers(hull.vertices.ravel().tolist())}"/>')
-        geoms.append(f'    <geom name={name} type="mesh" mesh={name} rgba="0.45 0.42 0.36 1"/>')
+    for name, hull in hulls.items():
+        quoted = quoteattr(name)
+        assets.append(f'    <mesh name={quoted} vertex="{_numbers(hull.vertices.ravel().tolist())}"/>')
+        geoms.append(f'    <geom name={quoted} type="mesh" mesh={quoted} rgba="0.45 0.42 0.36 1"/>')
     light = '    <light directional="true" pos="0 0 100" dir="0.3 0.2 -1"/>'
     lines = ['<mujoco model="terrain">', "  <asset>", *assets, "  </asset>"]
     lines += ["  <worldbody>", light, *geoms, "  </worldbody>", "</mujoco>", ""]

@@ -8,12 +8,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Float32, Int64
+from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt, gaussian_filter
-from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 from scipy.special import expit
+from trimesh import Trimesh
+from trimesh.convex import convex_hull
+from trimesh.creation import icosphere
 
 from dav_gswt.errors import InputError
 from dav_gswt.export.terrain_files import describe_area, suggest_size
@@ -31,8 +33,9 @@ SMOOTHING = 1.0  # standard deviation of what heights are averaged over, in grou
 AROUND = 0.2  # of the neighbours that are seen beside a tile, as a share of its side
 MAX_STEPS = 1024  # of the lattice in a tile's side
 MAX_POINTS = 2**25  # of an area's height field
+FLAT = 1e-6  # share of an object's size; what is thinner has no hull
 SOLID = 0.3  # least opacity of a Gaussian that belongs to a hull
-DIRECTIONS = 96  # a hull has the outermost point in each, so at most as many vertices
+DIRECTIONS = 2  # times that an icosahedron is divided; a hull has the outermost point in the direction of each vertex
 
 
 @dataclass(frozen=True)
@@ -79,16 +82,13 @@ def measure_tiles(sets: Sequence[TileSet]) -> TileSurfaces:
         for each in progress(sets, "measure the tiles' ground")
         for tile in range(len(each.fields[0]))
     ]
-    return TileSurfaces(steps, _find_spacing(sets), np.stack(heights))
+    return TileSurfaces(steps, min(each.spacing for each in sets), np.stack(heights))
 
 
 def choose_steps(sets: Sequence[TileSet]) -> int:
     """Steps of the lattice in a tile's side: a point or more a ground cell."""
-    return min(MAX_STEPS, 1 << max(1, int(np.ceil(np.log2(sets[0].side / _find_spacing(sets) - 1e-6)))))
-
-
-def _find_spacing(sets: Sequence[TileSet]) -> float:
-    return min(each.spacing for each in sets)
+    spacing = min(each.spacing for each in sets)
+    return min(MAX_STEPS, 1 << max(1, int(np.ceil(np.log2(sets[0].side / spacing - 1e-6)))))
 
 
 def _surround(tiles: TileSet, tile: int) -> GaussianField:
@@ -164,17 +164,8 @@ def _choose_heights(
     return np.take_along_axis(each, chosen[None], axis=0)[0]
 
 
-@dataclass(frozen=True)
-class Hull:
-    """A closed convex mesh in the frame of an export, triangles counter-clockwise from outside."""
-
-    name: str
-    vertices: Float32[Array, "v 3"]
-    triangles: Int64[Array, "t 3"]
-
-
-def collect_hulls(terrain: EndlessTerrain, area: Area, origin: Float[Array, "3"]) -> Iterator[Hull]:
-    """The hulls of all objects whose feet lie in an area, in the order of its cells. origin: as `plan_export` has it.
+def collect_hulls(terrain: EndlessTerrain, area: Area, origin: Float[Array, "3"]) -> Iterator[tuple[str, Trimesh]]:
+    """Names and hulls of all objects whose feet lie in an area, in the order of its cells. origin: see `find_origin`.
 
     An object without any extent in space, as one of a single flat leaf, has none.
     """
@@ -184,15 +175,13 @@ def collect_hulls(terrain: EndlessTerrain, area: Area, origin: Float[Array, "3"]
     found = terrain.scatter.instances_in(i, j)
     feet = place_feet(terrain, found)
     shapes = [find_outermost(levels[0]) for levels in terrain.objects]
+    thick = [np.linalg.matrix_rank(each - each.mean(0), FLAT * np.ptp(each)) == 3 for each in shapes]
     names = [each.name for each in terrain.object_entries]
     for k, number in enumerate(found.number.tolist()):
-        angle = np.radians(found.turn[k])
-        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-        points = feet[k] + found.size[k] * shapes[number] @ turn.T
+        points = feet[k] + found.size[k] * Rotation.from_euler("z", found.turn[k], degrees=True).apply(shapes[number])
         points[:, 2] += terrain.heights.at(points[:, 0], points[:, 1])[0]
-        mesh = wrap(points - origin)
-        if mesh is not None:
-            yield Hull(f"{names[number]}_{k}", *mesh)
+        if thick[number]:
+            yield f"{names[number]}_{k}", convex_hull(points - origin)
 
 
 def find_outermost(field: GaussianField) -> Float[Array, "k 3"]:
@@ -203,31 +192,9 @@ def find_outermost(field: GaussianField) -> Float[Array, "k 3"]:
     axes = axes * np.exp(field.log_scales.astype(float))[:, None]
     means = field.means.astype(float)
     points = []
-    for direction in _spread_directions():
+    for direction in icosphere(DIRECTIONS).vertices:
         along = np.einsum("nij,i->nj", axes, direction)  # how far each axis reaches in the direction
         reach = np.linalg.norm(along, axis=1)
         k = int(np.argmax(means @ direction + reach))
         points.append(means[k] + axes[k] @ along[k] / max(reach[k], 1e-30))
     return np.unique(np.round(points, 9), axis=0)
-
-
-def _spread_directions() -> Float[Array, "k 3"]:
-    """Directions all around, about as far apart: a Fibonacci lattice of the sphere."""
-    k = np.arange(DIRECTIONS) + 0.5
-    z, turn = 1 - 2 * k / DIRECTIONS, np.pi * (1 + 5**0.5) * k
-    flat = np.sqrt(1 - z * z)
-    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], 1)
-
-
-def wrap(points: Float[Array, "n 3"]) -> tuple[Float32[Array, "v 3"], Int64[Array, "t 3"]] | None:
-    """The convex hull of points, or None where they have no volume."""
-    try:
-        hull = ConvexHull(points)
-    except (QhullError, ValueError):
-        return None
-    corners = points[hull.simplices]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = (normals * hull.equations[:, :3]).sum(1) < 0
-    simplices = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
-    used, triangles = np.unique(simplices, return_inverse=True)
-    return points[used].astype(np.float32), triangles.reshape(-1, 3).astype(np.int64)

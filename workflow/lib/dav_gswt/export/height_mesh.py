@@ -23,11 +23,8 @@ def simplify_heights(
     """Lattice points (row, column) that are kept, and triangles of them, counter-clockwise from above.
 
     heights: of whole blocks: rows and columns are multiples of `block`, a power of two, plus one.
-    Raises: ValueError: they are not.
     """
     size = np.array(heights.shape) - 1
-    if block < 2 or block & (block - 1) or (size % block).any() or not size.all():
-        raise ValueError(f"a height field of {heights.shape} is not of blocks of {block}")
     split = measure_errors(heights, block) > tolerance
     first = np.array(list(product(*(range(0, n, block) for n in size))))[:, None]
     open_ones, kept = (_cut_block(block)[:, None] + first).reshape(-1, 3, 2), []

@@ -1,8 +1,10 @@
 """Gaussians on disk, one file per column, so that other programs' files are made in parts with bounded memory."""
 
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32, Float64
@@ -10,7 +12,10 @@ from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.field import GaussianField
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.raster.interface import RIM
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.finite import Area
 
 COLUMNS = {"means": 3, "dc": 3, "opacity_logits": 1, "log_scales": 3, "quats": 4}  # float32 each
 CHUNK = 262_144  # Gaussians that are read at once
@@ -41,9 +46,7 @@ class Spool:
         return self.count
 
     def append(self, field: GaussianField) -> None:
-        """Add Gaussians. Raises: ValueError: their colours depend on the view."""
-        if field.sh_degree:
-            raise ValueError("a spool holds colours of degree 0")
+        """Add Gaussians whose colours do not depend on the view."""
         for name, file in self._files.items():
             values = field.sh[:, 0] if name == "dc" else getattr(field, name)
             file.write(np.ascontiguousarray(values, "<f4").tobytes())
@@ -67,6 +70,25 @@ class Spool:
             reach = RIM * np.sqrt(np.einsum("nij,nj->ni", axes**2, np.exp(2 * scales.astype(float))))
             boxes.append(((points - reach).min(0), (points + reach).max(0)))
         return unite_boxes(boxes)
+
+
+@dataclass(frozen=True)
+class ExportJob:
+    """What a format's writer writes.
+
+    Attributes:
+        spool: the Gaussians of the area at the requested level.
+        facts: about the files, for formats that keep such.
+        place: puts cells on the surface at a level, on disk while its block runs.
+        reference: place on earth, if it is known.
+    """
+
+    spool: Spool
+    facts: Mapping[str, Any]
+    terrain: EndlessTerrain
+    area: Area
+    place: Callable[[Area, int], AbstractContextManager[Spool]]
+    reference: Georeference | None
 
 
 def unite_boxes(boxes: list[Box]) -> Box:

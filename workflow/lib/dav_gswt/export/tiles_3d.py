@@ -13,8 +13,7 @@ import numpy as np
 
 import dav_gswt
 from dav_gswt.export.glb import COMPRESSION, EXTENSION, write_splats
-from dav_gswt.export.spool import Box, unite_boxes
-from dav_gswt.export.terrain_files import ExportJob
+from dav_gswt.export.spool import Box, ExportJob, unite_boxes
 from dav_gswt.files import write_json
 from dav_gswt.logs import progress
 from dav_gswt.terrain.endless import EndlessTerrain
@@ -26,23 +25,21 @@ ALLOWED_PIXELS = 16
 GLTF_EXTENSION = "3DTILES_content_gltf"
 
 
-def write_tileset(job: ExportJob, folder: Path, compressed: bool) -> int:
+def write_tileset(job: ExportJob, folder: Path) -> int:
     """Write tileset.json and {level}/{column}_{row}.glb, named by the south-western cells, to a new folder.
 
     If the terrain's place on earth is known, the tileset's transform puts it there; else it stays in its own unit.
     Returns: the number of Gaussians. Raises: ValueError: the area has none.
     """
     folder.mkdir()
-    writer = _TreeWriter(job, folder, measure_errors(job.terrain), compressed)
+    writer = _TreeWriter(job, folder, measure_errors(job.terrain))
     root = writer.write_root()
     if job.reference is not None:
         shift = np.eye(4)
         shift[:3, 3] = job.facts["origin"]
         root["transform"] = (job.reference.to_geocentric @ shift).T.ravel().tolist()  # column by column
     # CesiumJS draws Gaussians only if the tileset itself names the extensions of its GLBs
-    used: dict[str, Any] = {"extensionsUsed": [EXTENSION]}
-    if compressed:
-        used = {name: [EXTENSION, COMPRESSION] for name in ("extensionsUsed", "extensionsRequired")}
+    used = {name: [EXTENSION, COMPRESSION] for name in ("extensionsUsed", "extensionsRequired")}
     tileset = {
         "asset": {"version": "1.1", "extras": {"generator": f"DAV-GSWT {dav_gswt.__version__}"}},
         "extensionsUsed": [GLTF_EXTENSION],
@@ -62,7 +59,6 @@ class _TreeWriter:
     job: ExportJob
     folder: Path
     errors: list[float]
-    compressed: bool
     count: int = 0
 
     def write_root(self) -> dict[str, Any]:
@@ -89,7 +85,7 @@ class _TreeWriter:
                 boxes.append(placed.find_box())
                 uri = f"{level}/{area.west}_{area.south}.glb"
                 extras = {"unit": self.job.facts["unit"], "level": level}
-                write_splats(placed, self.folder / uri, extras, compressed=self.compressed)
+                write_splats(placed, self.folder / uri, extras, compressed=True)
                 content = {"content": {"uri": uri, "boundingVolume": {"box": to_volume(boxes[-1])}}}
         if not boxes:
             return None

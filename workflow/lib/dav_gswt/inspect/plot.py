@@ -16,12 +16,11 @@ import numpy as np
 import pyvista as pv
 from jaxtyping import Float, UInt8
 from jinja2 import Template
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_file
+from dav_gswt.views.policies import HIGHEST
 
 Colour = tuple[int, int, int]
 PROBE = "import pyvista; plotter = pyvista.Plotter(off_screen=True); plotter.show(); assert plotter.image is not None"
@@ -32,35 +31,28 @@ POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' blob:; worker-src blob:; connect-src blob: data:; "
     "img-src blob: data:; style-src 'unsafe-inline'"
 )
-ADDRESS = r'(?<=")[0-9a-f]{16}(?=["-])|(?<=\$\{)[0-9a-f]{16}(?=[}-])'  # in names of VTK's objects
 ICON = "https://kitware.github.io/vtk-js/icon/favicon-"  # the viewer would request it
 STAGE = '<div class="content" style="position:fixed;inset:0"></div>'  # the viewer fills it
 OVERLAY = Path(__file__).with_name("overlay.html")  # Jinja2 template
 
 
-@dataclass(frozen=True)
-class Bar:
-    """Colours that stand for numbers, from `low` to `high`."""
+def make_bar(low: float, high: float, colours: str = UNCERTAINTY_MAP) -> pv.LookupTable:
+    """Colours that stand for numbers; one unit wide if `low` and `high` are the same."""
+    return pv.LookupTable(colours, scalar_range=(low, high if high > low else low + 1.0))
 
-    title: str
-    low: float = 0.0
-    high: float = 1.0
-    colours: str = UNCERTAINTY_MAP
 
-    @classmethod
-    def of_values(cls, title: str, values: Float[Array, "*n"], colours: str = UNCERTAINTY_MAP, most: float = 1.0):
-        """A bar from the least value to the quantile `most`; one unit wide if the values are constant."""
-        known = values[np.isfinite(values)]
-        low, high = (float(known.min()), float(np.quantile(known, most))) if known.size else (0.0, 1.0)
-        return cls(title, low, high if high > low else low + 1.0, colours)
+def fit_bar(values: Float[Array, "*n"], colours: str = UNCERTAINTY_MAP) -> pv.LookupTable:
+    """A bar from the least value to the quantile HIGHEST."""
+    known = values[np.isfinite(values)]
+    low, high = np.quantile(known, [0.0, HIGHEST]).tolist() if known.size else (0.0, 1.0)
+    return make_bar(low, high, colours)
 
-    def map(self, values: Float[Array, "*n"]) -> UInt8[Array, "*n 3"]:
-        """The colours of values; UNKNOWN where they are not finite."""
-        known = np.isfinite(values)
-        share = (np.where(known, values, self.low) - self.low) / (self.high - self.low)
-        colours = to_bytes(colormaps[self.colours].resampled(4096)(np.clip(share, 0, 1))[..., :3])
-        colours[~known] = UNKNOWN
-        return colours
+
+def map_colours(bar: pv.LookupTable, values: Float[Array, "*n"]) -> UInt8[Array, "*n 3"]:
+    """The colours of values; UNKNOWN where they are not finite."""
+    known = np.isfinite(values)
+    colours = np.asarray(bar(np.where(known, values, 0.0).ravel()))[:, :3]
+    return np.where(known[..., None], to_bytes(colours).reshape(*values.shape, 3), np.array(UNKNOWN, np.uint8))
 
 
 @dataclass
@@ -70,7 +62,7 @@ class Scene:
     Attributes:
         notes: lines below the title.
         meshes: meshes, each with the options with which PyVista draws it.
-        bars, names: the legend.
+        bars, names: the legend: what colours mean, by its title.
         box: lowest and highest corner of what the first view shows; None: all meshes.
         viewer: direction from the box to the viewer. (0, 0, 1): pictures, seen straight on.
     """
@@ -78,7 +70,7 @@ class Scene:
     title: str
     notes: list[str]
     meshes: list[tuple[pv.DataSet, dict[str, Any]]] = field(default_factory=list)
-    bars: list[Bar] = field(default_factory=list)
+    bars: dict[str, pv.LookupTable] = field(default_factory=dict)
     names: dict[str, Colour] = field(default_factory=dict)
     box: Float[Array, "2 3"] | None = None
     viewer: tuple[float, float, float] = (-0.45, -1.0, 0.75)
@@ -150,13 +142,12 @@ def make_plotter(scene: Scene, size: tuple[int, int], off_screen: bool, legend: 
     if legend:
         text = "\n".join(line if len(line) <= 110 else f"...{line[-107:]}" for line in [scene.title, *scene.notes])
         plotter.add_text(text, position="upper_left", font_size=8, color=BLACK)
-        for i, bar in enumerate(scene.bars):
+        for i, (title, bar) in enumerate(scene.bars.items()):
             mapper = pv.DataSetMapper()
-            mapper.lookup_table = pv.LookupTable(bar.colours, n_values=256, scalar_range=(bar.low, bar.high))
+            mapper.lookup_table = bar
             where = {"width": 0.25, "height": 0.06, "position_x": 0.02 + 0.28 * i, "position_y": 0.01}
             text = {"title_font_size": 14, "label_font_size": 14, "n_labels": 2, "fmt": "%.3g", "color": BLACK}
-            # The title is also a key, so two bars may not share one.
-            plotter.add_scalar_bar(f"{bar.title}{' ' * i}", mapper=mapper, vertical=False, **where, **text)
+            plotter.add_scalar_bar(title, mapper=mapper, vertical=False, **where, **text)
         left = size[0] - 20 - 9 * max(map(len, scene.names), default=0)
         for i, (name, colour) in enumerate(reversed(scene.names.items())):
             plotter.add_text(name, position=(left, 10 + 20 * i), font_size=9, color=colour)
@@ -177,13 +168,13 @@ def format_page(scene: Scene, render_window: Any) -> str:
     )
     page = re.sub(r"<title>.*?</title>", lambda _: head, text.getvalue().replace(ICON, "data:,"), count=1, flags=re.S)
     template = Template(OVERLAY.read_text(encoding="utf-8"), autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    stops = [[to_hex(colour) for colour in colormaps[bar.colours].resampled(16)(range(16))] for bar in scene.bars]
+    stops = {title: [pv.Color(row).hex_rgb for row in bar.values[8::16]] for title, bar in scene.bars.items()}
     before, body, after = page.rpartition("</body>")
-    return f"{before}{STAGE}\n{template.render(scene=scene, gradients=stops)}\n{body}{after}"
+    return f"{before}{STAGE}\n{template.render(scene=scene, stops=stops)}\n{body}{after}"
 
 
 def _pack_scene(render_window: Any) -> bytes:
-    """The scene as VTK's viewer reads it: the same bytes for the same scene."""
+    """The scene as VTK's viewer reads it."""
     from trame_vtk.modules.vtk import serializers as vtk
 
     vtk.initialize_serializers()
@@ -193,13 +184,7 @@ def _pack_scene(render_window: Any) -> bytes:
         entry["hash"]: entry | {"content": context.get_cached_data_array(entry["hash"], False)}
         for entry in vtk.extract_array_hash(state)
     }
-    # Objects are numbered in order of appearance instead of by address, and have no times of change.
-    numbers: dict[str, str] = {}
-    text = re.sub(ADDRESS, lambda m: numbers.setdefault(m[0], f"{len(numbers):016x}"), json.dumps(state))
-    state = json.loads(re.sub(r'"mtime": \d+', '"mtime": 1', text))
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w") as archive:
-        entry = zipfile.ZipInfo("index.json", (1980, 1, 1, 0, 0, 0))
-        entry.compress_type = zipfile.ZIP_DEFLATED
-        archive.writestr(entry, json.dumps({"hashes": arrays, "scene": state}))
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("index.json", json.dumps({"hashes": arrays, "scene": state}))
     return packed.getvalue()

@@ -6,7 +6,6 @@ line that it accepts. A folder is searched for the names in the order in which t
 
 import inspect
 from collections.abc import Callable
-from contextlib import contextmanager
 from dataclasses import asdict, replace
 from math import ceil
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, UInt8
 from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 from scipy.special import expit
@@ -22,22 +21,22 @@ from scipy.special import expit
 from dav_gswt.bundle import store as bundles
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, read_field
-from dav_gswt.files import read_json
-from dav_gswt.geometry.cameras import Camera, camera_from_json
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import pose_offset
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import image_files
-from dav_gswt.inspect.plot import BLACK, UNCERTAINTY_MAP, Bar, Colour, Scene, to_bytes
+from dav_gswt.inspect.plot import BLACK, UNCERTAINTY_MAP, Colour, Scene, fit_bar, make_bar, map_colours, to_bytes
 from dav_gswt.lod import store as levels
 from dav_gswt.paths import decode_path, related_folder
+from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction.ground import Ground, read_ground
 from dav_gswt.tiles import store as tiles
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import EDGES, LABELS, arrange_torus
 from dav_gswt.views import pose_maps
-from dav_gswt.views.policies import HIGHEST, candidate_values
-from dav_gswt.views.scores import Scores, read_scores
+from dav_gswt.views.policies import candidate_values
+from dav_gswt.views.scores import read_scores
 from dav_gswt.views.selection import read_pose_selection
 
 Reader = Callable[..., Scene]
@@ -56,10 +55,12 @@ DEPTH = 0.12  # flying heights from a camera to its picture
 PHOTO_SIDE = 160  # pixels of a photo's longer side
 BALL, CHOSEN_BALL, NUMBER = 0.018, 0.03, 0.07  # radii and height, in radii of the hemisphere
 ROLES = {"start": (34, 136, 51), "pool": (68, 119, 170), "test": (238, 102, 119), "photo": (90, 90, 90)}
-CAPTURED = (170, 51, 119)
+ROLES |= {"taken for a round": (170, 51, 119)}
 GROUND_NAMES = {"exemplar": (230, 140, 0), "seen by a photo": (120, 120, 120)}
 ASPECT, LETTER = 1.6, 0.05  # of all pictures side by side, width over height; height of letters, in picture widths
 MAX_PICTURES, MAX_SIDE = 60, 1024  # pictures of a scene, and pixels of a picture's longer side
+
+Vector = Float[Array, "3"]
 
 
 def reader(*names: str) -> Callable[[Reader], Reader]:
@@ -89,26 +90,24 @@ def read_scene(path: Path, most: int, **given: Any) -> Scene:
     for name in given.keys() - known:
         accepted = ", ".join(f"--{option}" for option in known) or "no options"
         raise InputError(f"--{name}: means nothing for {path}, which knows {accepted}")
-    return read(file, most=most, **given)
-
-
-@contextmanager
-def wrap_errors(path: Path):
-    """Turn errors about the content of a file, such as a missing key, into an InputError that names the file."""
     try:
-        yield
+        return read(file, most=most, **given)
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         why = f"{type(error).__name__}: {error}"
-        raise InputError(f"{path}: not as the workflow writes it ({why}); make it again") from error
+        raise InputError(f"{file}: not as the workflow writes it ({why}); make it again") from error
 
 
-def find_above(path: Path, name: str, folders: int | None = None) -> Path | None:
+def find_above(path: Path, name: str, why: str, folders: int | None = None) -> Path:
     """A file of this name in the nearest folder above a path. folders: how many are searched.
 
     The files of a fit lie in the folder of its scores or in the one above: `folders` is 2 for them.
+    Raises: InputError: there is none; why: what it is needed for.
     """
     files = (folder / name for folder in path.resolve().parents[:folders])
-    return next((file for file in files if file.is_file()), None)
+    found = next((file for file in files if file.is_file()), None)
+    if found is None:
+        raise InputError(f"{path}: {name} is in no folder above it, {why}; leave it in its result tree")
+    return found
 
 
 def choose(option: str, value: str | None, names: tuple[str, ...], path: Path) -> str:
@@ -122,41 +121,45 @@ def choose(option: str, value: str | None, names: tuple[str, ...], path: Path) -
 def read_levels(path: Path, *, most: int, colour: str | None = None, level: int | None = None) -> Scene:
     """All levels of detail side by side, the finest in the west, or one of them."""
     fields = levels.read_levels(path.parent).fields
-    return _arrange_fields(path, fields, _choose_levels(level, len(fields), path), colour, most)
+    known = tuple(f"{number}" for number in range(len(fields)))
+    numbers = range(len(fields)) if level is None else [int(choose("level", f"{level}", known, path))]
+    step = (1 + GAP) * float(np.ptp(np.quantile(fields[0].means[:, 0], [0.002, 0.998])))
+    placed = {f"level {k}": (fields[k], np.array([i * step, 0, 0])) for i, k in enumerate(numbers)}
+    scene = show_fields(path, placed, choose("colour", colour, COLOURS, path), most)
+    scene.notes.append(f"{', '.join(placed)} of {len(fields)} levels")
+    return scene
 
 
 @reader("field.ply", ".ply")
 def read_one_field(path: Path, *, most: int, colour: str | None = None) -> Scene:
     """A field of the workflow, or of another program."""
-    return _arrange_fields(path, [read_field(path)], None, colour, most)
+    return show_fields(path, {"": (read_field(path), np.zeros(3))}, choose("colour", colour, COLOURS, path), most)
 
 
-def _choose_levels(level: int | None, count: int, path: Path) -> list[int]:
-    if level is not None and not 0 <= level < count:
-        raise InputError(f"--level {level}: {path} has the levels 0 to {count - 1}")
-    return list(range(count)) if level is None else [level]
-
-
-def _arrange_fields(
-    path: Path, fields: list[GaussianField], numbers: list[int] | None, colour: str | None, most: int
+def show_fields(
+    path: Path, placed: dict[str, tuple[GaussianField, Vector]], by: str, most: int, cut: TileSet | None = None
 ) -> Scene:
-    """Fields side by side. numbers: the levels that are shown; None: the fields are no levels."""
-    by = choose("colour", colour, COLOURS, path)
-    scene = Scene(str(path), [], bars=[Bar("uncertainty")] if by == "uncertainty" else [])
-    boxes: list[Array] = []
-    for number in numbers or [0]:
-        kept = thin_field(fields[number], most // len(numbers or [0]))
+    """Fields by name, each with the place of its origin. cut: the tile set, if `by` is patch: fields are its tiles."""
+    scene = Scene(str(path), [], bars={"uncertainty": make_bar(0.0, 1.0)} if by == "uncertainty" else {})
+    boxes, drawn = [], 0
+    for name, (field, corner) in placed.items():
+        kept = thin_field(field, most // len(placed))
         if not len(kept):
-            raise InputError(f"{path}: no Gaussian is more opaque than {MIN_OPACITY:g}; there is nothing to draw")
+            continue
+        colours = compute_colours(kept, by) if cut is None else colour_patches(kept, cut, int(name))
+        kept = replace(kept, means=kept.means + corner.astype(np.float32))
+        add_solids(scene, kept, colours)
         low, high = np.quantile(kept.means, [0.002, 0.998], axis=0)  # outliers are left out of the first view
-        east = boxes[-1][1, 0] + GAP * (high - low)[0] - low[0] if boxes else 0.0
-        kept = replace(kept, means=kept.means + np.array([east, 0, 0], np.float32))
-        add_solids(scene, kept, compute_colours(kept, by))
-        boxes.append(np.array([low, high]) + [east, 0, 0])
-        scene.notes.append(
-            f"{f'level {number}: ' if numbers else ''}{len(kept)} of {len(fields[number])} Gaussians, by {by}"
-        )
-    scene.box = np.array([np.min(boxes, 0)[0], np.max(boxes, 0)[1]])
+        size = high[0] - low[0]
+        if len(placed) > 1:
+            scene.add_label(name, np.array([(low[0] + high[0]) / 2, low[1] - 0.6 * GAP * size, low[2]]), 0.1 * size)
+        boxes.append((low, high))
+        drawn += len(kept)
+    if not boxes:
+        raise InputError(f"{path}: no Gaussian is more opaque than {MIN_OPACITY:g}; there is nothing to draw")
+    total = sum(len(field) for field, _ in placed.values())
+    scene.notes.append(f"{drawn} of {total} Gaussians, by {by}")
+    scene.box = np.array([np.min([low for low, _ in boxes], 0), np.max([high for _, high in boxes], 0)])
     return scene
 
 
@@ -174,7 +177,7 @@ def thin_field(field: GaussianField, most: int) -> GaussianField:
 
 def compute_colours(field: GaussianField, by: str) -> UInt8[Array, "n 3"]:
     """A colour for each Gaussian. by: one of COLOURS."""
-    return Bar("").map(field.uncertainty) if by == "uncertainty" else to_bytes(field.base_colours)
+    return map_colours(make_bar(0.0, 1.0), field.uncertainty) if by == "uncertainty" else to_bytes(field.base_colours)
 
 
 def add_solids(scene: Scene, field: GaussianField, colours: UInt8[Array, "n 3"]) -> None:
@@ -201,47 +204,39 @@ def add_solids(scene: Scene, field: GaussianField, colours: UInt8[Array, "n 3"])
 def read_tile_set(path: Path, *, most: int, colour: str | None = None, level: int = 0) -> Scene:
     """A set of tiles, with --colour patch in the colours of the patches that they are cut from."""
     seams = path.parents[1] / "seams.json" if path.name == "labels.npz" else path
-    with wrap_errors(seams):
-        cut = tiles.read_tiles(seams.parent / "tiles", seams)
-        shape, wide = cut.labels.shape, cut.labels.shape[1] * cut.spacing
-        if shape[1] != shape[2] or cut.labels.max(initial=0) >= len(LABELS) or not abs(wide - cut.side) < 1e-6 * wide:
-            raise ValueError("labels.npz is not a map of each tile")
-    return _arrange_tiles(seams, cut.fields, cut.side, cut, colour, level, most)
+    cut = tiles.read_tiles(seams.parent / "tiles", seams)
+    shape, wide = cut.labels.shape, cut.labels.shape[1] * cut.spacing
+    if shape[1] != shape[2] or cut.labels.max(initial=0) >= len(LABELS) or not abs(wide - cut.side) < 1e-6 * wide:
+        raise ValueError("labels.npz is not a map of each tile")
+    by = choose("colour", colour, (*COLOURS, "patch"), path)
+    scene = _show_tiles(seams, cut.fields, cut.side, by, level, most, cut if by == "patch" else None)
+    scene.names = dict(zip(LABELS, PATCH_COLOURS, strict=True)) if by == "patch" else {}
+    return scene
 
 
 @reader("davgswt.json")
 def read_bundle(path: Path, *, most: int, colour: str | None = None, level: int = 0) -> Scene:
     """The quantized tiles of a bundle."""
     bundle = bundles.read_bundle(path.parent)
-    return _arrange_tiles(path, bundle.fields(), bundle.manifest.tile_side, None, colour, level, most)
+    by = choose("colour", colour, COLOURS, path)
+    return _show_tiles(path, bundle.fields(), bundle.manifest.tile_side, by, level, most)
 
 
-def _arrange_tiles(
+def _show_tiles(
     path: Path,
     fields: list[list[GaussianField]],
     side: float,
-    cut: TileSet | None,
-    colour: str | None,
+    by: str,
     level: int,
     most: int,
+    cut: TileSet | None = None,
 ) -> Scene:
-    """All tiles of a level, so that neighbours match. cut: the tile set, if its patches are known."""
-    by = choose("colour", colour, (*COLOURS, "patch") if cut else COLOURS, path)
-    _choose_levels(level, len(fields), path)
-    count, step = len(fields[level]), side * (1 + GAP)
-    scene = Scene(str(path), [f"{count} tiles, {len(fields)} levels, {side:.4g} wide; level {level} by {by}"])
-    scene.viewer, scene.box = (-0.25, -1.0, 1.3), np.zeros((2, 3))
-    scene.bars = [Bar("uncertainty")] if by == "uncertainty" else []
-    scene.names = dict(zip(LABELS, PATCH_COLOURS, strict=True)) if by == "patch" else {}
-    for tile, corner in place_tiles(count, step):
-        field = thin_field(fields[level][tile], most // count)
-        if len(field):
-            placed = replace(field, means=field.means + corner.astype(np.float32))
-            shown = shade_patches(field, cut, tile) if cut and by == "patch" else compute_colours(field, by)
-            add_solids(scene, placed, shown)
-        middle = float(np.median(field.means[:, 2])) if len(field) else 0.0
-        scene.add_label(f"{tile}", corner + [0.5 * side, -0.6 * GAP * side, middle], 0.1 * side)
-        scene.box[1] = np.maximum(scene.box[1], corner + side * np.array([1.0, 1.0, 0.2]))
+    """All tiles of a level, so that neighbours match."""
+    shown = fields[int(choose("level", f"{level}", tuple(f"{number}" for number in range(len(fields))), path))]
+    placed = {f"{tile}": (shown[tile], corner) for tile, corner in place_tiles(len(shown), side * (1 + GAP))}
+    scene = show_fields(path, placed, by, most, cut)
+    scene.notes.append(f"{len(shown)} tiles, {len(fields)} levels, {side:.4g} wide; level {level}")
+    scene.viewer = (-0.25, -1.0, 1.3)
     return scene
 
 
@@ -254,99 +249,52 @@ def place_tiles(count: int, step: float) -> list[tuple[int, Float[Array, "3"]]]:
     ]
 
 
-def find_patches(field: GaussianField, cut: TileSet, tile: int) -> Int[Array, "n"]:
-    """The label of the cell that each Gaussian lies over; of the nearest cell beyond the tile."""
+def colour_patches(field: GaussianField, cut: TileSet, tile: int) -> UInt8[Array, "n 3"]:
+    """The colour of the patch that each Gaussian lies over; of the nearest one beyond the tile."""
     last = cut.labels.shape[1] - 1
     column, row = np.clip(field.means[:, :2] / cut.spacing, 0, last).astype(int).T
-    return cut.labels[tile][row, column].astype(int)
+    return np.array(PATCH_COLOURS, np.uint8)[cut.labels[tile][row, column]]
 
 
-def shade_patches(field: GaussianField, cut: TileSet, tile: int) -> UInt8[Array, "n 3"]:
-    """Colours of the patches, lighter and darker by each Gaussian's own brightness, so that shapes are visible."""
-    named = np.array(PATCH_COLOURS)[find_patches(field, cut, tile)]
-    grey = np.clip(field.base_colours, 0, 1).mean(1)
-    return to_bytes(named / 255 * (1 + 1.5 * (grey - np.median(grey)))[:, None])
-
-
-def make_surface(grid: Ground, step: int) -> pv.PolyData:
-    """A quad for every `step`-th cell in both ways, through heights averaged at the cells' corners."""
-    heights, spacing = grid.heights[::step, ::step], grid.spacing * step
-    padded = np.pad(heights, 1, mode="edge")
-    z = np.nan_to_num(padded[:-1, :-1] + padded[1:, :-1] + padded[:-1, 1:] + padded[1:, 1:]) / 4
-    x, y = (np.arange(count + 1) * spacing for count in heights.shape[::-1])
-    points = np.stack([*np.meshgrid(grid.west + x, grid.south + y), z], -1).reshape(-1, 3)
-    first = (np.arange(len(heights))[:, None] * len(x) + np.arange(len(x) - 1)).ravel()
-    cells = first[:, None] + np.array([0, 1, len(x) + 1, len(x)])
-    return pv.PolyData.from_regular_faces(points.astype(np.float32), cells)
-
-
-@reader("ground.json")
+@reader("ground.json", "views.json", "capture.json")
 def read_photos(path: Path, *, most: int) -> Scene:
-    """photos/: its model and photos, by what each is for if one seed alone says so."""
-    splits = sorted(path.parents[1].glob("seed*/views.json"))
-    return _arrange_photos(path, path.parent, splits[0] if len(splits) == 1 else None, [])
-
-
-@reader("capture.json")
-def read_capture(path: Path, *, most: int) -> Scene:
-    """The photos of a round among those of the scene."""
-    return _arrange_photos(path, find_photos(path), None, read_shots(path))
-
-
-@reader("views.json")
-def read_split(path: Path, *, most: int) -> Scene:
-    """The photos by what they are for."""
-    return _arrange_photos(path, find_photos(path), path, [])
-
-
-def read_shots(path: Path) -> list[tuple[Camera, Path]]:
-    """The cameras and photos of a capture.json. Raises: InputError: damaged, or a name leads out of its folder."""
-    content = read_json(path)
-    with wrap_errors(path):
-        shots = [(str(shot["name"]), camera_from_json(shot["got"])) for shot in content["shots"]]
-    for name, _ in shots:
-        if Path(name).name != name:
-            raise InputError(f"{path}: {name!r} is no file's name; take the photos again")
-    return [(camera, path.parent / name) for name, camera in shots]
-
-
-def find_photos(path: Path) -> Path:
-    """The folder photos/ of the scene that a file belongs to. Raises: InputError: there is none."""
-    frame = find_above(path, "photos/ground.json")
-    if frame is None:
-        raise InputError(f"{path}: photos/ground.json is in no folder above it; leave it in its result tree")
-    return frame.parent
-
-
-def _arrange_photos(path: Path, folder: Path, split: Path | None, captured: list[tuple[Camera, Path]]) -> Scene:
-    """A photos/ folder. split: views.json. captured: further cameras, and their photos."""
+    """photos/ and its model; views.json: by what each photo is for; capture.json: with the photos of a round."""
     from dav_gswt.photos.colmap_model import read_colmap_model  # here, not above: it loads pycolmap
 
-    frame, model = read_scene_frame(folder / "ground.json"), read_colmap_model(folder / "sparse")
-    roles = {name: role for role, names in asdict(read_view_split(split)).items() for name in names} if split else {}
-    scene, depth = Scene(str(path), []), DEPTH * frame.flying_height
-    for name, camera in zip(model.names, model.cameras, strict=True):
-        role = roles.get(name, "photo")
+    scene, (frame, folder) = Scene(str(path), []), find_frame(path)
+    model, depth = read_colmap_model(folder / "sparse"), DEPTH * frame.flying_height
+    split = asdict(read_view_split(path)) if path.name == "views.json" else {}
+    roles = {name: role for role, names in split.items() for name in names}
+    shots = [
+        (camera, roles.get(name, "photo"), folder / "images" / name)
+        for name, camera in zip(model.names, model.cameras, strict=True)
+    ]
+    if path.name == "capture.json":
+        taken = read_capture_record(path.parent)
+        shots += [(photo.camera, "taken for a round", path.parent / photo.name) for photo in taken]
+    for camera, role, file in shots:
         scene.names[role] = ROLES[role]
-        add_frustum(scene, camera, depth, ROLES[role], folder / "images" / name)
-    for camera, file in captured:
-        scene.names["taken for a round"] = CAPTURED
-        add_frustum(scene, camera, depth, CAPTURED, file)
+        add_frustum(scene, camera, depth, ROLES[role], file)
     if len(model.points):
         scene.add(pv.PolyData(model.points.astype(np.float32)), to_bytes(model.colours), style="points", point_size=3.0)
-    eyes = np.array([camera.centre for camera in [*model.cameras, *(each for each, _ in captured)]]).reshape(-1, 3)
-    _add_ground(scene, frame, eyes)
-    scene.notes = [f"{len(eyes)} cameras, {len(model.points)} points; unit: {frame.unit[:40]}"]
+    _add_ground(scene, frame, np.array([camera.centre for camera, _, _ in shots]).reshape(-1, 3))
+    scene.notes = [f"{len(shots)} cameras, {len(model.points)} points; unit: {frame.unit[:40]}"]
     return scene
+
+
+def find_frame(path: Path) -> tuple[SceneFrame, Path]:
+    """The frame of the scene that a file belongs to, and its folder photos/. Raises: InputError: there is none."""
+    if path.name != "ground.json":
+        path = find_above(path, "photos/ground.json", "which says where its scene lies")
+    return read_scene_frame(path), path.parent
 
 
 def _add_ground(scene: Scene, frame: SceneFrame, eyes: Float[Array, "n 3"]) -> None:
     """Add the borders of the exemplar and of all visible ground. The first view shows the exemplar and the eyes."""
     square = frame.exemplar
     for area, colour in zip((square, frame.extent), GROUND_NAMES.values(), strict=True):
-        corners = [[area.west, area.south, 0.0], [area.east, area.south, 0.0], [area.east, area.north, 0.0]]
-        corners = np.array([*corners, [area.west, area.north, 0.0]], np.float32)
-        scene.add(pv.lines_from_points(corners, close=True), colour, line_width=3.0)
+        border = pv.Box((area.west, area.east, area.south, area.north, 0.0, 0.0)).extract_all_edges()
+        scene.add(border, colour, line_width=3.0)
     points = np.concatenate([eyes, [[square.west, square.south, 0.0], [square.east, square.north, 0.0]]])
     scene.box = np.array([points.min(0), points.max(0)])
     scene.names |= GROUND_NAMES
@@ -365,36 +313,27 @@ def add_frustum(scene: Scene, camera: Camera, depth: float, colour: Colour, phot
         scene.add_picture(to_bytes(small), corners[0], corners[1] - corners[0], corners[3] - corners[0])
 
 
-@reader("scores.csv")
-def read_candidates(path: Path, *, most: int, colour: str | None = None) -> Scene:
-    """The candidates by their scores."""
-    return _arrange_poses(path, None, colour, most)
-
-
-@reader("poses.json")
-def read_chosen(path: Path, *, most: int, colour: str | None = None) -> Scene:
-    """A round's poses among the candidates, by the scores by which they were chosen."""
-    return _arrange_poses(find_scores(path), path, colour, most)
-
-
-def _arrange_poses(path: Path, poses: Path | None, colour: str | None, most: int) -> Scene:
-    """path: scores.csv. poses: the poses.json whose poses are marked."""
-    photos, table = find_photos(path), read_scores(path)
-    frame = read_scene_frame(photos / "ground.json")
+@reader("poses.json", "scores.csv")
+def read_poses(path: Path, *, most: int, colour: str | None = None) -> Scene:
+    """The candidates by their scores; of poses.json those by which its poses were chosen, and these are marked."""
+    source = find_scores(path) if path.name == "poses.json" else path
+    (frame, _), table = find_frame(source), read_scores(source)
     if not len(table):
-        raise InputError(f"{path}: no candidate is in it: none was left to choose from")
-    label, values = candidate_values(table, float(decode_path((poses or path).resolve()).get("lam", 0.0)))
+        raise InputError(f"{source}: no candidate is in it: none was left to choose from")
+    label, values = candidate_values(table, float(decode_path(path.resolve()).get("lam", 0.0)))
     if colour is not None:
-        label = choose("colour", colour, tuple(table.terms), path)
+        label = choose("colour", colour, tuple(table.terms), source)
         values = table.terms[label]
     title, _, unit = label.partition(", ")
-    bar = Bar.of_values(title, values, most=HIGHEST)
-    tint, middle = bar.map(values), frame.exemplar.centre
-    at = middle + np.array([pose_offset(pose) for pose in table.poses])
+    bar, middle = fit_bar(values), frame.exemplar.centre
+    tint, at = map_colours(bar, values), middle + np.array([pose_offset(pose) for pose in table.poses])
     radius = float(np.median(np.linalg.norm(at - middle, axis=1)))
-    chosen = _read_marked(table, poses)
-    scene = Scene(str(poses or path), [f"{len(table)} candidates; {len(chosen)} chosen, numbered in order"], bars=[bar])
-    scene.notes += [f"{title}: {unit}"] if unit else []
+    names = [pose.name for pose in read_pose_selection(path).poses] if path.name == "poses.json" else []
+    if unknown := set(names) - set(table.names):
+        raise InputError(f"{path}: {min(unknown)} is not among the scored poses; give the poses of the round after")
+    chosen = [table.names.index(name) for name in names]
+    notes = [f"{len(table)} candidates; {len(chosen)} chosen, numbered in order"]
+    scene = Scene(str(path), notes + ([f"{title}: {unit}"] if unit else []), bars={title: bar})
     rest = np.setdiff1d(np.arange(len(table)), chosen)
     for rows, size in ((rest, BALL), (np.array(chosen, int), CHOSEN_BALL)):
         if len(rows):
@@ -404,22 +343,10 @@ def _arrange_poses(path: Path, poses: Path | None, colour: str | None, most: int
     for number, k in enumerate(chosen, 1):
         scene.add(pv.Line(middle, at[k]), BLACK, line_width=2.0)
         scene.add_label(f"{number}", at[k] + [0, 0, (CHOSEN_BALL + NUMBER) * radius], NUMBER * radius, upright=True)
-    field = find_above(path, "field.ply", folders=2)
-    if field and len(kept := thin_field(read_field(field), most)):
-        add_solids(scene, kept, compute_colours(kept, "colour"))
+    field = thin_field(read_field(find_above(source, "field.ply", "which was scored", folders=2)), most)
+    add_solids(scene, field, compute_colours(field, "colour"))
     _add_ground(scene, frame, at)
     return scene
-
-
-def _read_marked(table: Scores, poses: Path | None) -> list[int]:
-    """The rows of a poses.json among the candidates, in order."""
-    if poses is None:
-        return []
-    names = [pose.name for pose in read_pose_selection(poses).poses]
-    index = {name: i for i, name in enumerate(table.names)}
-    if unknown := [name for name in names if name not in index]:
-        raise InputError(f"{poses}: {unknown[0]} is not among the scored poses; give the poses of the round after")
-    return [index[name] for name in names]
 
 
 def find_scores(poses: Path) -> Path:
@@ -433,16 +360,7 @@ def find_scores(poses: Path) -> Path:
         raise InputError(f"{poses}: lies in no round of the result tree; give its scores.csv")
     by = read_pose_selection(poses).chosen_with
     of = ({"preset": by} if by else {}) | ({} if number == 1 else {"t": number - 1})
-    scores = related_folder(poses, "scored" if number == 1 else "round", **of) / "scores.csv"
-    if not scores.is_file():
-        raise InputError(f"{poses}: the scores by which they were chosen are missing ({scores}); make them again")
-    return scores
-
-
-@reader("materials.json")
-def read_materials(path: Path, *, most: int, part: str | None = None, channel: str | None = None) -> Scene:
-    """Which material, object and excluded ground each cell of the exemplar belongs to."""
-    return read_exr(path.with_name("materials.exr"), most=most, part=part, channel=channel)
+    return related_folder(poses, "scored" if number == 1 else "round", **of) / "scores.csv"
 
 
 @reader("maps.npz")
@@ -452,36 +370,33 @@ def read_pose_maps(
     """The field by the uncertainty that its maps gave it; with --part or --channel the maps themselves."""
     maps, uncertainty = pose_maps.read_pose_maps(path)
     if part is not None or channel is not None:
-        with wrap_errors(path):
-            known = {"opacity": maps.opacity} | ({} if maps.w2_sq is None else {"w2_sq": maps.w2_sq})
-            parts = {name: {key: values[i] for key, values in known.items()} for i, name in enumerate(maps.names)}
-        return _arrange_pictures(path, parts, part, channel)
-    file = find_above(path, "field.ply", folders=2)
-    if file is None:
-        raise InputError(f"{path}: there is no field.ply beside it, whose Gaussians it describes")
-    field = read_field(file)
-    if uncertainty.ndim != 1 or len(uncertainty) > len(field) or not np.isfinite(uncertainty).all():
-        raise InputError(f"{path}: describes other Gaussians than {file} has; score the poses again")
+        known = {"opacity": maps.opacity} | ({} if maps.w2_sq is None else {"w2_sq": maps.w2_sq})
+        parts = {name: {key: values[i] for key, values in known.items()} for i, name in enumerate(maps.names)}
+        return _show_pictures(path, parts, part, channel)
+    field = read_field(find_above(path, "field.ply", "whose Gaussians it describes", folders=2))
     field = pose_maps.apply_uncertainty(field, uncertainty.astype(np.float32))
-    return _arrange_fields(path, [field], None, colour or "uncertainty", most)
+    by = choose("colour", colour or "uncertainty", COLOURS, path)
+    return show_fields(path, {"": (field, np.zeros(3))}, by, most)
 
 
-@reader(".exr")
+@reader("materials.json", ".exr")
 def read_exr(path: Path, *, most: int, part: str | None = None, channel: str | None = None) -> Scene:
-    """A ground grid, or the part `above` if it is named, as a surface; anything else as pictures."""
+    """A ground grid, or the part `above` if it is named, as a surface; anything else as pictures.
+
+    The pictures of materials.json say which material, object and excluded ground each cell of the exemplar belongs to.
+    """
+    path = path.with_suffix(".exr")
     parts = image_files.read_exr_parts(path)
     first, facts = next(iter(parts.values()))
     if len(parts) == 1 and "ground_west" in facts:
         return _show_surface(path, read_ground(path), first, channel, most)
     if part == "above" and part in parts:
-        file = find_above(path, "ground.exr", folders=2)
-        if file is None:
-            raise InputError(f"{path}: there is no ground.exr beside it, on which its part {part} is drawn")
-        return _show_surface(path, read_ground(file), parts[part][0], channel, most)
-    return _arrange_pictures(path, {name: channels for name, (channels, _) in parts.items()}, part, channel)
+        grid = read_ground(find_above(path, "ground.exr", f"on which its part {part} is drawn", folders=2))
+        return _show_surface(path, grid, parts[part][0], channel, most)
+    return _show_pictures(path, {name: channels for name, (channels, _) in parts.items()}, part, channel)
 
 
-def _arrange_pictures(path: Path, parts: dict[str, dict[str, Array]], part: str | None, channel: str | None) -> Scene:
+def _show_pictures(path: Path, parts: dict[str, dict[str, Array]], part: str | None, channel: str | None) -> Scene:
     """Each selected channel of each selected part, in rows from the top left, with one scale for each channel."""
     selected = parts if part is None else {part: parts[choose("part", part, tuple(parts), path)]}
     if channel is not None:
@@ -490,16 +405,17 @@ def _arrange_pictures(path: Path, parts: dict[str, dict[str, Array]], part: str 
     shown = [each for each in found if channel in (None, each[1]) and each[2].ndim == 2][:MAX_PICTURES]
     if not shown:
         raise InputError(f"{path}: has no pictures")
-    bars = {key: np.concatenate([v.ravel() for _, other, v in shown if other == key]) for _, key, _ in shown}
-    bars = {key: Bar.of_values(key, values, _choose_map(key), HIGHEST) for key, values in bars.items()}
+    values = {key: np.concatenate([v.ravel() for _, other, v in shown if other == key]) for _, key, _ in shown}
+    bars = {key: fit_bar(each, _choose_map(key)) for key, each in values.items()}
     notes = [f"parts: {len(parts)}; pictures: {len(shown)} of {len(found)}; grey: not a number"]
-    scene = Scene(str(path), notes, bars=list(bars.values()), viewer=(0.0, 0.0, 1.0))
+    scene = Scene(str(path), notes, bars=bars, viewer=(0.0, 0.0, 1.0))
     aspect = max(values.shape[0] / values.shape[1] for _, _, values in shown)
     columns = min(len(shown), ceil((len(shown) * ASPECT * aspect) ** 0.5))
     for i, (name, key, values) in enumerate(shown):
         at = np.array([(i % columns) * 1.12, -(i // columns) * (aspect + 0.12 + LETTER), 0.0])
         height, step = values.shape[0] / values.shape[1], ceil(max(values.shape) / MAX_SIDE)
-        scene.add_picture(bars[key].map(values[::step, ::step]), at, np.array([1.0, 0, 0]), np.array([0.0, -height, 0]))
+        picture = map_colours(bars[key], values[::step, ::step])
+        scene.add_picture(picture, at, np.array([1.0, 0, 0]), np.array([0.0, -height, 0]))
         scene.add_label(f"{name} {key}".strip(), at + [0.5, -height - LETTER, 0.0], LETTER)
     return scene
 
@@ -513,10 +429,17 @@ def _show_surface(path: Path, grid: Ground, channels: dict[str, Array], channel:
     first = next((name for name in ("Z", "uncertainty") if name in channels), next(iter(channels)))
     name = choose("channel", channel, (first, *sorted(set(channels) - {first})), path)
     values = channels[name]
-    if values.shape != grid.shape:
-        raise InputError(f"{path}: has {values.shape} cells and the ground beside it {grid.shape}; score again")
-    bar = Bar(name) if name in ("uncertainty", "seen") else Bar.of_values(name, values, _choose_map(name))
+    bar = make_bar(0.0, 1.0) if name in ("uncertainty", "seen") else fit_bar(values, _choose_map(name))
     step = ceil((values.size / most) ** 0.5) if values.size > most else 1
-    scene = Scene(str(path), [f"{grid.shape[1]} x {grid.shape[0]} cells of {grid.spacing:.4g}, by {name}"], bars=[bar])
-    scene.add(make_surface(grid, step), bar.map(values[::-1].astype(float)[::step, ::step].ravel()))
+    notes = [f"{grid.shape[1]} x {grid.shape[0]} cells of {grid.spacing:.4g}, by {name}"]
+    scene = Scene(str(path), notes, bars={name: bar})
+    scene.add(make_surface(grid, step), map_colours(bar, values[::-1][::step, ::step].ravel()))
     return scene
+
+
+def make_surface(grid: Ground, step: int) -> pv.PolyData:
+    """The heights of every `step`-th cell in both ways, as a mesh whose points are their middles, row by row."""
+    rows, columns = (np.arange(count)[::step] + 0.5 for count in grid.shape)
+    x, y = np.meshgrid(grid.west + columns * grid.spacing, grid.south + rows * grid.spacing)
+    heights = np.nan_to_num(grid.heights[::step, ::step])
+    return pv.StructuredGrid(x.T, y.T, heights.T).extract_surface(algorithm=None)

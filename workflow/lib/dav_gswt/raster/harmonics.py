@@ -45,16 +45,9 @@ def list_terms(x: Any, y: Any, z: Any, degree: int) -> list[Any]:
 
 
 def seen_colours(sh: Float[Array, "n k 3"], means: Float[Array, "n 3"], camera: Camera) -> Float32[Array, "n 3"]:
-    """`colours` in the directions in which the camera sees the Gaussians, which a constant colour does not need."""
-    return colours(sh, means if sh.shape[1] == 1 else directions(means, camera))
-
-
-def colours(sh: Float[Array, "n k 3"], directions: Float[Array, "n 3"]) -> Float32[Array, "n 3"]:
-    """max(0, 0.5 + sum over k of basis_k sh_k). Raises: ValueError: k is not 1, 4, 9 or 16."""
+    """Colours of Gaussians as the camera sees them: max(0, 0.5 + sum over k of basis_k sh_k); k is 1, 4, 9 or 16."""
     k = sh.shape[1]
-    if k not in (1, 4, 9, 16):
-        raise ValueError(f"sh has {k} coefficients; 1, 4, 9 or 16 make whole degrees")
     if k == 1:
         return np.maximum(0.5 + np.float32(np.sqrt(1 / (4 * np.pi))) * sh[:, 0], 0).astype(np.float32)
-    values = np.einsum("nk,nkc->nc", basis(directions, int(np.sqrt(k)) - 1), sh)
+    values = np.einsum("nk,nkc->nc", basis(directions(means, camera), int(np.sqrt(k)) - 1), sh)
     return np.maximum(0.5 + values, 0).astype(np.float32)

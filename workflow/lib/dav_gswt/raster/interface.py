@@ -68,15 +68,8 @@ class Rendering:
     depth: Float32[Array, "h w"]
 
 
-@dataclass(frozen=True)
-class Gradients:
+class Gradients(GaussianArrays):
     """Gradient of a loss by each parameter; 0 for invisible Gaussians."""
-
-    means: Float32[Array, "n 3"]
-    log_scales: Float32[Array, "n 3"]
-    quats: Float32[Array, "n 4"]
-    opacity_logits: Float32[Array, "n"]
-    colours: Float32[Array, "n c"] | Float32[Array, "n k 3"]
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,11 @@ class Splats:
     colours: Float[Tensor, "m c"]
     depth: Float[Tensor, "m"]
 
+    @property
+    def shapes(self) -> Float[Tensor, "m 6"]:
+        """What `weights` needs of them: centre, the three entries of the root, opacity."""
+        return torch.cat([self.centres, self.roots.flatten(1)[:, [0, 1, 3]], self.opacity[:, None]], 1)
+
 
 def forward(
     means: Float[Tensor, "n 3"],
@@ -44,7 +49,7 @@ def forward(
     """Colour, alpha and depth, differentiable; see `interface.Rasterizer`."""
     splats = project(means, log_scales, quats, opacity_logits, colours, camera, near, dilation, antialiased)
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    weight = weights(splats, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1)).to(means))
+    weight = weights(splats.shapes, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1)).to(means))
     size = camera.height, camera.width
     colour = (weight @ splats.colours).reshape(*size, -1)
     return colour, weight.sum(1).reshape(size), (weight @ splats.depth).reshape(size)
@@ -99,13 +104,14 @@ def roots_of(c: Float[Tensor, "m 2 3"], dilation: float) -> tuple[Float[Tensor, 
     return roots, torch.where(ratio > 0, torch.where(ratio > 0, ratio, 1).sqrt(), 0)
 
 
-def weights(splats: Splats, pixels: Float[Tensor, "p 2"]) -> Float[Tensor, "p m"]:
-    """Blend weights of all splats at some pixels."""
-    d = pixels[:, None] - splats.centres[None]
-    alpha = splats.opacity * torch.exp(-0.5 * (torch.einsum("mij,pmj->pmi", splats.roots, d) ** 2).sum(2))
+def weights(shapes: Float[Tensor, "*b m 6"], pixels: Float[Tensor, "*b p 2"]) -> Float[Tensor, "*b p m"]:
+    """Blend weights of all splats, given front to back, at some pixels."""
+    x, y, r00, r01, r11, opacity = shapes[..., None, :, :].unbind(-1)
+    dx, dy = pixels[..., 0, None] - x, pixels[..., 1, None] - y
+    alpha = opacity * torch.exp(-0.5 * ((r00 * dx + r01 * dy) ** 2 + (r11 * dy) ** 2))
     alpha = torch.where(alpha < ALPHA_MIN, 0, alpha.clamp(max=ALPHA_MAX))
-    clear = torch.cumprod(1 - alpha, 1)
-    before = torch.cat([torch.ones_like(clear[:, :1]), clear[:, :-1]], 1)
+    clear = torch.cumprod(1 - alpha, -1)
+    before = torch.cat([torch.ones_like(clear[..., :1]), clear[..., :-1]], -1)
     return torch.where(clear >= CLEAR_MIN, alpha * before, 0)  # clear only falls: what follows is left out too
 
 

@@ -6,8 +6,6 @@ The backward pass blends again, so that no intermediate values are kept. Results
 of threads.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32, Int
@@ -25,92 +23,74 @@ from dav_gswt.raster.interface import (
     PictureGradients,
     Rendering,
 )
-from dav_gswt.raster.oracle import ALPHA_MAX, ALPHA_MIN, CLEAR_MIN, Splats
+from dav_gswt.raster.oracle import ALPHA_MIN, Splats
 
 SIDE = 8  # pixels: smaller squares mean more lists, larger ones more splats that miss most of their square
 BATCH = 1 << 19  # splats times pixels that are blended at a time: a few MB an intermediate value
-MAX_CENTRE, MAX_ROOT = 1e18, 1e12  # pixels, and one over pixels: float32 ends at 3e38
+LARGEST = 1e12  # pixels of a centre, and one over pixels of a root: float32 ends at 3e38
 
 
-@dataclass(frozen=True)
-class SquareGroup:
-    """Squares of the picture that are blended together.
-
-    corners: column and row of their first pixels. rows: their rows in the splats' tables, front to back; shorter lists
-    are padded with the last row, which is empty.
-    """
-
-    corners: Int[Tensor, "b 2"]
-    rows: Int[Tensor, "b length"]
-
-
-@dataclass(frozen=True)
-class BinnedSplats:
-    """The splats of a forward pass by squares. index: which Gaussian each is."""
-
-    groups: list[SquareGroup]
-    index: Int[Tensor, "m"]
+# Squares of the picture that are blended together. Their pixels: row times the padded width plus column. The rows of
+# their splats' tables, front to back; shorter lists are padded with the last row, which is empty.
+Squares = tuple[Int[Tensor, "b p"], Int[Tensor, "b length"]]
+Binned = tuple[list[Squares], Int[Tensor, "m"]]  # the splats of a forward pass, and which Gaussian each is
 
 
 class Rasterizer(interface.Rasterizer):
     """See `interface.Rasterizer`. The number of threads is PyTorch's own (torch.set_num_threads)."""
 
-    def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, BinnedSplats]:
+    def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Binned]:
         gaussians.check_values()
         with torch.no_grad():
             splats, shapes, values = self._project(to_leaves(gaussians), camera)
             groups = _group_squares(splats, camera)
-            picture = torch.zeros(*_padded_size(camera), values.shape[1])
-            for group in groups:
-                _put_squares(
-                    picture, group.corners, _blend_weights(shapes[group.rows], group.corners) @ values[group.rows]
-                )
+            picture = _pad(torch.zeros(camera.height, camera.width, values.shape[1]))
+            for pixels, rows in groups:
+                weight = oracle.weights(shapes[rows], _place(pixels, picture.shape[1]))
+                picture.view(-1, values.shape[1])[pixels] = weight @ values[rows]
         array = picture[: camera.height, : camera.width].numpy()
         parts = array[..., :-2], array[..., -2], array[..., -1]
-        return Rendering(*(np.ascontiguousarray(part) for part in parts)), BinnedSplats(groups, splats.index)
+        return Rendering(*(np.ascontiguousarray(part) for part in parts)), (groups, splats.index)
 
     @torch.enable_grad()
     def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
-        camera, binned = last.camera, last.state
-        by_pixel = join_gradients(last.rendering, given)
-        by_picture = torch.zeros(*_padded_size(camera), by_pixel.shape[2])
-        by_picture[: camera.height, : camera.width] = by_pixel
+        by_picture = _pad(join_gradients(last.rendering, given))
         leaves = {name: leaf.requires_grad_() for name, leaf in to_leaves(last.gaussians).items()}
-        _, *tables = self._project(leaves, camera)
+        _, *tables = self._project(leaves, last.camera)
         by_tables = [torch.zeros_like(table) for table in tables]
-        for group in binned.groups:
-            shapes, values = (table.detach()[group.rows].requires_grad_() for table in tables)
-            blended = _blend_weights(shapes, group.corners) @ values
-            parts = torch.autograd.grad(blended, (shapes, values), _take_squares(by_picture, group.corners))
+        for pixels, rows in last.state[0]:
+            shapes, values = (table.detach()[rows].requires_grad_() for table in tables)
+            blended = oracle.weights(shapes, _place(pixels, by_picture.shape[1])) @ values
+            parts = torch.autograd.grad(blended, (shapes, values), by_picture.flatten(0, 1)[pixels])
             for total, part in zip(by_tables, parts, strict=True):
-                total.index_add_(0, group.rows.flatten(), part.flatten(0, 1))
+                total.index_add_(0, rows.flatten(), part.flatten(0, 1))
         found = torch.autograd.grad(tables, list(leaves.values()), by_tables, materialize_grads=True)
         arrays = (np.ascontiguousarray(gradient.numpy(), np.float32) for gradient in found)
         return Gradients(**dict(zip(leaves, arrays, strict=True)))
 
     def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
-        camera, binned = last.camera, last.state
-        height, width = camera.height, camera.width
-        maps = torch.zeros(*_padded_size(camera), 1 + weights.shape[2])
-        maps[:height, :width] = torch.as_tensor(np.concatenate([np.ones((height, width, 1), np.float32), weights], 2))
+        groups, index = last.state
+        inside = np.ones((*weights.shape[:2], 1), np.float32)  # the padding beyond the picture counts for nothing
+        maps = _pad(torch.as_tensor(np.concatenate([inside, weights], 2)))
         with torch.no_grad():
-            _, shapes, _ = self._project(to_leaves(last.gaussians), camera)
+            _, shapes, _ = self._project(to_leaves(last.gaussians), last.camera)
             sums = torch.zeros(len(shapes), maps.shape[2])
             maximum = torch.zeros(len(shapes))
-            for group in binned.groups:
-                at, w = group.rows.flatten(), _blend_weights(shapes[group.rows], group.corners)
-                w = w * _take_squares(maps[..., :1], group.corners)  # the padding beyond the picture counts for nothing
-                sums.index_add_(0, at, (w.mT @ _take_squares(maps, group.corners)).flatten(0, 1))
+            for pixels, rows in groups:
+                at, seen = rows.flatten(), maps.flatten(0, 1)[pixels]
+                w = oracle.weights(shapes[rows], _place(pixels, maps.shape[1])) * seen[..., :1]
+                sums.index_add_(0, at, (w.mT @ seen).flatten(0, 1))
                 maximum.scatter_reduce_(0, at, w.amax(1).flatten(), "amax")
         found = torch.zeros(len(last.gaussians.means), maps.shape[2] + 1)
-        found[binned.index] = torch.cat([sums, maximum[:, None]], 1)[:-1]
+        found[index] = torch.cat([sums, maximum[:, None]], 1)[:-1]
         return Contributions(*(np.ascontiguousarray(found[:, i]) for i in (0, -1, slice(1, -1))))
 
     def _visible(self, last: Forward) -> Bool[Array, "n"]:
+        groups, index = last.state
         visible = np.zeros(len(last.gaussians.means) + 1, bool)
-        where = torch.cat([last.state.index, torch.tensor([len(visible) - 1])])
-        for group in last.state.groups:
-            visible[where[group.rows.flatten()].numpy()] = True
+        where = torch.cat([index, torch.tensor([len(visible) - 1])])
+        for _, rows in groups:
+            visible[where[rows.flatten()].numpy()] = True
         return visible[:-1]
 
     def _project(self, leaves: dict[str, Tensor], camera: Camera):
@@ -119,8 +99,7 @@ class Rasterizer(interface.Rasterizer):
         splats = oracle.project(
             **leaves, camera=camera, near=self.near, dilation=self.dilation, antialiased=self.antialiased
         )
-        root = splats.roots.flatten(1)[:, [0, 1, 3]].clamp(-MAX_ROOT, MAX_ROOT)
-        shapes = torch.cat([splats.centres.clamp(-MAX_CENTRE, MAX_CENTRE), root, splats.opacity[:, None]], 1)
+        shapes = splats.shapes.clamp(-LARGEST, LARGEST)
         values = torch.cat([splats.colours, torch.ones_like(splats.depth)[:, None], splats.depth[:, None]], 1)
         return splats, *(torch.nn.functional.pad(table, (0, 0, 0, 1)).float() for table in (shapes, values))
 
@@ -139,57 +118,32 @@ def join_gradients(rendering: Rendering, given: PictureGradients) -> Float[Tenso
     return torch.as_tensor(np.concatenate(parts, 2))
 
 
-def _padded_size(camera: Camera) -> tuple[int, int]:
-    """Rows and columns of a picture padded to whole squares."""
-    return -(-camera.height // SIDE) * SIDE, -(-camera.width // SIDE) * SIDE
+def _pad(picture: Float[Tensor, "h w c"]) -> Float[Tensor, "rows columns c"]:
+    """A picture padded to whole squares."""
+    height, width = picture.shape[:2]
+    return torch.nn.functional.pad(picture, (0, 0, 0, -width % SIDE, 0, -height % SIDE))
 
 
-def _view_squares(picture: Float[Tensor, "h w c"]) -> Float[Tensor, "rows columns side side c"]:
-    return picture.unflatten(1, (-1, SIDE)).unflatten(0, (-1, SIDE)).transpose(1, 2)
+def _place(pixels: Int[Tensor, "b p"], width: int) -> Float32[Tensor, "b p 2"]:
+    """The middles of pixels of a padded picture."""
+    return torch.stack([pixels % width, pixels // width], -1) + 0.5
 
 
-def _put_squares(
-    picture: Float[Tensor, "h w c"], corners: Int[Tensor, "b 2"], seen: Float[Tensor, "b pixels c"]
-) -> None:
-    column, row = (corners // SIDE).unbind(1)
-    _view_squares(picture)[row, column] = seen.unflatten(1, (SIDE, SIDE))
-
-
-def _take_squares(picture: Float[Tensor, "h w c"], corners: Int[Tensor, "b 2"]) -> Float[Tensor, "b pixels c"]:
-    column, row = (corners // SIDE).unbind(1)
-    return _view_squares(picture)[row, column].flatten(1, 2)
-
-
-def _blend_weights(
-    shapes: Float32[Tensor, "b length 6"], corners: Int[Tensor, "b 2"]
-) -> Float32[Tensor, "b pixels length"]:
-    """Blend weights in some squares; see `oracle.weights`."""
-    x, y, r00, r01, r11, opacity = shapes[:, None].unbind(-1)
-    steps = torch.arange(SIDE) + 0.5
-    dx, dy = (corners[:, i, None, None] + steps[:, None] - c for i, c in ((0, x), (1, y)))
-    across = (r00 * dx)[:, None] + (r01 * dy)[:, :, None]
-    exponent = across * across + ((r11 * dy) ** 2)[:, :, None]
-    alpha = (opacity[:, None] * torch.exp(-0.5 * exponent)).flatten(1, 2)
-    alpha = torch.where(alpha < ALPHA_MIN, 0, alpha.clamp(max=ALPHA_MAX))
-    clear = torch.cumprod(1 - alpha, 2)
-    before = torch.cat([torch.ones_like(clear[..., :1]), clear[..., :-1]], 2)
-    return torch.where(clear >= CLEAR_MIN, alpha * before, 0)
-
-
-def _group_squares(splats: Splats, camera: Camera) -> list[SquareGroup]:
+def _group_squares(splats: Splats, camera: Camera) -> list[Squares]:
     """The squares of the picture that splats meet, in groups with similar numbers of splats."""
     low, high = (bound // SIDE for bound in _bound_boxes(splats, camera))
     size = (high - low + 1).clamp(min=0)
     count = size.prod(1)
     rows = torch.repeat_interleave(torch.arange(len(count)), count)
     nth = torch.arange(len(rows)) - (torch.cumsum(count, 0) - count)[rows]
-    width = _padded_size(camera)[1] // SIDE
+    width = -(-camera.width // SIDE)
     square = (low[rows, 1] + nth // size[rows, 0]) * width + low[rows, 0] + nth % size[rows, 0]
     rows = rows[torch.argsort(square, stable=True)]  # stable: from front to back in each square
     lengths = torch.bincount(square)
     first = torch.cumsum(lengths, 0) - lengths
     order = torch.argsort(lengths, descending=True, stable=True)
     order = order[: int((lengths > 0).sum())]
+    inside = (torch.arange(SIDE)[:, None] * width * SIDE + torch.arange(SIDE)).flatten()
     groups, done = [], 0
     while done < len(order):
         longest = int(lengths[order[done]])
@@ -197,7 +151,8 @@ def _group_squares(splats: Splats, camera: Camera) -> list[SquareGroup]:
         place = torch.arange(longest)
         at = (first[some, None] + place).clamp(max=len(rows) - 1)
         theirs = torch.where(place < lengths[some, None], rows[at], len(count))
-        groups.append(SquareGroup(torch.stack([some % width, some // width], 1) * SIDE, theirs))
+        first_pixel = (some // width * width * SIDE + some % width) * SIDE
+        groups.append((first_pixel[:, None] + inside, theirs))
         done += len(some)
     return groups
 
