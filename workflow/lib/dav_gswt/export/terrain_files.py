@@ -3,7 +3,7 @@
 Which cells it has, and whether its files can be made, is checked before any work starts.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +15,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.errors import InputError
-from dav_gswt.export import glb, splat_files, tiles_3d
+from dav_gswt.export import splat_files
 from dav_gswt.export.formats import FORMATS, Format
 from dav_gswt.export.spool import ExportJob, Spool
 from dav_gswt.field import GaussianField
@@ -29,16 +29,6 @@ from dav_gswt.threads import map_ahead
 NAME = "terrain"
 KEPT = ("unit", "origin", "tile_side", "cells")  # of terrain.json, in files that have a place for it
 MAX_BYTES = 2 * 10**9  # of a file; what would be larger is refused before any work
-
-
-# Each writes a job to a path without suffix. They return the number of Gaussians in the files, or None: the job's.
-WRITERS: dict[str, Callable[[ExportJob, str], int | None]] = {
-    "ply": lambda job, path: splat_files.write_ply(job.spool, f"{path}.ply"),
-    "spz": lambda job, path: splat_files.write_spz(job.spool, f"{path}.spz"),
-    "glb": lambda job, path: glb.write_splats(job.spool, f"{path}.glb", dict(job.facts)),
-    "sog": lambda job, path: splat_files.write_sog(job.spool, Path(f"{path}.sog")),
-    "3dtiles": lambda job, path: tiles_3d.write_tileset(job, Path(f"{path}_3dtiles")),
-}
 
 
 def choose_area(settings: Mapping[str, Any]) -> Area:
@@ -121,7 +111,7 @@ def export_terrain(
             }
             job = ExportJob(placed, {key: facts[key] for key in KEPT}, terrain, area, place, reference)
             for name in formats:
-                facts["gaussians_by_format"][name] = WRITERS[name](job, f"{folder / NAME}") or len(placed)
+                facts["gaussians_by_format"][name] = formats[name].write(job, f"{folder / NAME}") or len(placed)
         write_json(folder / f"{NAME}.json", facts)
 
 
