@@ -88,7 +88,7 @@ def test_a_stone_a_plant_and_shadows_are_where_the_land_says():
 def test_a_picture_repeats_to_the_byte_whatever_the_threads_and_another_differs_in_its_noise():
     import drjit
 
-    scene, camera = synthetic.make_scene("desert", 0), off_centre(50, 38)
+    scene, camera = synthetic.Scene("desert", 0), off_centre(50, 38)
     before = drjit.thread_count()
     try:
         drjit.set_thread_count(1)

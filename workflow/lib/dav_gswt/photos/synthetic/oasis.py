@@ -15,8 +15,7 @@ from numpy import ndarray as Array
 from scipy import ndimage
 
 from dav_gswt.photos.synthetic import desert, land, meadow, meshes, noise, plants
-from dav_gswt.photos.synthetic.labels import GroundLabels
-from dav_gswt.photos.synthetic.land import PERIOD, FadingRaster, Height, Hills, Land, Light, PlantGroup
+from dav_gswt.photos.synthetic.land import PERIOD, FadingRaster, GroundLabels, Height, Hills, Land, Light, PlantGroup
 from dav_gswt.photos.synthetic.meshes import Mesh
 from dav_gswt.photos.synthetic.noise import smoothstep
 

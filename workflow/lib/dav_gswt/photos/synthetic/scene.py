@@ -9,18 +9,15 @@ import zlib
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
-from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
 from dav_gswt.photos.synthetic import desert, flowers, grass, meadow, oasis, planet
-from dav_gswt.photos.synthetic.labels import GroundLabels
 
 # each has a function `make_land`
 FAMILIES: dict[str, ModuleType] = {
@@ -58,18 +55,9 @@ class Scene:
         return SceneFrame("synthetic", "metre", RADIUS, exemplar, extent)
 
 
-def make_scene(family: str, seed: int) -> Scene:
-    """A scene of a family. Raises: InputError: an unknown family or a negative seed."""
-    if family not in FAMILIES:
-        raise InputError(f"there is no synthetic family {family!r}; choose from {', '.join(FAMILIES)}")
-    if seed < 0:
-        raise InputError(f"{family}: seed is {seed!r}; it must be a whole number from 0")
-    return Scene(family, seed)
-
-
 def scene_from_config(entry: dict) -> Scene:
     """The scene of an entry of the config."""
-    return make_scene(entry["family"], entry["seed"])
+    return Scene(entry["family"], entry["seed"])
 
 
 def start_views(entry: dict) -> list[Camera]:
@@ -122,20 +110,12 @@ def _orbit_cameras(places: list[camera_layouts.Place], size: int) -> list[Camera
     return [camera_layouts.orbit(*place, MIDDLE, size, size, FIELD_OF_VIEW) for place in places]
 
 
-class LoadedScene(NamedTuple):
-    """A mitsuba scene, and the true materials and objects of its ground where its family has them."""
-
-    world: Any
-    labels: GroundLabels | None
-
-
 @lru_cache(maxsize=1)
-def load_scene(scene: Scene) -> LoadedScene:
+def load_scene(scene: Scene):
     """The mitsuba scene, built once for all its pictures."""
     from dav_gswt.photos.synthetic import mitsuba_scene  # deferred: what only poses cameras renders nothing
 
-    made = FAMILIES[scene.family].make_land(scene.seed, EXEMPLAR)
-    return LoadedScene(mitsuba_scene.build_scene(made), made.labels)
+    return mitsuba_scene.build_scene(FAMILIES[scene.family].make_land(scene.seed, EXEMPLAR))
 
 
 def render(scene: Scene, camera: Camera, samples: int = SAMPLES, again: int = 0) -> Float32[Array, "h w 3"]:
@@ -149,7 +129,7 @@ def render(scene: Scene, camera: Camera, samples: int = SAMPLES, again: int = 0)
 
     place = np.round(np.concatenate([camera.centre, camera.forward]), 6) + 0.0  # + 0.0: no negative zeros
     seed = zlib.crc32(place.astype("<f8").tobytes(), (scene.seed + again * 0x9E3779B1) & 0xFFFFFFFF)
-    return encode_srgb(mitsuba_scene.render_light(load_scene(scene).world, camera, samples, seed))
+    return encode_srgb(mitsuba_scene.render_light(load_scene(scene), camera, samples, seed))
 
 
 def encode_srgb(light: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
