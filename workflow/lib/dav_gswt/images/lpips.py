@@ -48,16 +48,19 @@ def pairwise_mean(pictures: Float32[Array, "n m h w 3"], weights: Weights) -> Fl
     """Mean LPIPS over all pairs of the m pictures of each of n sets; each picture's features are computed once.
 
     As LPIPS is a weighted squared distance of unit features, its mean over pairs is twice their unbiased variance:
-    O(m), not O(m^2). Exactly 0 where all m are equal. Raises: ValueError: m < 2; as `distance`.
+    O(m), not O(m^2). Exactly 0 where all m are equal. Raises: as `distance`.
     """
     n, m, h, w, _ = pictures.shape
-    if m < 2:
-        raise ValueError(f"LPIPS between samples needs at least 2 of a pose, not {m}: one has no pair")
     _require_pictures(pictures.reshape(n * m, h, w, 3), m)
+    heads = _to_tensors(weights.heads)
     out = np.zeros(n)
     with torch.inference_mode():
-        for rows in _split_batch(n, h * w):
-            out[rows] = _feature_variance(pictures[rows], weights)
+        for rows in _split_batch(n, m * h * w):
+            features = _normalize_features(_run_layers(pictures[rows].reshape(-1, h, w, 3), weights))
+            for feature, head in zip(features, heads, strict=True):
+                sets = feature.unflatten(0, (-1, m))
+                variance = (sets - sets[:, :1]).var(1)  # of differences, so that equal ones give exactly 0
+                out[rows] += 2 * torch.einsum("bchw,c->b", variance, head).numpy() / variance[0, 0].numel()
     return out
 
 
@@ -80,25 +83,6 @@ def resize_pictures(pictures: Float32[Array, "n h w 3"], side: int) -> Float32[A
         torch.from_numpy(np.ascontiguousarray(pictures)).movedim(-1, 1), (side, side), mode="bilinear", antialias=True
     )
     return np.ascontiguousarray(small.movedim(1, -1).numpy().clip(-1, 1))
-
-
-def _feature_variance(sets: Float32[Array, "b m h w 3"], weights: Weights) -> Float64[Array, "b"]:
-    """Twice the weighted unbiased variance of the unit features, taken relative to each set's first picture.
-
-    Sum of |d|^2 less |sum of d|^2 / m cancels by no more than the factor m + 1, since d holds the first one's own 0.
-    """
-    m, heads = sets.shape[1], _to_tensors(weights.heads)
-    first = list(_normalize_features(_run_layers(sets[:, 0], weights)))
-    total = [torch.zeros_like(f) for f in first]
-    squares = torch.zeros(len(sets), dtype=torch.float64)
-    for i in range(1, m):
-        for k, feature in enumerate(_normalize_features(_run_layers(sets[:, i], weights))):
-            apart = feature.sub_(first[k])
-            squares += _weight_channels(apart, heads[k])
-            total[k] += apart
-    for summed, head in zip(total, heads, strict=True):
-        squares -= _weight_channels(summed, head) / m
-    return (2 / (m - 1) * squares).numpy()
 
 
 def _run_layers(pictures: Float32[Array, "b h w 3"], weights: Weights) -> Iterator[Float[Tensor, "b _ _ _"]]:

@@ -118,17 +118,15 @@ def load_scene(scene: Scene):
     return mitsuba_scene.build_scene(FAMILIES[scene.family].make_land(scene.seed, EXEMPLAR))
 
 
-def render(scene: Scene, camera: Camera, samples: int = SAMPLES, again: int = 0) -> Float32[Array, "h w 3"]:
-    """A photo: sRGB-encoded, in [0, 1].
+def render(scene: Scene, camera: Camera, samples: int = SAMPLES) -> Float32[Array, "h w 3"]:
+    """A photo by a pinhole with square pixels: sRGB-encoded, in [0, 1].
 
-    Args:   samples: rays a pixel; taken up to the next number that a grid of strata can hold. again: which of several
-            photos from one place, each with noise of its own.
-    Raises: ValueError: a camera that is not a pinhole with square pixels.
+    samples: rays a pixel; taken up to the next number that a grid of strata can hold.
     """
     from dav_gswt.photos.synthetic import mitsuba_scene
 
     place = np.round(np.concatenate([camera.centre, camera.forward]), 6) + 0.0  # + 0.0: no negative zeros
-    seed = zlib.crc32(place.astype("<f8").tobytes(), (scene.seed + again * 0x9E3779B1) & 0xFFFFFFFF)
+    seed = zlib.crc32(place.astype("<f8").tobytes(), scene.seed & 0xFFFFFFFF)
     return encode_srgb(mitsuba_scene.render_light(load_scene(scene), camera, samples, seed))
 
 
