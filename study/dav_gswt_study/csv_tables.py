@@ -1,13 +1,13 @@
 """Read, write and merge CSV tables.
 
-A table is a list of rows, a row a dict from column to value. Files keep the format of `dav_gswt.csv_tables`.
+A table is a list of rows, a row a dict from column to value. Files keep the format of `write_table`.
 """
 
 import csv
 from collections.abc import Collection
 from pathlib import Path
 
-from dav_gswt.csv_tables import write_table
+from dav_gswt.files import write_table
 
 
 def read_table(

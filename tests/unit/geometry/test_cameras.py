@@ -98,7 +98,7 @@ def test_test_views_are_distinct_from_each_other_and_from_every_other_view():
     def centres(places):
         return np.array([camera(*place).centre for place in places])
 
-    tests = centres(camera_layouts.held_out(6, 30.0, 7.0))
+    tests = centres(camera_layouts.hemisphere(6, 30.0, 6.3, turn=70.0))
     others = centres(camera_layouts.start_ring(8, 65.0, 7.0) + camera_layouts.hemisphere(250, 30.0, 7.0))
     assert np.linalg.norm(tests[:, None] - others, axis=-1).min() >= 0.7 - 1e-9  # a tenth of the radius
     assert np.linalg.norm(tests[:, None] - tests, axis=-1)[~np.eye(6, dtype=bool)].min() > 1.0

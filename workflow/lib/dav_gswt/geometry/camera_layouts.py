@@ -10,7 +10,6 @@ from numpy import ndarray as Array
 from dav_gswt.geometry.cameras import Camera, pinhole
 
 Place = tuple[float, float, float]  # elevation, azimuth, radius
-NEARER = 0.9  # radius of a test view, relative to other views
 GOLDEN = np.pi * (3.0 - 5.0**0.5)  # radians between neighbours of a Fibonacci lattice
 PLASTIC = 1.2207440846057596  # x^4 = x + 1: base of the quasirandom sequence in three dimensions
 CIRCLE = 36  # views on the circle of the rig `paper`, of 100 or of any number from 72
@@ -93,14 +92,6 @@ def paper(n: int, elevation: float, lowest_elevation: float, radius: float) -> l
     """
     circle = CIRCLE if n >= 2 * CIRCLE else round(n * CIRCLE / 100)
     return ring(circle, elevation, radius) + hemisphere(n - circle, lowest_elevation, radius, turn=35.0)
-
-
-def held_out(n: int, lowest_elevation: float, radius: float) -> list[Place]:
-    """n places of test views: uniform by area like `hemisphere`, but rotated and nearer by a tenth.
-
-    The other radius keeps them distinct from every start view and candidate.
-    """
-    return hemisphere(n, lowest_elevation, NEARER * radius, turn=70.0)
 
 
 def eye_level_camera(height: float, azimuth: float, away: float, target, width: int, rows: int, fov: float) -> Camera:

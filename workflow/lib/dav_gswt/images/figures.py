@@ -25,14 +25,9 @@ def make_figure(width: float, height: float, **padding: Any):
 
 def save_figure(figure, path: Path | str) -> None:
     """A figure as a PNG, or as a JPEG by the path's ending: the same bytes each time."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(figure)
+    options = {"pil_kwargs": {"quality": QUALITY}} if Path(path).suffix == ".jpg" else {"metadata": {"Software": None}}
     with atomic_file(path) as part:
-        if Path(path).suffix == ".jpg":
-            figure.savefig(part, format="jpg", pil_kwargs={"quality": QUALITY})
-        else:
-            figure.savefig(part, format="png", metadata={"Software": None})
+        figure.savefig(part, **options)
 
 
 def draw_sheet(pictures: dict[str, list[Path | str]], heads: list[str], tall: float = 2.05):

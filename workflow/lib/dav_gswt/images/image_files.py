@@ -1,7 +1,6 @@
 """Image files: photos of any format by OpenImageIO, float maps with named channels as OpenEXR."""
 
 import logging
-import os
 import struct
 from pathlib import Path
 
@@ -9,12 +8,12 @@ import numpy as np
 import OpenEXR
 import OpenImageIO as oiio
 import tifffile
-from jaxtyping import Float, Float16, Float32, UInt16
+from jaxtyping import Float, Float32, UInt16
 from numpy import ndarray as Array
 from scipy.ndimage import map_coordinates
 from scipy.sparse import csr_array
 
-from dav_gswt.errors import InputError
+from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import UNREADABLE, atomic_file
 
 _log = logging.getLogger(__name__)
@@ -22,14 +21,7 @@ _log = logging.getLogger(__name__)
 AT_ONCE = 2_000_000  # values that are averaged at a time
 MAX_PIXELS = 200_000_000  # of a photo: more is a broken header, or more than two cores should work on
 GDAL_NODATA = 42113  # tag of a TIFF
-PREVIEW = "colours"  # in an EXR's header: its R, G and B are other channels in colours
-RAMP = (  # colours of a preview from low to high, linear light: as viridis of Matplotlib has them
-    (0.058, 0.000, 0.089),
-    (0.041, 0.084, 0.258),
-    (0.015, 0.276, 0.263),
-    (0.112, 0.584, 0.121),
-    (0.984, 0.799, 0.019),
-)
+PNG_END = b"\0\0\0\0IEND\xaeB`\x82"  # its last chunk
 SUFFIXES = {".jpg", ".jpeg", ".jpe", ".jfif", ".png", ".tif", ".tiff", ".webp", ".jp2", ".jxl", ".bmp", ".ppm", ".tga"}
 IF_FULL = "if the disk is full, free some space, then run the same again"
 UNSUPPORTED = {".heic", ".heif", ".avif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".raw"}
@@ -149,24 +141,13 @@ def _write_pixels(path: Path | str, spec: oiio.ImageSpec, pixels: Array) -> None
     with atomic_file(path) as part:
         file = oiio.ImageOutput.create(str(part))  # by the ending, which need not be .png
         if file is None:
-            raise ValueError(f"{path}: {_first_line(oiio.geterror())}")
+            raise ValueError(f"{path}: {summarize_error(oiio.geterror())}")
         done = file.open(str(part), spec) and file.write_image(pixels)
         trouble = "" if done else file.geterror()
-        whole = file.close() and (part.suffix.lower() != ".png" or _is_whole_png(part))
-        if not (done and whole):
+        whole = file.close() and (part.suffix.lower() != ".png" or part.read_bytes().endswith(PNG_END))
+        if not (done and whole):  # OpenImageIO does not notice that a disk is full
             trouble = trouble or file.geterror() or "cut short"
-            raise OSError(f"{path}: not written ({_first_line(trouble)}); {IF_FULL}")
-
-
-def _is_whole_png(path: Path) -> bool:
-    """Whether a PNG's chunks follow each other to the last one. OpenImageIO does not notice that a disk is full."""
-    with path.open("rb") as file:
-        file.seek(8)  # the signature
-        while (head := file.read(8))[4:].isalpha():
-            if head[4:] == b"IEND":
-                return len(file.read(4)) == 4
-            file.seek(struct.unpack(">I", head[:4])[0] + 4, os.SEEK_CUR)
-    return False
+            raise OSError(f"{path}: not written ({summarize_error(trouble)}); {IF_FULL}")
 
 
 def fit_size(width: int, height: int, longest: int) -> tuple[int, int]:
@@ -184,10 +165,7 @@ def shrink_image(image: Float32[Array, "h w c"], width: int, height: int) -> Flo
     """The image on a coarser grid: each pixel is the exact mean over its area, of the encoded values.
 
     Exact for any ratio (a box filter sampled at pixel centres is up to 7 % off for ratios like 10 to 4).
-    Raises: ValueError: the image would be enlarged, or have no pixels.
     """
-    if not (1 <= width <= image.shape[1] and 1 <= height <= image.shape[0]):
-        raise ValueError(f"an image of {image.shape[1]} x {image.shape[0]} does not shrink to {width} x {height}")
     return np.ascontiguousarray(_average_axis(_average_axis(image, height, 0), width, 1), np.float32)
 
 
@@ -204,19 +182,6 @@ def read_exr(path: Path | str) -> tuple[dict[str, Array], dict[str, str]]:
     return next(iter(read_exr_parts(path).values()))
 
 
-def colour_values(values: Float32[Array, "h w"]) -> tuple[Float16[Array, "h w 3"], float, float]:
-    """A map in colours, linear light, and the values of the darkest and the brightest one; grey where it is no number.
-
-    The range leaves out the outermost hundredths, so that one odd pixel does not hide the others.
-    """
-    known = np.isfinite(values)
-    low, high = np.percentile(values[known], [1, 99]).tolist() if known.any() else (0.0, 0.0)
-    share = np.clip((np.where(known, values, low) - low) / ((high - low) or 1.0), 0, 1)
-    stops = np.linspace(0, 1, len(RAMP))
-    shown = np.stack([np.interp(share, stops, channel) for channel in np.array(RAMP).T], -1)
-    return np.where(known[..., None], shown, 0.2).astype(np.float16), low, high
-
-
 def enlarge_map(values: Float32[Array, "h w"], width: int, height: int) -> Float32[Array, "h2 w2"]:
     """A map on a finer grid over the same area: linear between cell centres, constant beyond the outermost."""
     rows, columns = ((np.arange(n) + 0.5) * old / n - 0.5 for n, old in zip((height, width), values.shape, strict=True))
@@ -225,11 +190,7 @@ def enlarge_map(values: Float32[Array, "h w"], width: int, height: int) -> Float
 
 
 def write_exr_parts(path: Path | str, parts: dict[str, tuple[dict[str, Array], dict[str, str]]]) -> None:
-    """Write a file of several parts, each with its own channels, size and header, by name.
-
-    Viewers of pictures know channels of colours alone. A part without any gets R, G and B, its first channel in
-    colours, and a text `colours` in the header that says so; they are no data, and `read_exr_parts` leaves them out.
-    """
+    """Write a file of several parts, each with its own channels, size and header, by name."""
     written = []
     # Parts of one file must agree on the display window, whatever their own sizes are.
     shapes = [np.shape(values) for channels, _ in parts.values() for values in channels.values()]
@@ -239,18 +200,13 @@ def write_exr_parts(path: Path | str, parts: dict[str, tuple[dict[str, Array], d
         # The library fills the dicts it is given with its own objects, hence the copies.
         own = {k: np.array(v, np.float32) for k, v in channels.items()}
         texts = {k: str(v) for k, v in header.items()}
-        if not {"R", "G", "B", "Y"} & set(own):
-            first = next(iter(own))
-            shown, low, high = colour_values(own[first])
-            own |= {name: np.ascontiguousarray(shown[..., k]) for k, name in enumerate("RGB")}
-            texts |= {PREVIEW: f"R, G, B: {first} from {low:.6g}, dark, to {high:.6g}, bright; other channels are data"}
         fixed = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         written.append(OpenEXR.Part(texts | fixed | window, own, name))
     with atomic_file(path) as part:
         try:
             OpenEXR.File(written).write(str(part))
         except RuntimeError as error:
-            raise OSError(f"{path}: not written ({_first_line(str(error))}); {IF_FULL}") from error
+            raise OSError(f"{path}: not written ({summarize_error(error)}); {IF_FULL}") from error
 
 
 def read_exr_parts(path: Path | str) -> dict[str, tuple[dict[str, Array], dict[str, str]]]:
@@ -269,14 +225,12 @@ def read_exr_parts(path: Path | str) -> dict[str, tuple[dict[str, Array], dict[s
                 raise ValueError("damaged or cut short")
             return {part.name(): _read_part(part) for part in file.parts}
     except (RuntimeError, ValueError, TypeError, OSError) as error:
-        raise InputError(f"{path}: not readable as EXR ({_first_line(str(error))})") from error
+        raise InputError(f"{path}: not readable as EXR ({summarize_error(error)})") from error
 
 
 def _read_part(part) -> tuple[dict[str, Array], dict[str, str]]:
-    texts = {k: v for k, v in part.header.items() if isinstance(v, str) and k != "name"}
-    shown = ("R", "G", "B") if texts.pop(PREVIEW, None) is not None else ()
-    channels = {name: np.array(channel.pixels) for name, channel in part.channels.items() if name not in shown}
-    return channels, texts
+    channels = {name: np.array(channel.pixels) for name, channel in part.channels.items()}
+    return channels, {k: v for k, v in part.header.items() if isinstance(v, str) and k != "name"}
 
 
 def _open_image(path: Path | str):
@@ -288,7 +242,7 @@ def _open_image(path: Path | str):
         raise InputError(f"{path}: there is no such file")
     file = oiio.ImageInput.open(str(path), config)
     if file is None:
-        raise InputError(f"{path}: not readable as an image ({_first_line(oiio.geterror())}); remove or replace it")
+        raise InputError(f"{path}: not readable as an image ({summarize_error(oiio.geterror())}); remove or replace it")
     spec = file.spec()
     if spec.width < 1 or spec.height < 1 or spec.nchannels < 1 or spec.depth > 1 or spec.deep:
         raise InputError(f"{path}: holds no flat picture; remove or replace it")
@@ -307,7 +261,7 @@ def _read_pixels(file, path: Path | str, channels: int) -> Float32[Array, "h w c
     finally:
         file.close()
     if pixels is None or trouble:
-        raise InputError(f"{path}: damaged or cut short ({_first_line(trouble)}); copy it again or remove it")
+        raise InputError(f"{path}: damaged or cut short ({summarize_error(trouble)}); copy it again or remove it")
     return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
 
 
@@ -344,7 +298,3 @@ def _average_axis(values: Array, n: int, axis: int) -> Array:
         first, last = int(some.indices.min()), int(some.indices.max()) + 1
         out[start : start + step] = some[:, first:last] @ flat[first:last]
     return np.moveaxis(out.reshape(n, *lines.shape[1:]), 0, axis)
-
-
-def _first_line(text: str) -> str:
-    return (text.strip().splitlines() or ["no reason given"])[0]

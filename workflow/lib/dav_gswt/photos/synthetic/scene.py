@@ -30,6 +30,7 @@ FAMILIES: dict[str, ModuleType] = {
 }
 EXEMPLAR = 6.0  # metres: side of the square of ground that is photographed
 RADIUS = 7.0  # metres from the middle of the ground to the cameras
+NEARER = 0.9 * RADIUS  # of test views, so that they are distinct from all other views
 FIELD_OF_VIEW = 55.0  # degrees across the picture's width: 7.3 m of ground from straight above
 RING_ELEVATION = 65.0  # degrees: neighbours of the start ring overlap by most of the exemplar
 LOWEST_ELEVATION = 30.0  # degrees: the lowest candidate and test view, where a scene does not say
@@ -84,9 +85,10 @@ def test_views(entry: dict) -> dict[str, list[Camera]]:
     """
     size, count = entry["size"], entry.get("walkers", 0)
     all_over = "high" if entry.get("layout") == "cap" else "hemisphere"
-    groups = {all_over: _orbit_cameras(camera_layouts.held_out(entry["test"], _lowest(entry), RADIUS), size)}
+    places = camera_layouts.hemisphere(entry["test"], _lowest(entry), NEARER, turn=70.0)
+    groups = {all_over: _orbit_cameras(places, size)}
     if entry.get("oblique"):
-        around = camera_layouts.ring(entry["oblique"], SIDE_ELEVATION, camera_layouts.NEARER * RADIUS, turn=20.0)
+        around = camera_layouts.ring(entry["oblique"], SIDE_ELEVATION, NEARER, turn=20.0)
         groups["oblique"] = _orbit_cameras(around, size)
     if count:
         heights = [EYE_HEIGHTS[i % len(EYE_HEIGHTS)] for i in range(count)]
