@@ -31,7 +31,7 @@ def views() -> dict[str, float]:
     """Seconds a view of each family, without the time to build the scene; the slowest is the figure."""
     out = {}
     for family in synthetic.FAMILIES:
-        scene = synthetic.make_scene(family, 0)
+        scene = synthetic.Scene(family, 0)
         places = camera_layouts.ring(VIEWS + 1, 45.0, synthetic.RADIUS)
         cameras = [camera_layouts.orbit(*p, (0.0, 0.0, 0.0), SIDE, SIDE, synthetic.FIELD_OF_VIEW) for p in places]
         synthetic.render(scene, cameras[0])  # builds the scene

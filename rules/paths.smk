@@ -18,7 +18,7 @@ from dav_gswt.images.lpips_weights import locate_weights
 from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
 from dav_gswt.sweeps import CELL
 from dav_gswt.views.policies import NEEDS_PHOTOS, POLICY_NAMES, PRIOR_POLICIES
-from dav_gswt.workflow import NamedEntries, lift_job_rate_limit, list_command_line_values
+from dav_gswt.workflow import NamedEntries, lift_job_rate_limit
 
 BASE = Path(str(workflow.current_basedir)).parent
 VIEWER = sorted(
@@ -33,7 +33,8 @@ CHOOSING = "|".join(map(paths.policy_pattern, POLICY_NAMES))  # policies, as a c
 EXTENSIONS = globals().get("EXTENSIONS", {})
 
 try:
-    given = merge_tables(config, parse_command_line(list_command_line_values(workflow)))
+    # the keys of `--config` as Snakemake read them: numbers in lists and tables are text
+    given = merge_tables(config, parse_command_line(dict(workflow.config_settings.config)))
     others = {key: given.pop(key, {}) for key in EXTENSIONS}
     given = check_config(add_scene_files(given, BASE / "config/scenes"))
     for key, extend in EXTENSIONS.items():

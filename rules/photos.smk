@@ -32,10 +32,9 @@ rule register_photos:
 
 
 rule render_photos:
-    """The start and test views of a synthetic scene, what each shows, and points triangulated from its exact poses."""
+    """The start and test views of a synthetic scene, and points triangulated from its exact poses."""
     output:
         images=directory("<results>/<photos>/images"),
-        truth=directory("<results>/<photos>/truth"),
         model=directory("<results>/<photos>/sparse"),
         frame="<results>/<photos>/ground.json",
     log:

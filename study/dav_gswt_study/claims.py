@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.csv_tables import read_table
+from dav_gswt_study.csv_tables import read_table
 from dav_gswt_study.markdown import render_template, write_page
 
 PAGE = "study/docs/results/claims.md"

@@ -20,6 +20,7 @@ from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import backends
 from dav_gswt_study import markdown
+from dav_gswt_study.figures import OKABE_ITO
 from dav_gswt_study.fit_profile import PhotoSet, find_time_to, measure_quality
 
 OPENSPLAT, GSPLAT = "opensplat", "gsplat"
@@ -127,7 +128,7 @@ def plot_programs(rows: list[dict], path: Path | str) -> None:
     """PSNR of the test photo over seconds, a line a program."""
     figure = figures.make_figure(6.4, 4.0)
     axes = figure.add_subplot()
-    for program, colour in zip(dict.fromkeys(row["program"] for row in rows), figures.OKABE_ITO, strict=False):
+    for program, colour in zip(dict.fromkeys(row["program"] for row in rows), OKABE_ITO, strict=False):
         own = [row for row in rows if row["program"] == program]
         x, y = ([row[name] for row in own] for name in ("seconds", "psnr_colour_corrected"))
         axes.semilogx(x, y, "o-", markersize=3, color=colour, label=program)

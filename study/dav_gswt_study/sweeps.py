@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import csv_tables
 from dav_gswt.files import read_json
 from dav_gswt.images import figures
 from dav_gswt.sweeps import CELL, COLUMNS, QUALITY, TILES, TIMES, describe_origin, tabulate_cell
+from dav_gswt_study import csv_tables
 from dav_gswt_study.experiments import EVERYTHING
+from dav_gswt_study.figures import OKABE_ITO
 from dav_gswt_study.seams import summary
 
 KEY = ("sweep", *CELL)  # what tells rows apart
@@ -103,7 +104,7 @@ def _last(rows: list[dict], value: str) -> str:
 
 def _draw_panel(panel, axis: str, key: str, rows: list[dict], scenes: list[str]) -> None:
     values = list(dict.fromkeys(row["varied_0"] for row in rows))
-    for scene, colour in zip(scenes, figures.OKABE_ITO * len(scenes), strict=False):
+    for scene, colour in zip(scenes, OKABE_ITO * len(scenes), strict=False):
         found = {v: [r[key] for r in rows if (r["scene"], r["varied_0"]) == (scene, v)] for v in values}
         known = {v: [x for x in each if x is not None] for v, each in found.items()}
         at = [i for i, v in enumerate(values) if known[v]]
@@ -124,9 +125,7 @@ def _is_number(text: str) -> bool:
 
 
 def _draw_curves(panel, rows: list[dict]) -> None:
-    for value, colour in zip(
-        dict.fromkeys(row["varied_0"] for row in rows), figures.OKABE_ITO * len(rows), strict=False
-    ):
+    for value, colour in zip(dict.fromkeys(row["varied_0"] for row in rows), OKABE_ITO * len(rows), strict=False):
         mine = [row for row in rows if row["varied_0"] == value and row["psnr"] is not None]
         photos = sorted({row["photos"] for row in mine})
         means = [float(np.mean([row["psnr"] for row in mine if row["photos"] == n])) for n in photos]

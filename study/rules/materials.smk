@@ -1,7 +1,7 @@
 """Materials and objects against the true labels of a synthetic scene that has them, and how visibly terrains repeat, with the
 pictures of study/docs/results/materials.md: `snakemake materials_pages`.
 
-In: the materials of the scenes of the config's `study.materials` and their true labels, the bundles of `study.lattice`.
+In: the materials of the scenes of the config's `study.materials`, the bundles of `study.lattice`.
 Out: study/results/tables/materials.csv, study/results/tables/lattice.csv, and beside each bundle a picture of 20 x 20 tiles from above.
 """
 
@@ -10,12 +10,16 @@ rule measure_materials:
     """Mean IoU of materials and F1 of objects."""
     input:
         materials="<results>/<materials>",
-        truth="<results>/<photos>/truth",
     output:
         table="<results>/<round>{inpainted}/materials.csv",
     log:
         "<logs>/<materials>/measure_materials.log",
+    wildcard_constraints:
+        scene=scenes_of("synthetic"),
+    resources:
+        mem_mb=per_attempt(2500),
     params:
+        scene=scene_keys("render_photos"),
         source=code_of_study("measure_materials"),
     script:
         "../scripts/measure_materials.py"

@@ -1,11 +1,11 @@
 """Rules calibrate_coarse and calibrate_round: do scores say where the field is wrong?"""
 
-from dav_gswt import csv_tables
 from dav_gswt.files import write_json
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
 from dav_gswt.views import candidates, pose_maps, prior_sampling, scores
+from dav_gswt_study import csv_tables
 from dav_gswt_study.calibration import judging
 
 with logging_to(snakemake.log[0]):

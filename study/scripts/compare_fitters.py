@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
-from dav_gswt.provenance import describe_machine, record_provenance
+from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction.fitting.plan import FitSettings
-from dav_gswt_study import fit_profile, markdown, peers
+from dav_gswt_study import csv_tables, fit_profile, markdown, peers
+from dav_gswt_study.machine import describe_machine
 
 with logging_to(snakemake.log[0]):
     out, asked = snakemake.output, dict(snakemake.params.asked)

@@ -1,7 +1,7 @@
 """Rule compare_policies: the rounds of all cells, and from these curves tables, a figure and the page."""
 
-from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
+from dav_gswt_study import csv_tables
 from dav_gswt_study.comparison import curves, page, tables
 from dav_gswt_study.markdown import render_template, write_page
 

@@ -1,8 +1,8 @@
 """Rule compare_settings: all settings as one table, the Pareto front of those measured by test views, and the page."""
 
-from dav_gswt import csv_tables
 from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
+from dav_gswt_study import csv_tables
 from dav_gswt_study.markdown import render_template, write_page
 from dav_gswt_study.tradeoff import page, plots, tables
 

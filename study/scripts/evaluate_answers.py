@@ -1,9 +1,9 @@
 """Rule evaluate_answers: choices of participants and of the model observer."""
 
-from dav_gswt import csv_tables
 from dav_gswt.files import write_json
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import record_provenance
+from dav_gswt_study import csv_tables
 from dav_gswt_study.forced_choice import answers, results
 
 with logging_to(snakemake.log[0]):

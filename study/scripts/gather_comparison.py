@@ -1,9 +1,8 @@
 """Rule gather_comparison: the experiments of a sweep as one table, added to that of earlier runs, and as a figure."""
 
-from dav_gswt import csv_tables
 from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
-from dav_gswt_study import sweeps
+from dav_gswt_study import csv_tables, sweeps
 
 with logging_to(snakemake.log[0]):
     out, params = snakemake.output, snakemake.params

@@ -1,8 +1,8 @@
 """Rule gather_frames: frame times of all scenes."""
 
-from dav_gswt import csv_tables
 from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
+from dav_gswt_study import csv_tables
 from dav_gswt_study.terrain import frames
 
 with logging_to(snakemake.log[0]):

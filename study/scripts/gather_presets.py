@@ -1,7 +1,7 @@
 """Rule gather_preset_costs: what presets cost and what they are worth, as a table and as a page."""
 
-from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
+from dav_gswt_study import csv_tables
 from dav_gswt_study.markdown import render_template, write_page
 from dav_gswt_study.tradeoff import preset_costs
 

@@ -1,7 +1,7 @@
 """Rule gather_scenes: the tables of several scenes in one."""
 
-from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
+from dav_gswt_study import csv_tables
 
 with logging_to(snakemake.log[0]):
     found = []

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from dav_gswt import csv_tables
 from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
+from dav_gswt_study import csv_tables
 from dav_gswt_study.markdown import write_page
 from dav_gswt_study.seams import report, summary
 

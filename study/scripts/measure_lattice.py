@@ -3,11 +3,11 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from dav_gswt import csv_tables
 from dav_gswt.bundle import store
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
 from dav_gswt.terrain import endless
+from dav_gswt_study import csv_tables
 from dav_gswt_study.terrain import lattice
 
 with logging_to(snakemake.log[0]):

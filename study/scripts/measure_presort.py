@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from dav_gswt import csv_tables
 from dav_gswt.bundle import store as bundles
 from dav_gswt.logs import logging_to
 from dav_gswt.terrain.fit_cover import gather_content
 from dav_gswt.tiles import store
+from dav_gswt_study import csv_tables
 from dav_gswt_study.terrain import presort
 
 with logging_to(snakemake.log[0]):

@@ -1,9 +1,9 @@
 """Rule measure_repetition: autocorrelation of a large top view at the tiles' period."""
 
-from dav_gswt import csv_tables
 from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
 from dav_gswt.tiles import store
+from dav_gswt_study import csv_tables
 from dav_gswt_study.seams import placed_tiles, repetition
 
 with logging_to(snakemake.log[0]):

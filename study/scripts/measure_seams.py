@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from dav_gswt import csv_tables
 from dav_gswt.files import write_json
 from dav_gswt.images import lpips_weights
 from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import record_provenance
 from dav_gswt.tiles import store
+from dav_gswt_study import csv_tables
 from dav_gswt_study.seams import measure
 
 with logging_to(snakemake.log[0]):

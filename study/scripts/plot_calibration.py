@@ -1,9 +1,9 @@
 """Rule plot_calibration: which scores say where the field is wrong?"""
 
-from dav_gswt import csv_tables
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import record_provenance
+from dav_gswt_study import csv_tables
 from dav_gswt_study.calibration import report
 
 with logging_to(snakemake.log[0]):

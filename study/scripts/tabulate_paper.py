@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from dav_gswt import csv_tables
 from dav_gswt.logs import logging_to
+from dav_gswt_study import csv_tables
 from dav_gswt_study.tables import paper, spread
 
 with logging_to(snakemake.log[0]):

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from dav_gswt import csv_tables
 from dav_gswt.bundle import store
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
 from dav_gswt.terrain import page
+from dav_gswt_study import csv_tables
 from dav_gswt_study.terrain import frames
 
 with logging_to(snakemake.log[0]):

@@ -1,9 +1,8 @@
 """Rule write_materials_page: the page about materials, from its template and its tables."""
 
-from dav_gswt import csv_tables
 from dav_gswt.files import copy_file
 from dav_gswt.logs import logging_to
-from dav_gswt_study import markdown
+from dav_gswt_study import csv_tables, markdown
 from dav_gswt_study.materials import page
 
 with logging_to(snakemake.log[0]):

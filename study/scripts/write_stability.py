@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-from dav_gswt import csv_tables
 from dav_gswt.files import read_json
 from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
-from dav_gswt_study import markdown
+from dav_gswt_study import csv_tables, markdown
 from dav_gswt_study.stability import page, running
 
 with logging_to(snakemake.log[0]):

@@ -116,3 +116,12 @@ def test_the_next_items_are_worked_on_while_one_is_taken_but_no_more_than_there_
     begun = []
     for taken, _ in enumerate(map_ahead(begun.append, range(20), 3), start=1):
         assert len(begun) <= taken + 3
+
+
+def test_a_table_has_five_digits_and_empty_fields_and_one_without_rows_is_an_empty_file(tmp_path):
+    files.write_table(tmp_path / "a.csv", [{"a": 1 / 3, "b": 123456, "c": None, "d": True, "e": "x, y"}, {"a": 2}])
+    assert (tmp_path / "a.csv").read_bytes() == b'a,b,c,d,e\n0.33333,123456,,True,"x, y"\n2,,,,\n'
+    files.write_table(tmp_path / "a.csv", [])
+    assert (tmp_path / "a.csv").read_bytes() == b""
+    with pytest.raises(ValueError, match="not in fieldnames: 'b'"):
+        files.write_table(tmp_path / "a.csv", [{"a": 1}, {"a": 1, "b": 2}])

@@ -22,11 +22,11 @@ FREE_SPACE = "results/field.ply: No space left on device; free some space, then 
         (ZeroDivisionError(), None, "failed", True),
     ],
 )
-def test_a_job_ends_with_a_message_and_only_faults_leave_a_traceback(tmp_path, capsys, error, code, said, traced):
+def test_a_job_ends_with_a_message_and_only_faults_leave_a_traceback(tmp_path, capfd, error, code, said, traced):
     with pytest.raises(SystemExit if code else ZeroDivisionError) as ended, logs.logging_to(tmp_path / "a.log"):
         raise error
     assert getattr(ended.value, "code", None) == code
-    text, shown = (tmp_path / "a.log").read_text(), capsys.readouterr().err
+    text, shown = (tmp_path / "a.log").read_text(), capfd.readouterr().err
     assert said in text and said in shown
     assert ("Traceback" in text) == traced and "Traceback" not in shown
 
@@ -61,10 +61,10 @@ def test_progress_tells_how_far_and_how_long(tmp_path, caplog):
     assert not caplog.text  # a loop that ends at once says nothing
 
 
-def test_a_log_on_a_full_disk_leaves_the_terminal_its_messages(capsys):
+def test_a_log_on_a_full_disk_leaves_the_terminal_its_messages(capfd):
     with logs.logging_to("/dev/full"):
         logging.info("a message")
-    assert capsys.readouterr().err == "  a message\n"
+    assert capfd.readouterr().err == "  a message\n"
     with pytest.raises(SystemExit) as ended, logs.logging_to("/none/a.log"):
         pass
-    assert ended.value.code == 1 and capsys.readouterr().err == "  /none/a.log: No such file or directory\n"
+    assert ended.value.code == 1 and capfd.readouterr().err == "  /none/a.log: No such file or directory\n"

@@ -5,10 +5,10 @@ A cell is a scene, a seed (of the start photos), a policy with its parameters, a
 
 from pathlib import Path
 
-from dav_gswt import csv_tables
 from dav_gswt.files import read_json
 from dav_gswt.sweeps import QUALITY as MEASURES
 from dav_gswt.sweeps import describe_origin, read_benchmark, select_metrics, sum_or_none
+from dav_gswt_study import csv_tables
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from dav_gswt.images import figures
 from dav_gswt_study.comparison.tables import EVERY, EVERYTHING
+from dav_gswt_study.figures import OKABE_ITO
 from dav_gswt_study.markdown import format_number, format_table
 
 NAMED = {  # measures, and decimals
@@ -103,7 +104,7 @@ def write_figure(path: Path | str, curves: list[dict], compared: list[dict], bas
     policies = [row["policy"] for row in _rank_policies(compared)]
     best = policies[: SHOWN - 1]
     looks = {baseline: BASE} | {
-        policy: {"color": colour, "linewidth": 1.6} for policy, colour in zip(best, figures.OKABE_ITO, strict=False)
+        policy: {"color": colour, "linewidth": 1.6} for policy, colour in zip(best, OKABE_ITO, strict=False)
     }
     columns = min(3, len(panels))
     above = -(-len(panels) // columns)
@@ -163,7 +164,7 @@ def _draw_forest(axes, compared: list[dict], baseline: str) -> None:
             axes.plot([row["low"], row["high"]], [place, place], color="0.25", linewidth=2)
         axes.plot(row["mean"], place, "s", color="0.25", markersize=6)
         alone = [r["mean"] for r in compared if r["policy"] == row["policy"] and r["scene"] != EVERY]
-        axes.plot(alone, [place] * len(alone), "o", color=figures.OKABE_ITO[0], markersize=4, alpha=0.7)
+        axes.plot(alone, [place] * len(alone), "o", color=OKABE_ITO[0], markersize=4, alpha=0.7)
     axes.axvline(0, color="black", linewidth=1, linestyle=":")
     axes.set_yticks(range(len(ranked)), [row["policy"] for row in ranked], fontsize=9)
     axes.set_ylim(len(ranked) - 0.5, -0.5)

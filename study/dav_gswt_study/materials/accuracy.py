@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from dav_gswt.images import image_files
 from dav_gswt.materials.objects import BORDER, SMALLEST
-from dav_gswt.photos.synthetic.labels import LabelMap
+from dav_gswt_study.materials.true_labels import LabelMap
 
 LEAST_IOU = 0.4  # of an object with its true footprint, above which it counts as found
 

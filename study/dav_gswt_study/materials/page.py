@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from dav_gswt.csv_tables import read_table
 from dav_gswt.materials.store import read_report
+from dav_gswt_study.csv_tables import read_table
 from dav_gswt_study.markdown import format_table
 
 ACCURACY = ("iou_sand", "iou_meadow", "iou_boulders", "iou_path")

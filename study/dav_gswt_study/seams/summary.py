@@ -10,9 +10,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt import csv_tables
 from dav_gswt.files import read_json
-from dav_gswt_study import statistics
+from dav_gswt_study import csv_tables, statistics
 
 EVERY = "every"
 CELL = ("scene", "seed", "preset", "variant")

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dav_gswt import csv_tables
+from dav_gswt_study import csv_tables
 from dav_gswt_study.stability import rasterizer, scores, terrain
 from dav_gswt_study.stability.formula import Check, measure_error
 

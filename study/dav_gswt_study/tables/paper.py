@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import csv_tables
 from dav_gswt.paths import encode_number
-from dav_gswt_study import statistics
+from dav_gswt_study import csv_tables, statistics
 from dav_gswt_study.tables.spread import VIEWER, mean_and_deviation
 
 PAPER = Path(__file__).with_name("paper.csv")

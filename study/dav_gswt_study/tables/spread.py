@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from dav_gswt import csv_tables
-from dav_gswt_study import sweeps
+from dav_gswt_study import csv_tables, sweeps
 
 VIEWER = (
     *("render_ms", "render_ms_sd", "sort_ms", "sort_ms_sd", "sort_share"),

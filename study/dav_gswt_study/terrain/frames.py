@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 from fixtures import browser
 
-from dav_gswt import csv_tables
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.images import figures
 from dav_gswt.logs import progress
-from dav_gswt.provenance import describe_machine
 from dav_gswt.terrain import endless, heights, stills, visibility
 from dav_gswt.terrain.page import write_page
 from dav_gswt.terrain.stills import FrameTiming, Shot
+from dav_gswt_study import csv_tables
+from dav_gswt_study.machine import describe_machine
 from dav_gswt_study.tables import spread
 from dav_gswt_study.terrain.walk import walk_shots
 

@@ -2,6 +2,7 @@
 
 from dav_gswt.images import figures
 from dav_gswt_study.experiments import PRESET
+from dav_gswt_study.figures import OKABE_ITO
 
 AXES = {
     "views": ("seconds", "PSNR of test views (dB)"),
@@ -34,7 +35,7 @@ def _front(axes, pareto: list[dict], key: str, on: str) -> None:
     axes.plot(*zip(*best, strict=True), drawstyle="steps-post", color="0.6", linewidth=1, zorder=1) if best else None
     for n, knob in enumerate(dict.fromkeys(row["knob"] for row in pareto)):
         mine = [row for row in pareto if row["knob"] == knob]
-        colour = "black" if knob == PRESET else figures.OKABE_ITO[n % len(figures.OKABE_ITO)]
+        colour = "black" if knob == PRESET else OKABE_ITO[n % len(OKABE_ITO)]
         x, y = ([row[name] for row in mine] for name in ("seconds", key))
         axes.plot(x, y, MARKS[n % len(MARKS)], color=colour, markersize=6, label=knob, alpha=0.8, zorder=2)
         if knob == PRESET:
@@ -73,7 +74,7 @@ def _panel(panel, knob: str, rows: list[dict]) -> None:
     known = [row for row in rows if None not in (row["own_seconds"], row[key])]
     for row in known:
         filled = "full" if row["base"] else "none"
-        panel.plot(row["own_seconds"], row[key], "o", color=figures.OKABE_ITO[0], fillstyle=filled, markersize=6)
+        panel.plot(row["own_seconds"], row[key], "o", color=OKABE_ITO[0], fillstyle=filled, markersize=6)
     _named(panel, [(row["own_seconds"], row[key], row["setting"]) for row in known], 7)
     panel.set_title(knob, fontsize=9, loc="left")
     panel.set_xlabel(across, fontsize=8)

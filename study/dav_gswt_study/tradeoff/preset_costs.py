@@ -8,8 +8,8 @@ from itertools import chain
 import numpy as np
 
 from dav_gswt.files import read_json
-from dav_gswt.provenance import describe_machine
 from dav_gswt.sweeps import MEGA, describe_origin, read_benchmark, select_metrics, sum_or_none
+from dav_gswt_study.machine import describe_machine
 from dav_gswt_study.markdown import format_number, format_table
 
 PARTS = {"fits": "fits", "views": "scores and choice of views", "tiles": "materials, levels, tiles, bundle"}

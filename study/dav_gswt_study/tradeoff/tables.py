@@ -6,12 +6,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
-from dav_gswt import csv_tables
 from dav_gswt.images import image_files
 from dav_gswt.images.metrics import mse_to_psnr
-from dav_gswt.provenance import describe_machine
 from dav_gswt.sweeps import CELL, sum_or_none
-from dav_gswt_study import sweeps
+from dav_gswt_study import csv_tables, sweeps
+from dav_gswt_study.machine import describe_machine
 from dav_gswt_study.statistics import subtract_or_none
 
 KEY = ("scene", "seed", "knob", "setting", "preset", "tiling", "prior", "tau", "processor", "cores")  # tells rows apart

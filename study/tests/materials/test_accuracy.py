@@ -3,8 +3,8 @@ import pytest
 
 from dav_gswt.geometry.scene_frame import Extent
 from dav_gswt.images import image_files
-from dav_gswt.photos.synthetic.labels import LabelMap
 from dav_gswt_study.materials import accuracy
+from dav_gswt_study.materials.true_labels import LabelMap
 
 BARE = np.zeros((20, 20), int)
 

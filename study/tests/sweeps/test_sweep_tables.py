@@ -2,8 +2,8 @@ import json
 
 import pytest
 
-from dav_gswt import csv_tables
 from dav_gswt.sweeps import TILES, TIMES
+from dav_gswt_study import csv_tables
 from dav_gswt_study import sweeps as tables
 from dav_gswt_study.seams import measure
 

@@ -60,7 +60,7 @@ def test_a_fit_is_given_all_keys_of_its_settings(rule):
 def test_scores_are_given_all_keys_of_a_rig_s_reach():
     given = select_keys(PhotoScene, "score_coarse", photo_scene("serial"))["rig"]
     assert not {"millimetres", "limits"} & given.withheld and "port" in given.withheld
-    assert serial_rig.filter_reachable({"rig": given}, synthetic.make_scene("desert", 0).frame, []) == []
+    assert serial_rig.filter_reachable({"rig": given}, synthetic.Scene("desert", 0).frame, []) == []
 
 
 def test_what_renders_photos_reads_only_its_keys(synthetic_scene):
@@ -72,7 +72,7 @@ def test_what_renders_photos_reads_only_its_keys(synthetic_scene):
 
 
 def test_what_lists_candidates_reads_only_its_keys(synthetic_scene):
-    frame = synthetic.make_scene("desert", 0).frame
+    frame = synthetic.Scene("desert", 0).frame
     given = select_keys(SCENES["synthetic"], "select_poses", synthetic_scene)
     camera = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, 64.0, 64.0, 128, 128)
     assert len(candidates.list_poses(given, frame, camera)) == 250

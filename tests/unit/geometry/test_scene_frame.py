@@ -1,4 +1,4 @@
-"""ground.json: what is written is read back, in a fixed order of keys, and what is wrong in it is named."""
+"""ground.json: what is written is read back, and what is wrong in it is named."""
 
 import json
 from dataclasses import replace

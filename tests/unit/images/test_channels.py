@@ -33,12 +33,6 @@ def test_channels_are_scaled_and_filled_each_by_its_own_value(image):
     assert np.isnan(image[1, 2]).all()
 
 
-def test_mean_squares_and_largest_differences_are_over_the_channels(image):
-    found = channels.mean_squares(image)
-    assert found.dtype == np.float32 and found == pytest.approx((image.astype(float) ** 2).mean(-1), rel=1e-6)
-    assert np.array_equal(channels.largest_difference(image, image[::-1]), np.abs(image - image[::-1]).max(-1))
-
-
 ONE = np.ones((16, 16), np.float32)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fixtures.lpips_arrays import KERNELS
 from numpy.lib.stride_tricks import sliding_window_view
 
 from dav_gswt.errors import InputError
@@ -114,10 +115,8 @@ def test_pictures_that_cannot_be_compared_are_refused(random_weights):
             lambda bad=bad: lpips.pairwise_mean(np.stack([good, bad], 1), random_weights),
             lambda bad=bad: lpips.layers(bad, random_weights),
         ):
-            with pytest.raises(ValueError, match=r"picture 2 has values outside \[-1, 1\]"):
+            with pytest.raises(ValueError, match=r"values outside \[-1, 1\]"):
                 call()
-    with pytest.raises(ValueError, match="at least 2 of a pose, not 1"):
-        lpips.pairwise_mean(good[:, None], random_weights)
 
 
 def test_resized_pictures_keep_their_range_and_what_is_constant():
@@ -137,8 +136,8 @@ class Calls:
 
 
 def test_the_published_weights_have_their_shapes_channels_first(real_weights):
-    assert tuple(kernel.shape for kernel in real_weights.kernels) == lpips_weights.KERNELS
-    sizes = [shape[0] for shape in lpips_weights.KERNELS]
+    assert tuple(kernel.shape for kernel in real_weights.kernels) == KERNELS
+    sizes = [shape[0] for shape in KERNELS]
     assert [len(bias) for bias in real_weights.biases] == [len(head) for head in real_weights.heads] == sizes
     assert all(head.min() >= 0 for head in real_weights.heads)
     assert all(kernel.flags.c_contiguous and kernel.flags.writeable for kernel in real_weights.kernels)

@@ -1,5 +1,6 @@
-"""Outputs that appear whole or not at all, JSON that says where it comes from, and digests."""
+"""Outputs that appear whole or not at all, JSON that says where it comes from, CSV tables, and digests."""
 
+import csv
 import hashlib
 import json
 import lzma
@@ -10,6 +11,7 @@ import time
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Iterable
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -98,6 +100,26 @@ def write_json(path: Path | str, value) -> None:
     text = json.dumps(value, indent=1, allow_nan=False) + "\n"
     with atomic_file(path) as part:
         part.write_text(text, encoding="utf-8")
+
+
+def write_table(path: Path | str, rows: Iterable[dict]) -> None:
+    """Write a CSV table: rows under the columns of the first one; no rows give an empty file.
+
+    Floats have five significant digits; the field of a value that is not known is empty.
+    Raises: ValueError: a row has a column that the first one lacks.
+    """
+    rows = list(rows)
+    with atomic_file(path) as part, part.open("w", encoding="utf-8", newline="") as text:
+        if rows:
+            writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows({name: _format_cell(value) for name, value in row.items()} for row in rows)
+
+
+def _format_cell(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
 def read_json(path: Path | str):

@@ -1,7 +1,6 @@
 """Logging of a job: its log file has everything, the terminal a short form."""
 
 import errno
-import io
 import logging
 import os
 import sys
@@ -79,18 +78,12 @@ def _native_messages_to(path: Path | str) -> Iterator[TextIO]:
     log = os.open(path, os.O_WRONLY | os.O_APPEND)
     os.dup2(log, 2)
     os.close(log)
-    try:
-        direct = stream.fileno() == 2
-    except (AttributeError, io.UnsupportedOperation):  # a replacement that is no file
-        direct = False
-    if direct:
-        sys.stderr = os.fdopen(os.dup(before), "w", buffering=1, encoding=stream.encoding, errors=stream.errors)
+    sys.stderr = os.fdopen(os.dup(before), "w", buffering=1, encoding=stream.encoding, errors=stream.errors)
     try:
         yield sys.stderr
     finally:
-        if direct:
-            sys.stderr.flush()  # not closed: handlers of the root logger keep it
-            sys.stderr = stream
+        sys.stderr.flush()  # not closed: handlers of the root logger keep it
+        sys.stderr = stream
         os.dup2(before, 2)
         os.close(before)
 

@@ -1,7 +1,5 @@
 """Where a result comes from: the code, the parameters, the bytes of every input. Times stand in benchmarks only."""
 
-import os
-import platform
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -25,11 +23,3 @@ def _files(given: Path | str | list) -> list[Path]:
     paths = [Path(path) for path in ([given] if isinstance(given, Path | str) else given)]
     found = [sorted(p for p in path.rglob("[!.]*") if p.is_file()) if path.is_dir() else [path] for path in paths]
     return [file for files in found for file in files]
-
-
-def describe_machine() -> dict:
-    """The processor's name and how many cores it has: what seconds are to be read with."""
-    info = Path("/proc/cpuinfo")
-    lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return {"processor": names[0] if names else platform.processor() or platform.machine(), "cores": os.cpu_count()}

@@ -19,8 +19,7 @@ def default_threads() -> int:
         if not given.isdecimal() or int(given) < 1:
             raise ValueError(f"DAV_GSWT_THREADS={given}: give a whole number from 1")
         return int(given)
-    mine = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(mine, MAX_THREADS)
+    return min(len(os.sched_getaffinity(0)), MAX_THREADS)
 
 
 def let_waiting_threads_sleep() -> None:

@@ -14,11 +14,6 @@ def lift_job_rate_limit(scheduler) -> None:
         scheduler.job_rate_limiter = None
 
 
-def list_command_line_values(workflow) -> dict:
-    """The keys of `--config`, as Snakemake read them: numbers in lists and tables are text."""
-    return dict(workflow.config_settings.config)
-
-
 class NamedEntries(dict):
     """A table of the config by name, whose error for a name that a path asks for says which names there are."""
 

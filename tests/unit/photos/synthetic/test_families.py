@@ -1,4 +1,4 @@
-"""The families of land: what they refuse, that they repeat, where things stand, and what all share."""
+"""The families of land: that they repeat, where things stand, and what all share."""
 
 from functools import cache
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from dav_gswt.errors import InputError
 from dav_gswt.photos.synthetic import oasis, scene
 from dav_gswt.photos.synthetic.land import make_ground_mesh  # as it is before `small_land` replaces it
 
@@ -58,13 +57,6 @@ def test_everything_is_finite_rooted_in_the_ground_and_no_reflectance_leaves_0_t
     else:
         assert z == pytest.approx(height(x, y), abs=1e-9)
         assert all(plant.vertices[:, 2].min() < 0 for plant in made.plants)
-
-
-def test_a_scene_that_cannot_be_is_refused():
-    with pytest.raises(InputError, match="'dessert'; choose from desert, meadow"):
-        scene.make_scene("dessert", 0)
-    with pytest.raises(InputError, match="desert: seed is -1"):
-        scene.make_scene("desert", -1)
 
 
 def test_the_mesh_of_the_ground_is_fine_about_the_origin_and_faces_up():

@@ -1,4 +1,4 @@
-"""Synthetic scenes: what they refuse, that pictures are taken where cameras say, and that they repeat."""
+"""Synthetic scenes: that pictures are taken where cameras say, and that they repeat."""
 
 from dataclasses import replace
 
@@ -85,10 +85,10 @@ def test_a_stone_a_plant_and_shadows_are_where_the_land_says():
         assert sky[:7].mean(axis=(0, 1)) == pytest.approx(colour, rel=0.15)
 
 
-def test_a_picture_repeats_to_the_byte_whatever_the_threads_and_another_differs_in_its_noise():
+def test_a_picture_repeats_to_the_byte_whatever_the_threads():
     import drjit
 
-    scene, camera = synthetic.make_scene("desert", 0), off_centre(50, 38)
+    scene, camera = synthetic.Scene("desert", 0), off_centre(50, 38)
     before = drjit.thread_count()
     try:
         drjit.set_thread_count(1)
@@ -101,9 +101,6 @@ def test_a_picture_repeats_to_the_byte_whatever_the_threads_and_another_differs_
     assert one.dtype == np.float32 and one.shape == (38, 50, 3)
     assert one.tobytes() == three.tobytes()
     assert one.min() >= 0 and one.max() <= 1 and one.std() > 0.02
-    second = synthetic.render(scene, camera, 4, again=1)
-    assert one.tobytes() != second.tobytes() and np.abs(one - second).mean() < 0.08
-    assert np.abs(one.mean() - second.mean()) < 0.01  # a mean over blocks of pixels whose noise goes together
 
 
 def elevations(cameras):

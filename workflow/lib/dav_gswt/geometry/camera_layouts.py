@@ -10,7 +10,6 @@ from numpy import ndarray as Array
 from dav_gswt.geometry.cameras import Camera, pinhole
 
 Place = tuple[float, float, float]  # elevation, azimuth, radius
-NEARER = 0.9  # radius of a test view, relative to other views
 GOLDEN = np.pi * (3.0 - 5.0**0.5)  # radians between neighbours of a Fibonacci lattice
 PLASTIC = 1.2207440846057596  # x^4 = x + 1: base of the quasirandom sequence in three dimensions
 CIRCLE = 36  # views on the circle of the rig `paper`, of 100 or of any number from 72
@@ -22,10 +21,7 @@ def orbit(elevation, azimuth, radius, target, width: int, height: int, fov) -> C
 
     The picture's top is up; from straight above it is the side away from the camera's azimuth, which is what the top
     tends to as the elevation tends to 90.
-    Raises: ValueError: a radius that is not positive, an elevation outside -90 to 90, or a number that is not finite.
     """
-    if not (np.isfinite([elevation, azimuth, radius]).all() and radius > 0 and -90 <= elevation <= 90):
-        raise ValueError(f"no camera stands at elevation {elevation}, azimuth {azimuth}, radius {radius}")
     e, a = np.radians(elevation), np.radians(azimuth % 360.0)
     target = np.asarray(target, float)
     outward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
@@ -35,8 +31,6 @@ def orbit(elevation, azimuth, radius, target, width: int, height: int, fov) -> C
 
 def start_ring(n: int, elevation: float, radius: float) -> list[Place]:
     """n places: one straight above, the others evenly around at `elevation`. One alone is the one above."""
-    if n < 1:
-        raise ValueError(f"a ring has at least 1 place, not {n}")
     return [(90.0, 0.0, radius)] + ring(n - 1, elevation, radius)
 
 
@@ -100,22 +94,11 @@ def paper(n: int, elevation: float, lowest_elevation: float, radius: float) -> l
     return ring(circle, elevation, radius) + hemisphere(n - circle, lowest_elevation, radius, turn=35.0)
 
 
-def held_out(n: int, lowest_elevation: float, radius: float) -> list[Place]:
-    """n places of test views: uniform by area like `hemisphere`, but rotated and nearer by a tenth.
-
-    The other radius keeps them distinct from every start view and candidate.
-    """
-    return hemisphere(n, lowest_elevation, NEARER * radius, turn=70.0)
-
-
 def eye_level_camera(height: float, azimuth: float, away: float, target, width: int, rows: int, fov: float) -> Camera:
     """A camera at eye level: `height` above the target, `away` from it, looking past it to the horizon.
 
     azimuth: of the camera from the target. fov: of the picture's width, degrees.
-    Raises: ValueError: a height that is not positive.
     """
-    if not height > 0:
-        raise ValueError(f"an eye-level camera is above the ground, not at {height}")
     a, down = np.radians(azimuth), np.radians(EYE_LEVEL_PITCH)
     out = np.array([np.cos(a), np.sin(a), 0.0])
     eye = np.asarray(target, float) + away * out + [0.0, 0.0, height]

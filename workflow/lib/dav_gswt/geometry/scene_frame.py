@@ -12,14 +12,6 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import read_record, write_json
 from dav_gswt.geometry.georeference import Georeference
 
-_COMMON = "kind unit flying_height exemplar extent "
-_KEYS = {  # of ground.json by kind of scene, in the order in which they are written
-    "photos": _COMMON + "photos_per_cell relief georeference test images registered left_out focal_ratio focal "
-    "reprojection_error points verdict",
-    "synthetic": _COMMON + "test test_groups images registered left_out focal_ratio renderer",
-    "field": _COMMON + "test relief gaussians removed images registered left_out focal_ratio",
-}
-
 
 @dataclass(frozen=True)
 class Square:
@@ -142,11 +134,8 @@ class SceneFrame:
 
 
 def write_scene_frame(path: Path | str, frame: SceneFrame) -> None:
-    """Write ground.json."""
-    values = asdict(frame)
-    if frame.georeference is None:
-        del values["georeference"]
-    write_json(path, {key: values[key] for key in _KEYS[frame.kind].split() if key in values})
+    """Write ground.json: what is None is left out."""
+    write_json(path, {key: value for key, value in asdict(frame).items() if value is not None})
 
 
 def read_scene_frame(path: Path | str) -> SceneFrame:

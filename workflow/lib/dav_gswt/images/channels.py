@@ -4,7 +4,7 @@ NumPy's loop over a last axis of 3 takes ten times as long as the arithmetic. Th
 """
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 from numpy import ndarray as Array
 
 
@@ -45,16 +45,3 @@ def fill_unknown(image: Float32[Array, "h w c"], colour: Float32[Array, "c"]) ->
         plane = out[..., c]
         np.copyto(plane, colour[c], where=np.isnan(plane))
     return out
-
-
-def mean_squares(difference: Float[Array, "h w c"]) -> Float[Array, "h w"]:
-    """Mean of the squares over the channels."""
-    return sum_products(difference, difference) / difference.dtype.type(difference.shape[2])
-
-
-def largest_difference(one: Float[Array, "h w c"], other: Float[Array, "h w c"]) -> Float[Array, "h w"]:
-    """Largest absolute difference over the channels."""
-    apart = np.abs(one[..., 0] - other[..., 0])
-    for c in range(1, one.shape[2]):
-        np.maximum(apart, np.abs(one[..., c] - other[..., c]), out=apart)
-    return apart

@@ -8,11 +8,10 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.files import atomic_file, copy_file
+from dav_gswt.files import atomic_file
 from dav_gswt.images import image_files
 
 QUALITY = 88  # of JPEGs
-OKABE_ITO = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # for any colour vision
 KINDS = ((0.90, 0.62, 0.0), (0.0, 0.62, 0.45), (0.0, 0.45, 0.70), (0.80, 0.47, 0.65))  # of kinds of ground
 
 
@@ -26,25 +25,9 @@ def make_figure(width: float, height: float, **padding: Any):
 
 def save_figure(figure, path: Path | str) -> None:
     """A figure as a PNG, or as a JPEG by the path's ending: the same bytes each time."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(figure)
+    options = {"pil_kwargs": {"quality": QUALITY}} if Path(path).suffix == ".jpg" else {"metadata": {"Software": None}}
     with atomic_file(path) as part:
-        if Path(path).suffix == ".jpg":
-            figure.savefig(part, format="jpg", pil_kwargs={"quality": QUALITY})
-        else:
-            figure.savefig(part, format="png", metadata={"Software": None})
-
-
-def copy_figure(source: Path | str, target: Path | str) -> None:
-    """Copy a picture: the same file, or a JPEG by the target's ending, a fifth of the bytes where it shows photos."""
-    if Path(target).suffix != ".jpg":
-        copy_file(source, target)
-    else:
-        from matplotlib.image import imsave
-
-        with atomic_file(target) as part:
-            imsave(part, image_files.read_photo(source), format="jpg", pil_kwargs={"quality": QUALITY})
+        figure.savefig(part, **options)
 
 
 def draw_sheet(pictures: dict[str, list[Path | str]], heads: list[str], tall: float = 2.05):

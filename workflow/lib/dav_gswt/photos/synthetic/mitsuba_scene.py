@@ -35,14 +35,11 @@ def render_light(world, camera: Camera, samples: int, seed) -> Float32[Array, "h
 
 
 def make_sensor(camera: Camera, sampler: dict) -> dict:
-    """The description of a camera for mitsuba.
+    """The description of a pinhole camera with square pixels for mitsuba.
 
     mitsuba looks along +z with +x to the *left* of the picture and +y up: COLMAP's axes with x and y turned over. Its
     principal point offset is in widths (heights) of the picture, and grows as the principal point moves left (up).
-    Raises: ValueError: an orthographic camera, or pixels that are not square.
     """
-    if camera.orthographic or not np.isclose(camera.fx, camera.fy, rtol=1e-9):
-        raise ValueError("synthetic scenes are photographed by pinhole cameras with square pixels")
     pose = np.eye(4)
     pose[:3, :3] = camera.rotation.T * [-1.0, -1.0, 1.0]
     pose[:3, 3] = camera.centre

@@ -15,8 +15,7 @@ from numpy import ndarray as Array
 from scipy import ndimage
 
 from dav_gswt.photos.synthetic import desert, land, meadow, meshes, noise, plants
-from dav_gswt.photos.synthetic.labels import GroundLabels
-from dav_gswt.photos.synthetic.land import PERIOD, FadingRaster, Height, Hills, Land, Light, PlantGroup
+from dav_gswt.photos.synthetic.land import PERIOD, FadingRaster, GroundLabels, Height, Hills, Land, Light, PlantGroup
 from dav_gswt.photos.synthetic.meshes import Mesh
 from dav_gswt.photos.synthetic.noise import smoothstep
 
@@ -95,7 +94,9 @@ def make_land(seed: int, exemplar: float) -> Land:
         meshes.transform_mesh(bushes[k], row[1:4], row[4], row[5]).vertices
         for k, row in zip(which, standing, strict=True)
     ]
-    things += [_cut_off(block, height) for block in blocks]
+    for block in blocks:
+        x, y, z = block.vertices.T.astype(float)
+        things.append(block.vertices[z > height(x, y)])  # what is above the ground
     return Land(
         ground=land.make_ground_mesh(height),
         albedo=albedo,
@@ -276,12 +277,6 @@ def _lay_boulder(rng, single: Float[Array, "3"], height: Height) -> Mesh:
     sunk = size * (low + rng.uniform(0.2, 0.4) * (high - low))
     up = height(np.array([x]), np.array([y]))[0] - sunk
     return meshes.transform_mesh(rock, (x, y, up), size, rng.uniform(0, 2 * np.pi))
-
-
-def _cut_off(block: Mesh, height: Height) -> Float32[Array, "v 3"]:
-    """The vertices above the ground."""
-    x, y, z = block.vertices.T.astype(float)
-    return block.vertices[z > height(x, y)]
 
 
 def _scatter_field(rng, layout: Layout, free: Float[Array, "n n"]) -> list[Float[Array, "_ 3"]]:

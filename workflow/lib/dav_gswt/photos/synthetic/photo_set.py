@@ -15,7 +15,7 @@ from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import ColmapModel, make_lens, model_from_reconstruction, write_colmap_model
 from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
-from dav_gswt.photos.synthetic import labels, mitsuba_scene
+from dav_gswt.photos.synthetic import mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 
 FEATURES = 4096
@@ -23,20 +23,18 @@ NEIGHBOURS = 20  # views that each is matched with, if there are many
 
 
 def render_set(entry: dict, folder: Path) -> None:
-    """Fill a photos/ folder: images/, truth/, sparse/ (exact cameras, triangulated points), ground.json.
+    """Fill a photos/ folder: images/, sparse/ (exact cameras, triangulated points), ground.json.
 
-    truth/ has a map of the ground where a family has labels (`labels`). entry: a synthetic scene of the config. Points
-    come from the start views alone; test views are in the model, but observe nothing.
+    entry: a synthetic scene of the config. Points come from the start views alone; test views are in the model, but
+    observe nothing.
     """
     scene, groups = synthetic.scene_from_config(entry), synthetic.test_views(entry)
     shots = _name_views("view", synthetic.start_views(entry))
     tests = _name_views("test", [camera for cameras in groups.values() for camera in cameras])
-    for part in ("images", "truth", "sparse"):
+    for part in ("images", "sparse"):
         (folder / part).mkdir(parents=True, exist_ok=True)
     for name, camera in progress(shots + tests, "render photos"):
         image_files.write_png(folder / "images" / name, synthetic.render(scene, camera))
-    if (known := synthetic.load_scene(scene).labels) is not None:
-        labels.write_label_map(folder / "truth", labels.draw_label_map(known, scene.frame.exemplar))
     points = triangulate_points(folder / "images", shots, entry["seed"])
     write_colmap_model(add_cameras(points, tests), folder / "sparse")
     named = iter(name for name, _ in tests)

@@ -148,7 +148,10 @@ def make_flower(rng: np.random.Generator, kind: Flower, most: int = 4) -> Mesh:
     low = grow_around(rng, foot, np.radians(rng.uniform(25, 75, len(foot))), (0.15, 0.42), 4, 0.1, droop=0.12)
     parts = [make_rods(stems, 0.012, 0.008, green, rng), make_leaves(rng, stems, 9, green)]
     parts.append(_make_short_grass(rng, low, [0.012, 0.026, 0.022, 0.002], dry=0.05))
-    return merge_meshes([*parts, *_make_heads(rng, stems, kind, 0.8, 0.18)])
+    for stem in stems:  # each has a flower at its end, which faces along it and upwards
+        facing = normalize(path_directions(stem[None])[0, -1] + [0, 0, 0.8] + rng.normal(0, 0.18, 3))
+        parts.append(_make_flower_head(rng, stem[-1], facing, kind))
+    return merge_meshes(parts)
 
 
 def make_swathe(rng: np.random.Generator, plants: list[Mesh], count: int, heights: tuple[float, float]) -> Mesh:
@@ -171,15 +174,6 @@ def make_stand(rng: np.random.Generator, count: int, length: float, width: float
     sweep = 0.16 * long[:, None, None] * (np.linspace(0, 1, 5) ** 2)[None, :, None] * np.array([1.0, 0.0, -0.35])
     paths = grow_paths(rng, root, heading, long, joints=5, bend=0.07, droop=0.12) + sweep
     return _make_grass(rng, paths, width * TAPER, tint, (0.6, 1.5))
-
-
-def _make_heads(rng, stems, kind: Flower, up: float, spread: float) -> list[Mesh]:
-    """A flower at the end of each stem, which faces along it and upwards."""
-    heads = []
-    for stem in stems:
-        facing = normalize(path_directions(stem[None])[0, -1] + [0, 0, up] + rng.normal(0, spread, 3))
-        heads.append(_make_flower_head(rng, stem[-1], facing, kind))
-    return heads
 
 
 def _make_flower_head(rng, centre, facing, kind: Flower) -> Mesh:
@@ -251,12 +245,13 @@ def grow_paths(
 
 
 def grow_around(rng, root, lean, length, joints: int, bend: float, droop: float = -0.05) -> Float[Array, "n joints 3"]:
-    """Paths as of `grow_paths` from roots, evenly spread around the vertical.
+    """Paths as of `grow_paths` from roots, spread around the vertical evenly but for some jitter, in random order.
 
     lean: from the vertical, radians. length: one per path, or the least and the most as a tuple.
     """
-    heading = to_direction(lean, draw_azimuths(rng, len(root)))
-    long = rng.uniform(*length, len(root)) if isinstance(length, tuple) else length
+    n = len(root)
+    heading = to_direction(lean, 2 * np.pi * (rng.permutation(n) + rng.uniform(-0.4, 0.4, n)) / n)
+    long = rng.uniform(*length, n) if isinstance(length, tuple) else length
     return grow_paths(rng, root, heading, long, joints, bend, droop)
 
 
@@ -276,11 +271,6 @@ def path_directions(paths: Float[Array, "n joints 3"]) -> Float[Array, "n pieces
 def to_direction(lean, azimuth) -> Float[Array, "n 3"]:
     """Unit vectors by their angle to the vertical and their azimuth, radians."""
     return np.column_stack([np.sin(lean) * np.cos(azimuth), np.sin(lean) * np.sin(azimuth), np.cos(lean)])
-
-
-def draw_azimuths(rng, n: int) -> Float[Array, "n"]:
-    """n azimuths, evenly spread with some jitter, in random order."""
-    return 2 * np.pi * (rng.permutation(n) + rng.uniform(-0.4, 0.4, n)) / n
 
 
 def make_blades(

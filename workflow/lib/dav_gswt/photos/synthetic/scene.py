@@ -9,18 +9,15 @@ import zlib
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
-from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
 from dav_gswt.photos.synthetic import desert, flowers, grass, meadow, oasis, planet
-from dav_gswt.photos.synthetic.labels import GroundLabels
 
 # each has a function `make_land`
 FAMILIES: dict[str, ModuleType] = {
@@ -33,6 +30,7 @@ FAMILIES: dict[str, ModuleType] = {
 }
 EXEMPLAR = 6.0  # metres: side of the square of ground that is photographed
 RADIUS = 7.0  # metres from the middle of the ground to the cameras
+NEARER = 0.9 * RADIUS  # of test views, so that they are distinct from all other views
 FIELD_OF_VIEW = 55.0  # degrees across the picture's width: 7.3 m of ground from straight above
 RING_ELEVATION = 65.0  # degrees: neighbours of the start ring overlap by most of the exemplar
 LOWEST_ELEVATION = 30.0  # degrees: the lowest candidate and test view, where a scene does not say
@@ -58,18 +56,9 @@ class Scene:
         return SceneFrame("synthetic", "metre", RADIUS, exemplar, extent)
 
 
-def make_scene(family: str, seed: int) -> Scene:
-    """A scene of a family. Raises: InputError: an unknown family or a negative seed."""
-    if family not in FAMILIES:
-        raise InputError(f"there is no synthetic family {family!r}; choose from {', '.join(FAMILIES)}")
-    if seed < 0:
-        raise InputError(f"{family}: seed is {seed!r}; it must be a whole number from 0")
-    return Scene(family, seed)
-
-
 def scene_from_config(entry: dict) -> Scene:
     """The scene of an entry of the config."""
-    return make_scene(entry["family"], entry["seed"])
+    return Scene(entry["family"], entry["seed"])
 
 
 def start_views(entry: dict) -> list[Camera]:
@@ -96,9 +85,10 @@ def test_views(entry: dict) -> dict[str, list[Camera]]:
     """
     size, count = entry["size"], entry.get("walkers", 0)
     all_over = "high" if entry.get("layout") == "cap" else "hemisphere"
-    groups = {all_over: _orbit_cameras(camera_layouts.held_out(entry["test"], _lowest(entry), RADIUS), size)}
+    places = camera_layouts.hemisphere(entry["test"], _lowest(entry), NEARER, turn=70.0)
+    groups = {all_over: _orbit_cameras(places, size)}
     if entry.get("oblique"):
-        around = camera_layouts.ring(entry["oblique"], SIDE_ELEVATION, camera_layouts.NEARER * RADIUS, turn=20.0)
+        around = camera_layouts.ring(entry["oblique"], SIDE_ELEVATION, NEARER, turn=20.0)
         groups["oblique"] = _orbit_cameras(around, size)
     if count:
         heights = [EYE_HEIGHTS[i % len(EYE_HEIGHTS)] for i in range(count)]
@@ -122,34 +112,24 @@ def _orbit_cameras(places: list[camera_layouts.Place], size: int) -> list[Camera
     return [camera_layouts.orbit(*place, MIDDLE, size, size, FIELD_OF_VIEW) for place in places]
 
 
-class LoadedScene(NamedTuple):
-    """A mitsuba scene, and the true materials and objects of its ground where its family has them."""
-
-    world: Any
-    labels: GroundLabels | None
-
-
 @lru_cache(maxsize=1)
-def load_scene(scene: Scene) -> LoadedScene:
+def load_scene(scene: Scene):
     """The mitsuba scene, built once for all its pictures."""
     from dav_gswt.photos.synthetic import mitsuba_scene  # deferred: what only poses cameras renders nothing
 
-    made = FAMILIES[scene.family].make_land(scene.seed, EXEMPLAR)
-    return LoadedScene(mitsuba_scene.build_scene(made), made.labels)
+    return mitsuba_scene.build_scene(FAMILIES[scene.family].make_land(scene.seed, EXEMPLAR))
 
 
-def render(scene: Scene, camera: Camera, samples: int = SAMPLES, again: int = 0) -> Float32[Array, "h w 3"]:
-    """A photo: sRGB-encoded, in [0, 1].
+def render(scene: Scene, camera: Camera, samples: int = SAMPLES) -> Float32[Array, "h w 3"]:
+    """A photo by a pinhole with square pixels: sRGB-encoded, in [0, 1].
 
-    Args:   samples: rays a pixel; taken up to the next number that a grid of strata can hold. again: which of several
-            photos from one place, each with noise of its own.
-    Raises: ValueError: a camera that is not a pinhole with square pixels.
+    samples: rays a pixel; taken up to the next number that a grid of strata can hold.
     """
     from dav_gswt.photos.synthetic import mitsuba_scene
 
     place = np.round(np.concatenate([camera.centre, camera.forward]), 6) + 0.0  # + 0.0: no negative zeros
-    seed = zlib.crc32(place.astype("<f8").tobytes(), (scene.seed + again * 0x9E3779B1) & 0xFFFFFFFF)
-    return encode_srgb(mitsuba_scene.render_light(load_scene(scene).world, camera, samples, seed))
+    seed = zlib.crc32(place.astype("<f8").tobytes(), scene.seed & 0xFFFFFFFF)
+    return encode_srgb(mitsuba_scene.render_light(load_scene(scene), camera, samples, seed))
 
 
 def encode_srgb(light: Float[Array, "*shape"]) -> Float[Array, "*shape"]:

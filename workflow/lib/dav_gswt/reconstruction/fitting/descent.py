@@ -94,7 +94,8 @@ class Descent:
         gain, offset = run.exposures.gain_and_offset(index)
         exposed = channels.scale_channels(image, gain, offset)
         if task.collects_errors(run.step):
-            squared = channels.mean_squares(exposed - view.image) * view.weight
+            apart = exposed - view.image
+            squared = channels.sum_products(apart, apart) / 3 * view.weight
             run.add_errors(task.raster.contributions(squared[..., None]).mapped[:, 0])
         _, gradient = raster.loss(exposed, view.image, view.weight, STRUCTURE)
         gradient = channels.scale_channels(gradient, gain)

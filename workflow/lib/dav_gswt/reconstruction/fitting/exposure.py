@@ -154,7 +154,7 @@ def update_gain_and_offset(
     counts = weight > 0
     if not counts.any():
         return before
-    apart = channels.largest_difference(channels.scale_channels(picture, *before), image)
+    apart = np.abs(channels.scale_channels(picture, *before) - image).max(axis=2)
     agrees = counts & (apart <= TRIM * np.median(apart[counts]))
     w = weight[agrees][:, None].astype(float)
     u, v, total = picture[agrees].astype(float), image[agrees].astype(float), float(w.sum()) + 1e-9

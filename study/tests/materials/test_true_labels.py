@@ -1,15 +1,12 @@
-"""The map of true materials and objects: what it shows of known ground, and that files keep it."""
-
-import json
+"""The map of true materials and objects: what it shows of known ground."""
 
 import numpy as np
 import pytest
 
-from dav_gswt.errors import InputError
-from dav_gswt.geometry.scene_frame import Extent, Square
-from dav_gswt.images import image_files
-from dav_gswt.photos.synthetic import desert, labels, meshes
-from dav_gswt.photos.synthetic.labels import GroundLabels
+from dav_gswt.geometry.scene_frame import Square
+from dav_gswt.photos.synthetic import desert, meshes
+from dav_gswt.photos.synthetic.land import GroundLabels
+from dav_gswt_study.materials import true_labels
 
 SQUARE = Square(-2.0, -1.0, 4.0)  # x from -2 to 2, y from -1 to 3
 
@@ -31,46 +28,30 @@ def known():
 
 
 def test_rows_of_the_map_run_to_the_north_and_the_material_repeats(known):
-    found = labels.draw_label_map(known, SQUARE, 80)
+    found = true_labels.draw_label_map(known, SQUARE, 80)
     assert (found.material[:20] == 1).all() and (found.material[20:] == 2).all()
     row, column = np.argwhere(found.object == 1).mean(axis=0)
     assert (column, row) == pytest.approx(((1.0 + 2.0) * 20 - 0.5, (2.0 + 1.0) * 20 - 0.5), abs=0.3)
-    far = labels.draw_label_map(known, Square(-2.0, -9.0, 12.0), 120)
+    far = true_labels.draw_label_map(known, Square(-2.0, -9.0, 12.0), 120)
     assert far.material[:, 7].tolist() == 10 * [2 - 1] + 40 * [2] + 40 * [1] + 30 * [2]
 
 
 def test_the_footprint_of_an_object_is_its_outline_from_above_cut_at_the_border(known):
-    found = labels.draw_label_map(known, SQUARE, 200)
+    found = true_labels.draw_label_map(known, SQUARE, 200)
     assert found.object.max() == 2  # not the far one
     cell = SQUARE.side / 200
     for number, radius in ((1, 0.5), (2, 0.25)):
         area = (found.object == number).sum() * cell**2
         assert area == pytest.approx(np.pi * radius**2, rel=0.12)  # half a cell around
     known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 8.0, (ball(2.0, 0.0, 0.5),))
-    found = labels.draw_label_map(known, SQUARE, 200)
+    found = true_labels.draw_label_map(known, SQUARE, 200)
     assert (found.object == 1).sum() * 0.02**2 == pytest.approx(np.pi * 0.5**2 / 2, rel=0.12)
 
 
 def test_twigs_with_gaps_between_them_are_one_footprint():
     twigs = np.array([[x, y, 0.1] for x in np.arange(-0.3, 0.31, 0.05) for y in np.arange(-0.3, 0.31, 0.05)])
     far_leaf = [[0.8, 0.8, 0.1]]
-    covered = labels.rasterize_footprint(np.vstack([twigs, far_leaf]).astype(np.float32), Square(-1.0, -1.0, 2.0), 200)
+    covered = true_labels.rasterize_footprint(
+        np.vstack([twigs, far_leaf]).astype(np.float32), Square(-1.0, -1.0, 2.0), 200
+    )
     assert covered.sum() * 0.01**2 == pytest.approx(0.6**2, rel=0.1)
-
-
-def test_files_keep_a_map_whose_first_row_is_the_northern_one(known, tmp_path):
-    made = labels.draw_label_map(known, SQUARE, 40)
-    labels.write_label_map(tmp_path, made)
-    found = labels.read_label_map(tmp_path)
-    assert (found.material == made.material).all() and (found.object == made.object).all()
-    assert (found.extent, found.materials) == (made.extent, made.materials)
-    channels, header = image_files.read_exr(tmp_path / labels.MAP)
-    assert set(channels) == {"material", "object"}
-    assert channels["material"][0, 0] == 2 and channels["material"][-1, 0] == 1
-    assert Extent(**json.loads(header["extent"])) == Extent(-2.0, -1.0, 2.0, 3.0)
-
-
-def test_a_file_of_another_kind_is_refused(tmp_path):
-    image_files.write_exr(tmp_path / labels.MAP, {"material": np.ones((4, 4), np.float32)})
-    with pytest.raises(InputError, match="not a map of labels.*object"):
-        labels.read_label_map(tmp_path)

@@ -1,32 +1,13 @@
 """Read, write and merge CSV tables.
 
-A table is a list of rows, a row a dict from column to value. Files keep one format: floats with five significant
-digits, an empty field for a value that is not known, lines that end in a newline.
+A table is a list of rows, a row a dict from column to value. Files keep the format of `write_table`.
 """
 
 import csv
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from pathlib import Path
 
-from dav_gswt.files import atomic_file
-
-
-def write_table(path: Path | str, rows: Iterable[dict]) -> None:
-    """Write rows under the columns of the first one; no rows give an empty file.
-
-    Raises: ValueError: a row has a column that the first one lacks.
-    """
-    rows = list(rows)
-    with atomic_file(path) as part:
-        if not rows:
-            part.touch()
-            return
-        columns = list(rows[0])
-        if extra := {name for row in rows for name in row} - set(columns):
-            raise ValueError(f"{path}: the first row has no column {', '.join(sorted(extra))}")
-        with part.open("w", encoding="utf-8", newline="") as text:
-            writer = csv.writer(text, lineterminator="\n")
-            writer.writerows([columns, *([_format(row.get(name)) for name in columns] for row in rows)])
+from dav_gswt.files import write_table
 
 
 def read_table(
@@ -67,12 +48,6 @@ def merge_rows(before: list[dict], new: list[dict], key: Collection[str]) -> lis
 def update_table(path: Path | str, rows: list[dict], key: Collection[str]) -> None:
     """Add rows to a table that grows from run to run; rows with the same key are replaced."""
     write_table(path, merge_rows(read_table(path, missing_ok=True), rows, key))
-
-
-def _format(value: object) -> str:
-    if value is None:
-        return ""
-    return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
 def _parse(text: str, kind: type | None) -> str | float | int | None:

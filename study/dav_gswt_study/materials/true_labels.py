@@ -1,39 +1,18 @@
-"""The true materials and objects of synthetic ground, and their map from above, which evaluations read.
+"""The true materials and objects of synthetic ground, as a map from above."""
 
-The map is truth/ground_labels.exr, with the channels material and object; its header says what their numbers mean. The
-product does not read it.
-"""
-
-import json
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float32, Int
 from numpy import ndarray as Array
 from scipy import ndimage
 
-from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.geometry.scene_frame import Extent, Square
-from dav_gswt.images import image_files
+from dav_gswt.photos.synthetic import scene as synthetic
+from dav_gswt.photos.synthetic.land import GroundLabels
 
-MAP = "ground_labels.exr"
 CELLS = 600  # of the map along a side of the exemplar: 1 cm each
 GAP = 3  # cells: gaps between twigs and leaves up to twice as wide belong to a footprint
-
-
-@dataclass(frozen=True)
-class GroundLabels:
-    """What a piece of land consists of.
-
-    materials: numbers by name, from 1. material: the number at every place, over a square that repeats after `period`
-    metres (as in `noise`). objects: of each single thing, shrub or boulder, the vertices of its mesh above the ground.
-    """
-
-    materials: dict[str, int]
-    material: Int[Array, "n n"]
-    period: float
-    objects: tuple[Float32[Array, "_ 3"], ...]
 
 
 @dataclass(frozen=True)
@@ -47,6 +26,14 @@ class LabelMap:
     object: Int[Array, "rows columns"]
     extent: Extent
     materials: dict[str, int]
+
+
+def draw_scene_labels(scene: synthetic.Scene) -> LabelMap:
+    """The map of a scene's exemplar. Raises: ValueError: its family has no labels."""
+    labels = synthetic.FAMILIES[scene.family].make_land(scene.seed, synthetic.EXEMPLAR).labels
+    if labels is None:
+        raise ValueError(f"the ground of the family {scene.family} has no labels")
+    return draw_label_map(labels, scene.frame.exemplar)
 
 
 def draw_label_map(labels: GroundLabels, square: Square, cells: int = CELLS) -> LabelMap:
@@ -76,25 +63,3 @@ def rasterize_footprint(vertices: Float32[Array, "v 3"], square: Square, cells: 
     if count > 1:
         whole = pieces == 1 + np.argmax(np.bincount(pieces.ravel())[1:])
     return whole[edge:-edge, edge:-edge]
-
-
-def write_label_map(folder: Path | str, labels: LabelMap) -> None:
-    """Write a map. On disk the first row is the northern one, as in any image of a map."""
-    channels = {"material": labels.material[::-1], "object": labels.object[::-1]}
-    names = {key: json.dumps(asdict(labels)[key]) for key in ("extent", "materials")}
-    image_files.write_exr(Path(folder) / MAP, {k: v.astype(np.float32) for k, v in channels.items()}, names)
-
-
-def read_label_map(folder: Path | str) -> LabelMap:
-    """Read the map of a photo set from its truth/ folder.
-
-    Raises: InputError: there is none, as for families without labels, or the file is of another kind.
-    """
-    path = Path(folder) / MAP
-    channels, header = image_files.read_exr(path)
-    try:
-        material, objects = (np.rint(channels[name][::-1]).astype(int) for name in ("material", "object"))
-        extent, materials = (json.loads(header[key]) for key in ("extent", "materials"))
-        return LabelMap(material, objects, Extent(**extent), materials)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: not a map of labels ({summarize_error(error)}); make the photos again") from error

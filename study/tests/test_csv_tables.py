@@ -1,26 +1,21 @@
 import pytest
 
-from dav_gswt import csv_tables
+from dav_gswt_study import csv_tables
 
 
-def test_a_table_holds_five_digits_and_gives_back_numbers_texts_and_missing_values(tmp_path):
+def test_a_table_gives_back_numbers_texts_and_missing_values(tmp_path):
     rows = [{"seconds": 1.5, "step": 25, "psnr": 30.125}, {"seconds": 2.5, "step": 50, "psnr": None}]
     csv_tables.write_table(tmp_path / "a.csv", rows)
     assert csv_tables.read_table(tmp_path / "a.csv", numbers=["seconds", "psnr"], integers=["step"]) == rows
-    csv_tables.write_table(tmp_path / "a.csv", [{"a": 1 / 3, "b": 123456, "c": None, "d": True, "e": "x, y"}])
-    assert (tmp_path / "a.csv").read_bytes() == b'a,b,c,d,e\n0.33333,123456,,True,"x, y"\n'
     csv_tables.write_table(tmp_path / "a.csv", [{"name": "none", "value": 2, "other": None}])
     assert csv_tables.read_table(tmp_path / "a.csv", texts=["name"]) == [{"name": "none", "value": 2.0, "other": None}]
 
 
-def test_a_table_without_rows_is_an_empty_file(tmp_path):
+def test_a_file_without_rows_is_read(tmp_path):
     csv_tables.write_table(tmp_path / "a.csv", [])
-    assert (tmp_path / "a.csv").read_bytes() == b""
     assert csv_tables.read_table(tmp_path / "a.csv") == csv_tables.read_table(tmp_path / "b.csv", missing_ok=True) == []
     with pytest.raises(FileNotFoundError):
         csv_tables.read_table(tmp_path / "b.csv")
-    with pytest.raises(ValueError, match="no column b"):
-        csv_tables.write_table(tmp_path / "a.csv", [{"a": 1}, {"a": 1, "b": 2}])
 
 
 def test_update_table_adds_rows_and_replaces_those_with_the_same_key(tmp_path):
