@@ -125,12 +125,12 @@ def triangulate_model(model: ColmapModel, names: Sequence[str]) -> ColmapModel:
         raise InputError(f"{unknown[0]}: no such image in the model; it may not have been registered")
     part = _with_images(model, [i for i, name in enumerate(model.names) if name in set(names)])
     part = replace(part, colours=np.full(model.points.shape, 0.5, np.float32))
-    part = _with_points(part, np.bincount(part.point_of, minlength=len(part.points)) >= 2)
+    part = select_points(part, np.bincount(part.point_of, minlength=len(part.points)) >= 2)
     points, spread = intersect_rays(part)
     part = replace(part, points=points)
     good = spread >= 1 - np.cos(np.radians(LEAST_ANGLE))
     np.logical_and.at(good, part.point_of, reprojection_errors(part) <= WORST_ERROR)
-    return _with_points(part, good)
+    return select_points(part, good)
 
 
 def intersect_rays(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:
@@ -174,7 +174,7 @@ def _with_images(model: ColmapModel, kept: list[int]) -> ColmapModel:
     )
 
 
-def _with_points(model: ColmapModel, kept: Bool[Array, "n"]) -> ColmapModel:
+def select_points(model: ColmapModel, kept: Bool[Array, "n"]) -> ColmapModel:
     """The model of some of its points; all images stay."""
     own = kept[model.point_of]
     return replace(

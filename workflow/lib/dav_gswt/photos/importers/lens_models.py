@@ -2,10 +2,9 @@
 
 import numpy as np
 import pycolmap
-from jaxtyping import Float
-from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 
 FOCAL = (0.01, 1000.0)  # in longer sides: beyond, the number is in another unit
@@ -82,53 +81,29 @@ def fit_camera_to_photo(
     )
 
 
-def undistort_camera(camera: pycolmap.Camera, side: int, where: str) -> tuple[pycolmap.Camera, pycolmap.Camera]:
-    """The lens at the size of the picture, at most `side` pixels long, and the pinhole camera that replaces it.
+def require_invertible(lens: pycolmap.Camera, pinhole: Camera, where: str) -> None:
+    """Raises: InputError: the distortion of a lens folds over within the picture of its pinhole camera.
 
-    Raises: InputError: the distortion folds over within the picture, so that it cannot be undone.
+    What the pinhole sees must lie in the photo, and the way back must lead to the same ray.
     """
-    small = shrink_camera(camera, side)
-    limits = pycolmap.UndistortCameraOptions(blank_pixels=0, max_image_size=side)
-    found = pycolmap.undistort_camera(limits, small)
-    if not _is_invertible(small, found):
-        raise InputError(
-            f"{where}: the distortion of its camera cannot be undone over the whole picture (parameters "
-            f"{camera.params_info}: {camera.params_to_string()}); check them, or calibrate again with fewer terms"
-        )
-    return small, found
-
-
-def shrink_camera(camera: pycolmap.Camera, side: int) -> pycolmap.Camera:
-    """The lens of the picture shrunk to at most `side` pixels; pictures are never enlarged."""
-    return _scale_camera(camera, *image_files.fit_size(camera.width, camera.height, side))
-
-
-def unproject_pixels(camera: pycolmap.Camera, pixels: Float[Array, "m 2"]) -> Float[Array, "m 2"]:
-    """Where rays cross depth 1; NaN where the lens has no such ray (the library then gives anything)."""
-    found = np.array(camera.cam_from_img(np.ascontiguousarray(pixels)), float).reshape(-1, 2)
-    back = np.asarray(camera.img_from_cam(np.c_[found, np.ones(len(found))])).reshape(-1, 2)
-    with np.errstate(invalid="ignore"):
-        found[~(np.abs(back - pixels).max(1, initial=0.0) < 0.01)] = np.nan
-    return found
+    params = [pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy]
+    if np.isfinite(params).all() and min(params[:2]) > 0:
+        x, y = np.meshgrid(np.linspace(0, pinhole.width, 17), np.linspace(0, pinhole.height, 17))
+        rays = np.stack([(x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy], -1).reshape(-1, 2)
+        seen = np.asarray(lens.img_from_cam(np.c_[rays, np.ones(len(rays))]))
+        back = np.asarray(lens.cam_from_img(np.ascontiguousarray(seen)))
+        inside = (seen >= -STRAY) & (seen <= np.array([lens.width, lens.height]) + STRAY)
+        if inside.all() and (np.abs(back - rays).max(1) * max(params[:2]) < 1).all():
+            return
+    raise InputError(
+        f"{where}: the distortion of its camera cannot be undone over the whole picture (parameters "
+        f"{lens.params_info}: {lens.params_to_string()}); check them, or calibrate again with fewer terms"
+    )
 
 
 def camera_key(camera: pycolmap.Camera) -> tuple:
     """What two equal lenses have in common."""
     return camera.model_name, camera.width, camera.height, *camera.params.tolist()
-
-
-def _is_invertible(small: pycolmap.Camera, found: pycolmap.Camera) -> bool:
-    """Whether what the pinhole sees lies in the photo, and the way back leads to the same ray."""
-    if not np.isfinite(found.params).all() or min(found.params[:2]) <= 0:
-        return False
-    x, y = np.meshgrid(np.linspace(0, found.width, 17), np.linspace(0, found.height, 17))
-    (fx, fy, cx, cy), size = found.params, np.array([small.width, small.height])
-    at = np.stack([(x - cx) / fx, (y - cy) / fy], -1).reshape(-1, 2)
-    seen = np.asarray(small.img_from_cam(np.c_[at, np.ones(len(at))]))
-    if not ((seen >= -STRAY) & (seen <= size + STRAY)).all():
-        return False
-    back = np.asarray(small.cam_from_img(np.ascontiguousarray(seen)))
-    return bool((np.abs(back - at).max(1) * max(fx, fy) < 1).all())
 
 
 def _same_shape(camera: pycolmap.Camera, size: tuple[int, int]) -> bool:
