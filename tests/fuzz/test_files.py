@@ -120,7 +120,7 @@ def read_model(path: Path):
 def is_model(model) -> bool:
     for shot in model.images:
         right = ".." not in shot.name.split("/") and np.abs(shot.rotation @ shot.rotation.T - np.eye(3)).max() < 1e-6
-        if not right or not (shot.lens is None or shot.lens.width * shot.lens.height <= 2e8):
+        if not right or shot.lens.width * shot.lens.height > 2e8:
             return False
     return True
 

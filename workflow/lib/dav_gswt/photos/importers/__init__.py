@@ -51,7 +51,7 @@ def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> R
     for name, reason in left_out:
         _log.warning("%s is left out: %s", name, reason)
     known, sources = _place_photos(placed, given.points), {place.key: place.path for place in placed}
-    if not given.points:
+    if not known.num_points3D():
         known = triangulate_features(known, sources, options)
     model, lenses = replace_lenses(known, {p.key: (p.lens.width, p.lens.height) for p in placed}, options.side)
     for name, camera, lens in zip(model.names, model.cameras, lenses, strict=True):
@@ -95,7 +95,7 @@ def _read_model(path: Path, photos: PhotoFolder) -> ImportedModel:
     )
 
 
-def _place_photos(placed: list[MatchedPhoto], points: pycolmap.Reconstruction | None) -> pycolmap.Reconstruction:
+def _place_photos(placed: list[MatchedPhoto], points: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     """The photos in the model's world, numbered from 1 on, with the points that they see."""
     known, numbers, tracks = pycolmap.Reconstruction(), {}, defaultdict(list)
     for i, place in enumerate(placed, 1):
@@ -104,7 +104,8 @@ def _place_photos(placed: list[MatchedPhoto], points: pycolmap.Reconstruction | 
             numbers[key] = lens.camera_id
             known.add_camera_with_trivial_rig(lens)
         turn, given = np.linalg.matrix_power(QUARTER, place.turns), place.image
-        seen = points.images[given.number].get_observation_points2D() if points else []
+        all_seen = points.images[given.number].get_observation_points2D() if points.num_points3D() else []
+        seen = [p for p in all_seen if p.point3D_id in points.points3D]
         # through rays: a photo may be a scaled copy of the model's picture, or turned by EXIF
         rays = given.lens.cam_from_img(np.array([p.xy for p in seen]).reshape(-1, 2))
         pixels = place.lens.img_from_cam(np.c_[rays, np.ones(len(seen))] @ turn.T)
@@ -114,9 +115,8 @@ def _place_photos(placed: list[MatchedPhoto], points: pycolmap.Reconstruction | 
         pose = turn @ np.c_[given.rotation, given.translation]
         known.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pose))
     for number, elements in sorted(tracks.items()):
-        if number in points.points3D:
-            point = points.points3D[number]
-            known.add_point3D(point.xyz, pycolmap.Track(elements), point.color)
+        point = points.points3D[number]
+        known.add_point3D(point.xyz, pycolmap.Track(elements), point.color)
     return known
 
 

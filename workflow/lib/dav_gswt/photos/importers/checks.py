@@ -5,7 +5,7 @@ name the file, and the key or image within it.
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
@@ -34,11 +34,11 @@ class ImportedImage:
     right, y down).
 
     name: relative to the photos' folder, with slashes. lens: at the size that the model gives, of the picture as it is
-    stored; None where no size is known because there is no such photo. number: of the image among the model's points.
+    stored. number: of the image among the model's points.
     """
 
     name: str
-    lens: pycolmap.Camera | None
+    lens: pycolmap.Camera
     rotation: Float[Array, "3 3"]
     translation: Float[Array, "3"]
     number: int = 0
@@ -52,7 +52,7 @@ class ImportedModel:
     """
 
     images: tuple[ImportedImage, ...]
-    points: pycolmap.Reconstruction | None = None
+    points: pycolmap.Reconstruction = field(default_factory=pycolmap.Reconstruction)
     about: Georeference | None = None
 
 

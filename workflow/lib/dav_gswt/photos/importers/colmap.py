@@ -48,7 +48,7 @@ def import_colmap(folder: Path, photos: Path) -> ImportedModel:
         name = checks.check_image_name(image.name, photos, str(files["images"]))
         pose = checks.check_pose(image.cam_from_world().matrix(), f"{files['images']}: image {name}")
         images.append(ImportedImage(name, cameras[image.camera_id], *pose, number))
-    return ImportedModel(tuple(images), stored if stored.num_points3D() else None)
+    return ImportedModel(tuple(images), stored)
 
 
 def _read_reconstruction(files: dict[str, Path]) -> pycolmap.Reconstruction:

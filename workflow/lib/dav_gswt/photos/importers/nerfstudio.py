@@ -84,11 +84,12 @@ def import_nerfstudio(
         turn = turn * OPENGL
         said = _read_intrinsics(values, part, where)
         if said.w is None or said.h is None:
-            size = size_of(name)
-            said = replace(said, w=float(size[0]), h=float(size[1])) if size else None
-        if said and said not in lens_of:
+            if not (size := size_of(name)):
+                continue  # there is no such photo
+            said = replace(said, w=float(size[0]), h=float(size[1]))
+        if said not in lens_of:
             lens_of[said] = _make_lens(said, where)
-        images.append(ImportedImage(name, lens_of.get(said), turn.T, -turn.T @ centre))
+        images.append(ImportedImage(name, lens_of[said], turn.T, -turn.T @ centre))
     return ImportedModel(tuple(images))
 
 

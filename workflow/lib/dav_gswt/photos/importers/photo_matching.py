@@ -85,7 +85,6 @@ def match_photos_to_images(
     for name, key in zip(names, name_pictures(names), strict=True):
         image, path = owners[name], folder.photos[name]
         width, height, orientation = image_files.read_stored_size(path)
-        assert image.lens is not None  # its photo is there, so its size is known
         lens, turns = fit_camera_to_photo(image.lens, (width, height), orientation, f"{source}: {image.name}")
         out.append(MatchedPhoto(path, key, image, lens, turns))
     return sorted(out, key=lambda p: p.key), tuple(left_out)
