@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float
 from matplotlib import colormaps
-from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Rectangle
 from numpy import ndarray as Array
 
@@ -40,12 +39,10 @@ WORST_ERROR = 2.0  # pixels: a photo's mean error, above which its place is doub
 WORST_MEAN = 1.0  # pixels: the set's mean error, likewise
 LEAST_SIDE = 0.5  # flying heights: side of an exemplar with room for tiles that differ
 TOO_FEW = 0.02  # share of the exemplar that may be seen by fewer photos than are needed
-NAMES = ("upper", "upper right", "right", "lower right", "lower", "lower left", "left", "upper left")
 DOWN = 5.0  # degrees off straight down, within which a camera has no arrow
 THUMBNAIL = 200  # pixels of the longer side
 MASKED = np.array([0.85, 0.1, 0.5], np.float32)
 FEW, MARK = "#b3471f", "#d55e00"  # colours of ground that too few photos see, and of photos that are weakly placed
-MOST_COLOURS = 6
 
 
 @dataclass(frozen=True)
@@ -112,35 +109,23 @@ def collect_facts(folder: Path | str) -> ReportFacts:
     return ReportFacts(frame, model, _assess_photos(model, off, tests), need, cover, error)
 
 
-def _assess_photos(model: ColmapModel, off: Array, tests: set[str]) -> tuple[PhotoFacts, ...]:
-    """Each photo of the model, and what is weak about it. off: reprojection errors of the observations."""
+def _assess_photos(model: ColmapModel, off: Float[Array, "m"], tests: set[str]) -> tuple[PhotoFacts, ...]:
+    """Each photo of the model, and what is weak about it, in words. off: reprojection errors of the observations."""
     shared = count_shared_points(model)
     points = np.diag(shared).copy()
     np.fill_diagonal(shared, 0)
     usual = float(np.median([n for n, name in zip(points, model.names, strict=True) if name not in tests] or [0]))
     found = []
     for i, name in enumerate(model.names):
-        own = off[model.image_of == i]
-        error = float(own.mean()) if len(own) else 0.0
-        weak = () if name in tests else find_weaknesses(int(points[i]), error, int(shared[i].max()), usual)
-        found.append(PhotoFacts(name, name in tests, weak))
+        own, said = off[model.image_of == i], []
+        if points[i] < max(LEAST_POINTS, LEAST_SHARE * usual):
+            said.append(f"sees only {points[i]} points; the median is {usual:.0f}")
+        if len(own) and not own.mean() <= WORST_ERROR:
+            said.append(f"its points are {own.mean():.1f} px off on average")
+        if shared[i].max() < view_split.LINK:
+            said.append(f"shares at most {shared[i].max()} points with any other photo")
+        found.append(PhotoFacts(name, name in tests, () if name in tests else tuple(said)))
     return tuple(found)
-
-
-def find_weaknesses(points: int, error: float, shared: int, usual: float) -> tuple[str, ...]:
-    """What is weak about a photo, in words.
-
-    points: how many it sees; `usual` is the median over the set. error: their mean distance from
-    where they should be, pixels. shared: points in common with the photo that shares most.
-    """
-    said = []
-    if points < max(LEAST_POINTS, LEAST_SHARE * usual):
-        said.append(f"sees only {points} points; the median is {usual:.0f}")
-    if not error <= WORST_ERROR:
-        said.append(f"its points are {error:.1f} px off on average")
-    if shared < view_split.LINK:
-        said.append(f"shares at most {shared} points with any other photo")
-    return tuple(said)
 
 
 def _summarize(found: ReportFacts) -> str:
@@ -164,7 +149,11 @@ def list_advice(found: ReportFacts) -> list[str]:
             f"{len(frame.left_out)} of {frame.images} photos were left out for the reasons below. Photos taken between "
             "them and the others can help."
         )
-    said += _advise_on_coverage(found)
+    if (share := measure_sparse_share(found)) > TOO_FEW:
+        said.append(
+            f"{100 * share:.0f} % of the exemplar is seen by fewer than {found.need} photos (brown on the map). Take more "
+            "photos of it."
+        )
     if weak := [photo.name for photo in found.photos if photo.weak]:
         names = ", ".join(weak[:5]) + (f" and {len(weak) - 5} more" if len(weak) > 5 else "")
         said.append(f"Weakly placed photos: {names}. If the field looks blurred there, leave them out.")
@@ -185,32 +174,14 @@ def list_advice(found: ReportFacts) -> list[str]:
     return said
 
 
-def _advise_on_coverage(found: ReportFacts) -> list[str]:
-    """Parts of the exemplar that few photos see."""
-    counts, said = crop_to_exemplar(found), []
-    if min(counts.shape) < 3:
-        return ["The exemplar is too small on the map to say how often its parts are seen. Photograph more ground."]
-    for i, band in enumerate(np.array_split(counts, 3, axis=0)):
-        for j, part in enumerate(np.array_split(band, 3, axis=1)):
-            if (typical := int(np.median(part))) <= found.need:
-                place = "middle" if i == j == 1 else NAMES[round(np.degrees(np.arctan2(j - 1, i - 1)) / 45) % 8]
-                said.append(f"{place} ({typical})")
-    if said:
-        return [f"Photograph these parts of the exemplar again, which few photos see: {', '.join(said)}."]
-    if (short := float((counts < found.need).mean())) > TOO_FEW:
-        return [
-            f"{100 * short:.0f} % of the exemplar is seen by fewer than {found.need} photos. Take more photos of it."
-        ]
-    return []
-
-
-def crop_to_exemplar(found: ReportFacts) -> Int[Array, "rows columns"]:
-    """How many photos see each cell of the exemplar."""
+def measure_sparse_share(found: ReportFacts) -> float:
+    """The share of the exemplar that fewer photos see than are needed."""
     square, cover = found.frame.exemplar, found.cover
     rows, columns = cover.counts.shape
     y = cover.south + (np.arange(rows) + 0.5) * cover.cell
     x = cover.west + (np.arange(columns) + 0.5) * cover.cell
-    return cover.counts[np.ix_((y > square.south) & (y < square.north), (x > square.west) & (x < square.east))]
+    counts = cover.counts[np.ix_((y > square.south) & (y < square.north), (x > square.west) & (x < square.east))]
+    return float((counts < found.need).mean()) if counts.size else 1.0
 
 
 def _list_facts(found: ReportFacts) -> list[tuple[str, str]]:
@@ -237,13 +208,12 @@ def draw_map(found: ReportFacts) -> str:
     axes = figure.subplots()
     rows, columns = cover.counts.shape
     box = (cover.west, cover.west + columns * cover.cell, cover.south, cover.south + rows * cover.cell)
-    most = max(int(cover.counts.max()), found.need)
-    bounds = np.unique(np.linspace(found.need, most + 1, MOST_COLOURS + 1).astype(int))
-    colours = [FEW, *colormaps["viridis"](np.linspace(0.25, 1, len(bounds) - 1))]
-    norm = BoundaryNorm([1, *bounds], len(colours))  # at least two photos are needed
-    counts = np.ma.masked_equal(cover.counts, 0)
-    shown = axes.imshow(counts, ListedColormap(colours), norm, extent=box, origin="lower", interpolation="nearest")
-    figure.colorbar(shown, label=f"photos that see a place (at least {found.need} are needed)", shrink=0.7)
+    counts, colours = np.ma.masked_equal(cover.counts, 0), colormaps["viridis"].with_extremes(under=FEW)
+    limits = {"vmin": found.need, "vmax": max(int(cover.counts.max()), found.need + 1)}
+    shown = axes.imshow(counts, colours, **limits, extent=box, origin="lower", interpolation="nearest")
+    figure.colorbar(
+        shown, label=f"photos that see a place (at least {found.need} are needed)", shrink=0.7, extend="min"
+    )
     square = frame.exemplar
     side = Rectangle((square.west, square.south), square.side, square.side, fill=False, ls="--", lw=1.5, ec="k")
     axes.add_patch(side)
