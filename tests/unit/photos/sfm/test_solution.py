@@ -43,7 +43,7 @@ def solutions(monkeypatch):
             return SfmSolution(Placed(placed[len(asked) - 1]), (), focal, verdicts[len(asked) - 1], unsure)
 
         monkeypatch.setattr(mapping, "_solve", solve)
-        scene = SfmScene("folder", [], {1: 300.0}, None, Path("database.db"))
+        scene = SfmScene("folder", [], {1: 300.0}, {}, Path("database.db"))
         return mapping.find_solution(scene, 0), asked
 
     return give

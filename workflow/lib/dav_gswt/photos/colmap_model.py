@@ -46,32 +46,30 @@ def silence_pycolmap() -> None:
     pycolmap.logging.minloglevel = 2
 
 
-def bundle_adjust(stored: pycolmap.Reconstruction, refine_focal_length: bool) -> None:
-    """Bundle adjustment in one thread, in place; the world's frame is held by two cameras."""
-    options, config = _adjustment(stored, refine_focal_length, lenses=True)
-    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    pycolmap.create_default_bundle_adjuster(options, config, stored).solve()
+def bundle_adjust(
+    stored: pycolmap.Reconstruction, refine_focal_length: bool = False, priors: Sequence[pycolmap.PosePrior] = ()
+) -> None:
+    """Bundle adjustment in one thread, in place.
 
-
-def bundle_adjust_with_priors(stored: pycolmap.Reconstruction, priors: list[pycolmap.PosePrior]) -> None:
-    """Bundle adjustment with positions of cameras, their outliers held back, in one thread, in place; lenses stay."""
-    options, config = _adjustment(stored, refine_focal_length=False, lenses=False)
-    robust = pycolmap.PosePriorBundleAdjustmentOptions()
-    robust.ceres.prior_position_loss_function_type = pycolmap.LossFunctionType.CAUCHY
-    robust.alignment_ransac.random_seed = 0
-    pycolmap.create_pose_prior_bundle_adjuster(options, robust, config, priors, stored).solve()
-
-
-def _adjustment(stored: pycolmap.Reconstruction, refine_focal_length: bool, lenses: bool):
+    With `priors`, positions of cameras, whose outliers are held back, lenses stay; without, two cameras hold the
+    world's frame.
+    """
     silence_pycolmap()
     options = pycolmap.BundleAdjustmentOptions(
-        refine_focal_length=refine_focal_length, refine_extra_params=lenses, print_summary=False
+        refine_focal_length=refine_focal_length, refine_extra_params=not priors, print_summary=False
     )
     options.ceres.solver_options.num_threads = 1
     config = pycolmap.BundleAdjustmentConfig()
     for number in stored.reg_image_ids():
         config.add_image(number)
-    return options, config
+    if priors:
+        robust = pycolmap.PosePriorBundleAdjustmentOptions()
+        robust.ceres.prior_position_loss_function_type = pycolmap.LossFunctionType.CAUCHY
+        robust.alignment_ransac.random_seed = 0
+        pycolmap.create_pose_prior_bundle_adjuster(options, robust, config, list(priors), stored).solve()
+    else:
+        config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+        pycolmap.create_default_bundle_adjuster(options, config, stored).solve()
 
 
 def transform_model(

@@ -151,8 +151,8 @@ def list_advice(found: ReportFacts) -> list[str]:
         )
     if (share := measure_sparse_share(found)) > TOO_FEW:
         said.append(
-            f"{100 * share:.0f} % of the exemplar is seen by fewer than {found.need} photos (brown on the map). Take more "
-            "photos of it."
+            f"{100 * share:.0f} % of the exemplar is seen by fewer than {found.need} photos (brown on the map): take "
+            "more photos of it."
         )
     if weak := [photo.name for photo in found.photos if photo.weak]:
         names = ", ".join(weak[:5]) + (f" and {len(weak) - 5} more" if len(weak) > 5 else "")

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.photos.colmap_model import bundle_adjust_with_priors
+from dav_gswt.photos.colmap_model import bundle_adjust
 from dav_gswt.photos.photo_files import read_gps_position
 
 _log = logging.getLogger(__name__)
@@ -90,7 +90,7 @@ def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]
         return False
     best.transform(pycolmap.Sim3d(scale, pycolmap.Rotation3d(turn), shift))
     priors = [_make_pose_prior(best.images[i], at[best.images[i].name]) for i in numbers]
-    bundle_adjust_with_priors(best, priors)
+    bundle_adjust(best, priors=priors)
     _log.info("GPS: the photos lie in metres, %.1f m from their positions (median)", off)
     return True
 

@@ -96,8 +96,8 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
             held = _enter_images(photos, store)
         extract_features(Path(scratch), database, options.size, options.features, options.threads)
         match_photos(len(photos), database, NEIGHBOURS, options.threads, options.seed)
-        scene = SfmScene(folder, photos, held, positions, database)
-        solution = find_solution(scene, options.seed)
+        gps = dict(zip(keys, positions.at, strict=True)) if positions else {}
+        solution = find_solution(SfmScene(folder, photos, held, gps, database), options.seed)
     for name, reason in solution.left_out:
         _log.warning("%s is left out: %s", name, reason)
     _log.info("focal length: %s", solution.focal.decision)
@@ -109,7 +109,7 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
     for text in verdict.tried[1:]:
         _log.info("tried: %s", text)
     require_trust(verdict)
-    if positions and not align_to_gps(solution.best, scene.gps):
+    if positions and not align_to_gps(solution.best, gps):
         positions = None
     model, lenses = replace_lenses(solution.best, {photo.key: photo.full for photo in photos}, options.side)
     require_parallax(intersect_rays(model)[1])
