@@ -11,10 +11,10 @@ from dav_gswt.errors import InputError
 from dav_gswt.photos.importers import lens_models, nerfstudio, opensfm
 from dav_gswt.photos.importers.lens_models import (
     fit_camera_to_photo,
-    make_camera,
     make_perspective_camera,
     require_invertible,
 )
+from dav_gswt.photos.lenses import make_camera
 
 W, H = 400, 300
 RNG = np.random.default_rng(11)

@@ -15,6 +15,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import read_capture_record
+from dav_gswt.photos.view_split import find_ground_pixels
 
 WHOLE = 0.99  # of a shrunk pixel that must not be masked for it to count
 IN_MEMORY = 300e6  # bytes of all photos, beyond which they lie in files (a fit holds them about four times)
@@ -121,11 +122,7 @@ def read_captured_views(folder: Path | str, size: int, arrays: ArrayFile | None 
 
 def mask_outside_ground(view: TrainingView, west: float, south: float, east: float, north: float) -> TrainingView:
     """The view with weight 0 where its ray does not meet the plane z = 0 inside the rectangle."""
-    origin, step = view.camera.rays()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = -origin[..., 2] / step[..., 2]
-        x, y = origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
-    hit = (t > 0) & (x > west) & (x < east) & (y > south) & (y < north)
+    hit = find_ground_pixels(view.camera, (west, south, east, north))
     return view.with_pixels(weight=view.weight * hit.astype(np.float32))
 
 

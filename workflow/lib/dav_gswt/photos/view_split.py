@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
@@ -139,14 +139,17 @@ def shows_enough(camera: Camera, ground: Bounds) -> bool:
 
 def measure_picture_share(camera: Camera, ground: Bounds, grid: int = 16) -> float:
     """The share of a picture that shows the plane z = 0 between these bounds."""
+    return float(find_ground_pixels(camera.resized(grid, grid), ground).mean())
+
+
+def find_ground_pixels(camera: Camera, ground: Bounds) -> Bool[Array, "h w"]:
+    """Whether the ray of each pixel meets the plane z = 0 between these bounds."""
     west, south, east, north = ground
-    at = (np.arange(grid) + 0.5) / grid
-    x, y = np.meshgrid((at * camera.width - camera.cx) / camera.fx, (at * camera.height - camera.cy) / camera.fy)
-    rays = np.stack([x.ravel(), y.ravel(), np.ones(x.size)], 1) @ camera.rotation
-    falls = rays[:, 2] * camera.centre[2] < 0
-    hits = camera.centre[:2] - rays[:, :2] * (camera.centre[2] / np.where(falls, rays[:, 2], 1.0))[:, None]
-    inside = (hits > [west, south]).all(1) & (hits < [east, north]).all(1)
-    return float((inside & falls).mean())
+    origin, step = camera.rays()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = -origin[..., 2] / step[..., 2]
+        x, y = origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
+    return (t > 0) & (x > west) & (x < east) & (y > south) & (y < north)
 
 
 def measure_visible_share(camera: Camera, ground: Bounds, grid: int = 16) -> float:

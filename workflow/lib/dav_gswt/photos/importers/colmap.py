@@ -15,7 +15,7 @@ from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.photos.colmap_model import silence_pycolmap
 from dav_gswt.photos.importers import checks
 from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel
-from dav_gswt.photos.importers.lens_models import make_camera
+from dav_gswt.photos.lenses import make_camera
 
 _PLACES = ("", "sparse", "sparse/0", "0")  # where a model may be below the folder that is given
 _PARTS = ("cameras", "images", "points3D")

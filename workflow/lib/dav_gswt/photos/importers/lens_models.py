@@ -5,14 +5,12 @@ import pycolmap
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.images import image_files
+from dav_gswt.photos.lenses import make_camera
 
-FOCAL = (0.01, 1000.0)  # in longer sides: beyond, the number is in another unit
 QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # turns the picture clockwise: right becomes down
 TURNS = {1: 0, 6: 1, 3: 2, 8: 3}  # quarter turns clockwise that EXIF's orientation asks for; the others mirror
 STRAY = 2.0  # pixels by which a pinhole's border may look past the photo's
 _SWAPPED = {"fx": "fy", "fy": "fx", "cy": "cx"}
-_MODELS = pycolmap.CameraModelId.__members__
 
 
 def make_perspective_camera(
@@ -35,25 +33,6 @@ def make_perspective_camera(
 def make_fisheye_camera(width: int, height: int, pinhole: tuple, k: tuple = (), where: str = "") -> pycolmap.Camera:
     """A fisheye after Kannala and Brandt: a ray at the angle t off the axis lands at t (1 + k1 t^2 + ... + k4 t^8)."""
     return make_camera("OPENCV_FISHEYE", width, height, (*pinhole, *(*k, 0.0, 0.0, 0.0, 0.0)[:4]), where)
-
-
-def make_camera(model: str, width: int, height: int, params: tuple, where: str) -> pycolmap.Camera:
-    """A camera of one of COLMAP's models. Raises: InputError: unknown, spherical, or numbers that no lens has."""
-    if model not in _MODELS or model in ("INVALID", "EQUIRECTANGULAR"):
-        raise InputError(f"{where}: pictures of a camera {model} are not read; export pictures of a perspective camera")
-    if not (min(width, height) >= 1 and width * height <= image_files.MAX_PIXELS):
-        most = image_files.MAX_PIXELS // 10**6
-        raise InputError(f"{where}: pictures of {width} x {height} pixels; 1 pixel to {most} megapixels are read")
-    camera = pycolmap.Camera(model=model, width=width, height=height, params=[float(v) for v in params])
-    if not camera.verify_params() or not np.isfinite(camera.params).all():
-        raise InputError(f"{where}: {model} needs finite numbers for {camera.params_info}, not {list(params)[:16]}")
-    low, high = (side * max(width, height) for side in FOCAL)
-    if not all(low <= f <= high for f in (camera.focal_length_x, camera.focal_length_y)):
-        raise InputError(
-            f"{where}: focal lengths {camera.focal_length_x:g}, {camera.focal_length_y:g} for {width} x {height} "
-            "pixels; they must be positive and in pixels (of OpenSfM: in longer sides)"
-        )
-    return camera
 
 
 def fit_camera_to_photo(
