@@ -11,7 +11,6 @@ from dav_gswt.errors import InputError
 from dav_gswt.photos.importers import lens_models, nerfstudio, opensfm
 from dav_gswt.photos.importers.lens_models import (
     fit_camera_to_photo,
-    make_perspective_camera,
     require_invertible,
 )
 from dav_gswt.photos.lenses import make_camera
@@ -114,11 +113,11 @@ def test_a_turned_lens_sees_turned_rays_at_turned_places(name):
 
 
 def test_a_lens_that_fits_the_upright_photo_alone_is_not_turned_and_mirrored_photos_are_refused():
-    camera = make_perspective_camera(H, W, (320.0, 320.0, H / 2, W / 2))
+    camera = make_camera("PINHOLE", H, W, (320.0, 320.0, H / 2, W / 2), "")
     same, turns = fit_camera_to_photo(camera, (W, H), 6, "there")
     assert turns == 0 and (same.width, same.height) == (H, W)
     with pytest.raises(InputError, match="there: its EXIF orientation mirrors"):
-        fit_camera_to_photo(make_perspective_camera(W, H, (320.0, 320.0, 200.0, 150.0)), (W, H), 2, "there")
+        fit_camera_to_photo(make_camera("PINHOLE", W, H, (320.0, 320.0, 200.0, 150.0), ""), (W, H), 2, "there")
 
 
 def test_a_scaled_copy_fits_and_another_shape_does_not():

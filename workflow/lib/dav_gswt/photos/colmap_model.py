@@ -220,22 +220,19 @@ def model_from_reconstruction(
     """
     ids = np.array(sorted(stored.points3D), np.int64)
     found = sorted((stored.images[i].name, i) for i in stored.reg_image_ids())
-    cameras, numbers, owners, pixels = [], [], [], []
+    cameras, rows = [], [np.zeros((0, 4))]  # of each observation its point, its image and its pixel
     for i, (_, key) in enumerate(found):
         image = stored.images[key]
         lens = stored.cameras[image.camera_id]
         target = pinholes[image.camera_id] if pinholes else lens
         pose, ((fx, _, cx), (_, fy, cy), _) = image.cam_from_world().matrix(), target.calibration_matrix().tolist()
         cameras.append(Camera(pose[:, :3].copy(), pose[:, 3].copy(), fx, fy, cx, cy, target.width, target.height))
-        seen = [(p.point3D_id, *p.xy) for p in image.get_observation_points2D()]
-        seen = np.array(seen, float).reshape(-1, 3)
+        seen = np.array([(p.point3D_id, i, *p.xy) for p in image.get_observation_points2D()], float).reshape(-1, 4)
         if pinholes:
-            seen[:, 1:] = target.img_from_cam(np.c_[lens.cam_from_img(seen[:, 1:]), np.ones(len(seen))])
-        numbers.append(np.searchsorted(ids, seen[:, 0].astype(np.int64)))
-        owners.append(np.full(len(seen), i))
-        pixels.append(seen[:, 1:])
-    empty = np.zeros(0, int)
-    point_of, image_of = np.concatenate([empty, *numbers]), np.concatenate([empty, *owners])
+            seen[:, 2:] = target.img_from_cam(np.c_[lens.cam_from_img(seen[:, 2:]), np.ones(len(seen))])
+        rows.append(seen)
+    observed = np.concatenate(rows)
+    point_of, image_of = np.searchsorted(ids, observed[:, 0].astype(np.int64)), observed[:, 1].astype(int)
     order = np.lexsort((image_of, point_of))
     points = [stored.points3D[i] for i in ids]
     return ColmapModel(
@@ -245,7 +242,7 @@ def model_from_reconstruction(
         (np.array([p.color for p in points]).reshape(-1, 3) / 255).astype(np.float32),
         point_of[order],
         image_of[order],
-        np.concatenate([np.zeros((0, 2)), *pixels])[order],
+        observed[order, 2:],
     )
 
 

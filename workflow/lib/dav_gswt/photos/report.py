@@ -30,13 +30,11 @@ from dav_gswt.photos.colmap_model import (
     transform_model,
 )
 from dav_gswt.photos.ground_frame import Coverage, count_coverage
-from dav_gswt.photos.sfm import mapping
 from dav_gswt.photos.view_split import find_aim_point
 from dav_gswt.templates import render_template
 
 LEAST_POINTS, LEAST_SHARE = 100, 0.2  # points that hold a photo: as a number, and as a share of the set's median
 WORST_ERROR = 2.0  # pixels: a photo's mean error, above which its place is doubtful or its lens is another
-WORST_MEAN = 1.0  # pixels: the set's mean error, likewise
 LEAST_SIDE = 0.5  # flying heights: side of an exemplar with room for tiles that differ
 TOO_FEW = 0.02  # share of the exemplar that may be seen by fewer photos than are needed
 DOWN = 5.0  # degrees off straight down, within which a camera has no arrow
@@ -157,15 +155,6 @@ def list_advice(found: ReportFacts) -> list[str]:
     if weak := [photo.name for photo in found.photos if photo.weak]:
         names = ", ".join(weak[:5]) + (f" and {len(weak) - 5} more" if len(weak) > 5 else "")
         said.append(f"Weakly placed photos: {names}. If the field looks blurred there, leave them out.")
-    if found.error is not None and found.error > WORST_MEAN:
-        said.append(f"Points are {found.error:.1f} px off on average: use sharp photos of one camera at one zoom.")
-    lens = frame.focal
-    if lens and lens.exif is None and lens.tilt < mapping.OBLIQUE:
-        said.append("The focal length is unsure, and heights with it: set the scene's `focal`, or add oblique photos.")
-    elif lens and lens.exif and lens.free and abs(lens.free / lens.exif - 1) > mapping.HELD:
-        said.append(
-            f"The photos alone suggest {lens.free / lens.exif:.2f} times the focal length of EXIF: check the heights."
-        )
     side = frame.exemplar.side / frame.flying_height
     if side < LEAST_SIDE:
         said.append(

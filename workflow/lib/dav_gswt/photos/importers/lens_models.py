@@ -13,26 +13,24 @@ STRAY = 2.0  # pixels by which a pinhole's border may look past the photo's
 _SWAPPED = {"fx": "fy", "fy": "fx", "cy": "cx"}
 
 
-def make_perspective_camera(
-    width: int, height: int, pinhole: tuple, k: tuple = (), p: tuple = (), where: str = ""
+def make_lens(
+    size: tuple[int, int], pinhole: tuple, k: tuple, p: tuple = (), fisheye: bool = False, where: str = ""
 ) -> pycolmap.Camera:
-    """A lens after Brown. pinhole: fx, fy, cx, cy. k: up to three radial terms; p: OpenCV's two tangential ones.
+    """A lens by pinhole (fx, fy, cx, cy), up to four radial terms k, and OpenCV's two tangential ones p.
 
-    With x, y before the camera at depth 1 and r^2 = x^2 + y^2 the picture is at
+    After Brown: with x, y before the camera at depth 1 and r^2 = x^2 + y^2 the picture is at
     x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and y likewise with p1 and p2 exchanged.
+    A fisheye, after Kannala and Brandt: a ray at the angle t off the axis lands at t (1 + k1 t^2 + ... + k4 t^8).
     """
-    k1, k2, k3 = (*k, 0.0, 0.0, 0.0)[:3]
+    k1, k2, k3, k4 = (*k, 0.0, 0.0, 0.0, 0.0)[:4]
     p1, p2 = (*p, 0.0, 0.0)[:2]
+    if fisheye:
+        return make_camera("OPENCV_FISHEYE", *size, (*pinhole, k1, k2, k3, k4), where)
     if k3:
-        return make_camera("FULL_OPENCV", width, height, (*pinhole, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0), where)
+        return make_camera("FULL_OPENCV", *size, (*pinhole, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0), where)
     if k1 or k2 or p1 or p2:
-        return make_camera("OPENCV", width, height, (*pinhole, k1, k2, p1, p2), where)
-    return make_camera("PINHOLE", width, height, pinhole, where)
-
-
-def make_fisheye_camera(width: int, height: int, pinhole: tuple, k: tuple = (), where: str = "") -> pycolmap.Camera:
-    """A fisheye after Kannala and Brandt: a ray at the angle t off the axis lands at t (1 + k1 t^2 + ... + k4 t^8)."""
-    return make_camera("OPENCV_FISHEYE", width, height, (*pinhole, *(*k, 0.0, 0.0, 0.0, 0.0)[:4]), where)
+        return make_camera("OPENCV", *size, (*pinhole, k1, k2, p1, p2), where)
+    return make_camera("PINHOLE", *size, pinhole, where)
 
 
 def fit_camera_to_photo(
@@ -93,8 +91,7 @@ def _same_shape(camera: pycolmap.Camera, size: tuple[int, int]) -> bool:
 
 def _scale_camera(camera: pycolmap.Camera, width: int, height: int) -> pycolmap.Camera:
     camera = pycolmap.Camera(camera.todict())
-    if (camera.width, camera.height) != (width, height):
-        camera.rescale(width, height)
+    camera.rescale(width, height)
     return camera
 
 

@@ -23,7 +23,7 @@ from dav_gswt.photos.importers.checks import (
     check_pose,
     parse_part,
 )
-from dav_gswt.photos.importers.lens_models import make_fisheye_camera, make_perspective_camera
+from dav_gswt.photos.importers.lens_models import make_lens
 
 PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV")
 FISHEYE = "OPENCV_FISHEYE"
@@ -120,8 +120,5 @@ def _make_lens(said: Intrinsics, where: str) -> pycolmap.Camera:
     for key in unused:
         if getattr(said, key) != 0:
             raise InputError(f"{where}: {key} is not read with camera_model {model}; calibrate without it")
-    if model == FISHEYE:
-        return make_fisheye_camera(width, height, (fx, fy, cx, cy), (said.k1, said.k2, said.k3, said.k4), where)
-    return make_perspective_camera(
-        width, height, (fx, fy, cx, cy), (said.k1, said.k2, said.k3), (said.p1, said.p2), where
-    )
+    k, p = (said.k1, said.k2, said.k3, said.k4), (said.p1, said.p2)
+    return make_lens((width, height), (fx, fy, cx, cy), k, p, model == FISHEYE, where)

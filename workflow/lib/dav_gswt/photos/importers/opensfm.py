@@ -23,7 +23,7 @@ from dav_gswt.photos.importers.checks import (
     check_image_name,
     parse_part,
 )
-from dav_gswt.photos.importers.lens_models import make_fisheye_camera, make_perspective_camera
+from dav_gswt.photos.importers.lens_models import make_lens
 
 _log = logging.getLogger(__name__)
 
@@ -122,9 +122,8 @@ def _make_lens(values, where: str) -> pycolmap.Camera:
     side = max(width, height)
     pinhole = (fx * side, fy * side, cx * side + width / 2, cy * side + height / 2)
     k = (said.k1, said.k2, said.k3, said.k4)[: (RADIAL | FISHEYE)[kind]]
-    if kind in FISHEYE:
-        return make_fisheye_camera(width, height, pinhole, k, where)
-    return make_perspective_camera(width, height, pinhole, k, (said.p1, said.p2) if kind == "brown" else (), where)
+    p = (said.p1, said.p2) if kind == "brown" else ()
+    return make_lens((width, height), pinhole, k, p, kind in FISHEYE, where)
 
 
 def _read_shot(label: str, values, cameras: dict[str, pycolmap.Camera], photos: Path, path: Path) -> ImportedImage:

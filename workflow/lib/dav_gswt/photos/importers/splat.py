@@ -50,15 +50,12 @@ def fit_field_frame(
     Only the colour that is the same from all sides is kept (degree 0).
     Raises: InputError: too few opaque Gaussians, or no ground across `up`.
     """
-    direction = np.asarray(up, float)
-    if direction.shape != (3,) or not np.linalg.norm(direction) > 0 or not np.isfinite(direction).all():
-        raise InputError(f"up: {list(up)} is no direction; give three numbers that are not all 0")
     before, degree = len(field), field.sh_degree
     if degree > 0:
         _log.warning("view-dependent colour (degree %d) is dropped: the colour from all sides is kept", degree)
         field = replace(field, sh=np.ascontiguousarray(field.sh[:, :1]))
     field = field[_select_near(field)]
-    field, relief = _level_field(field, direction, rng)
+    field, relief = _level_field(field, np.array(up, float), rng)
     field, side, height = _center_on_exemplar(field)
     extent = find_extent(*_opaque_ground(*_project_discs(field), CELLS))
     side, relief = float(side / height), float(relief / height)
