@@ -44,25 +44,18 @@ FEW, MARK = "#b3471f", "#d55e00"  # colours of ground that too few photos see, a
 
 
 @dataclass(frozen=True)
-class PhotoFacts:
-    """A photo of the model. tests: it is used for testing alone. weak: reasons to doubt its place."""
-
-    name: str
-    tests: bool
-    weak: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class ReportFacts:
     """A scene's photos.
 
-    need: how many photos must see a place. cover: in world units, without test photos. error: mean
-    reprojection error in pixels; None where it is unknown.
+    tests: names of those that only test. weak: reasons to doubt the place of others, by name. need: how many photos
+    must see a place. cover: in world units, without test photos. error: mean reprojection error in pixels; None where
+    it is unknown.
     """
 
     frame: SceneFrame
     model: ColmapModel
-    photos: tuple[PhotoFacts, ...]
+    tests: frozenset[str]
+    weak: dict[str, list[str]]
     need: int
     cover: Coverage
     error: float | None
@@ -74,9 +67,8 @@ def write_report(folder: Path | str, template: Path | str, scene: str, out: Path
     Raises: InputError: the folder is not readable, or the template uses a name that has no value.
     """
     found = collect_facts(folder)
-    names = progress([photo.name for photo in found.photos], "shrink photos")
-    pictures = [make_thumbnail(Path(folder) / "images" / name) for name in names]
-    frame = found.frame
+    frame, names = found.frame, sorted(found.model.names, key=lambda name: name in found.tests)
+    pictures = {name: make_thumbnail(Path(folder) / "images" / name) for name in progress(names, "shrink photos")}
     values = {
         "scene": scene,
         "summary": _summarize(found),
@@ -85,7 +77,9 @@ def write_report(folder: Path | str, template: Path | str, scene: str, out: Path
         "facts": _list_facts(found),
         "verdict": frame.verdict,
         "left_out": frame.left_out,
-        "photos": sorted(zip(found.photos, pictures, strict=True), key=lambda pair: pair[0].tests),
+        "photos": pictures,
+        "tests": found.tests,
+        "weak": found.weak,
     }
     with atomic_file(out) as part:
         part.write_text(render_template(template, values), encoding="utf-8")
@@ -95,7 +89,7 @@ def collect_facts(folder: Path | str) -> ReportFacts:
     """The facts of a photos/ folder. Raises: InputError: what it holds is not readable."""
     folder = Path(folder)
     frame, model = read_scene_frame(folder / "ground.json"), read_colmap_model(folder / "sparse")
-    tests, unit = set(frame.test or ()), frame.flying_height
+    tests, unit = frozenset(frame.test or ()), frame.flying_height
     flat = transform_model(model, 1 / unit, np.eye(3), np.zeros(3))
     cameras = tuple(c for name, c in zip(model.names, flat.cameras, strict=True) if name not in tests)
     empty = Coverage(0.0, 0.0, 1.0, np.zeros((1, 1), int))
@@ -104,17 +98,18 @@ def collect_facts(folder: Path | str) -> ReportFacts:
     need = frame.photos_per_cell or (3 if len(cameras) >= 9 else 2)
     off = reprojection_errors(model)
     error = float(off.mean()) if frame.reprojection_error is None and len(off) else frame.reprojection_error
-    return ReportFacts(frame, model, _assess_photos(model, off, tests), need, cover, error)
+    return ReportFacts(frame, model, tests, find_weaknesses(model, off, tests), need, cover, error)
 
 
-def _assess_photos(model: ColmapModel, off: Float[Array, "m"], tests: set[str]) -> tuple[PhotoFacts, ...]:
-    """Each photo of the model, and what is weak about it, in words. off: reprojection errors of the observations."""
+def find_weaknesses(model: ColmapModel, off: Float[Array, "m"], tests: frozenset[str]) -> dict[str, list[str]]:
+    """What is weak about photos that do not only test, in words. off: reprojection errors of the observations."""
     shared = count_shared_points(model)
     points = np.diag(shared).copy()
     np.fill_diagonal(shared, 0)
-    usual = float(np.median([n for n, name in zip(points, model.names, strict=True) if name not in tests] or [0]))
-    found = []
-    for i, name in enumerate(model.names):
+    used = [i for i, name in enumerate(model.names) if name not in tests]
+    usual = float(np.median(points[used])) if used else 0.0
+    found = {}
+    for i in used:
         own, said = off[model.image_of == i], []
         if points[i] < max(LEAST_POINTS, LEAST_SHARE * usual):
             said.append(f"sees only {points[i]} points; the median is {usual:.0f}")
@@ -122,15 +117,16 @@ def _assess_photos(model: ColmapModel, off: Float[Array, "m"], tests: set[str]) 
             said.append(f"its points are {own.mean():.1f} px off on average")
         if shared[i].max() < view_split.LINK:
             said.append(f"shares at most {shared[i].max()} points with any other photo")
-        found.append(PhotoFacts(name, name in tests, () if name in tests else tuple(said)))
-    return tuple(found)
+        if said:
+            found[model.names[i]] = said
+    return found
 
 
 def _summarize(found: ReportFacts) -> str:
     frame, side = found.frame, f"{found.frame.exemplar.side:.2f} {found.frame.unit}s"
-    tests = sum(photo.tests for photo in found.photos)
     if frame.kind == "synthetic":
-        first = f"{len(found.photos) - tests} photos were rendered, and {tests} for testing; their cameras are exact."
+        tests, photos = len(found.tests), len(found.model.names)
+        first = f"{photos - tests} photos were rendered, and {tests} for testing; their cameras are exact."
     else:
         first = f"{frame.registered} of {frame.images} photos were placed."
     return f"{first} Tiles are cut from a square of ground that is {side} wide, the exemplar (dashed on the map)."
@@ -152,7 +148,7 @@ def list_advice(found: ReportFacts) -> list[str]:
             f"{100 * share:.0f} % of the exemplar is seen by fewer than {found.need} photos (brown on the map): take "
             "more photos of it."
         )
-    if weak := [photo.name for photo in found.photos if photo.weak]:
+    if weak := list(found.weak):
         names = ", ".join(weak[:5]) + (f" and {len(weak) - 5} more" if len(weak) > 5 else "")
         said.append(f"Weakly placed photos: {names}. If the field looks blurred there, leave them out.")
     side = frame.exemplar.side / frame.flying_height
@@ -206,12 +202,10 @@ def draw_map(found: ReportFacts) -> str:
     square = frame.exemplar
     side = Rectangle((square.west, square.south), square.side, square.side, fill=False, ls="--", lw=1.5, ec="k")
     axes.add_patch(side)
-    for photo, camera in zip(found.photos, found.model.cameras, strict=True):
-        _draw_camera(axes, camera, MARK if photo.weak else "k", photo.tests, frame.flying_height)
-        if photo.weak:
-            axes.annotate(
-                photo.name, tuple(camera.centre[:2]), (4, 4), textcoords="offset points", fontsize=7, color=MARK
-            )
+    for name, camera in zip(found.model.names, found.model.cameras, strict=True):
+        _draw_camera(axes, camera, MARK if name in found.weak else "k", name in found.tests, frame.flying_height)
+        if name in found.weak:
+            axes.annotate(name, tuple(camera.centre[:2]), (4, 4), textcoords="offset points", fontsize=7, color=MARK)
     if frame.georeference:
         turn = np.radians(frame.georeference.north)
         tip = np.array([0.93, 0.93]) + 0.07 * np.array([-np.sin(turn), np.cos(turn)])

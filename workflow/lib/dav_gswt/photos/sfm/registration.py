@@ -102,12 +102,10 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
         _log.warning("%s is left out: %s", name, reason)
     _log.info("focal length: %s", solution.focal.decision)
     verdict = solution.verdict
-    if verdict.grade == "good":
-        _log.info("structure from motion: good, by %s", ", ".join(sign.name for sign in verdict.signs))
+    for text in verdict.tried:
+        _log.info("structure from motion: %s", text)
     for sign in verdict.objections:
         _log.warning("structure from motion is %s: %s", sign.grade, sign.reason)
-    for text in verdict.tried[1:]:
-        _log.info("tried: %s", text)
     require_trust(verdict)
     if positions and not align_to_gps(solution.best, gps):
         positions = None
