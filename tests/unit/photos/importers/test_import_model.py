@@ -13,7 +13,6 @@ from fixtures.imported_models import (
     NUMBERS,
     SCENE,
     WIDTH,
-    WORLD,
     reconstruction,
     shoot,
     transforms,
@@ -80,14 +79,6 @@ def test_cameras_pictures_and_points_are_those_of_the_scene(three, kind):
     a, b = one.model.cameras[5], found.model.cameras[5]
     assert [a.fx, a.fy, a.cx, a.cy, a.width, a.height] == pytest.approx([b.fx, b.fy, b.cx, b.cy, b.width, b.height])
     assert found.model.points == pytest.approx(one.model.points, abs=1e-5)
-
-
-def test_points_lie_on_the_ground(three):
-    found = three["colmap"]
-    assert len(found.model.points) > 200
-    # Features lie a fifth of a pixel of 1/300 off; over base lines of a fifth of the height that is five times as much.
-    assert np.median(np.abs(found.model.points @ WORLD[:, 2])) < 0.003
-    assert found.error < 0.7 and np.median(reprojection_errors(found.model)) < 0.7
 
 
 @pytest.mark.parametrize("binary", [False, True], ids=["text", "binary"])

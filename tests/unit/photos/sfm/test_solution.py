@@ -78,10 +78,6 @@ def test_where_the_first_way_gives_no_model_others_are_tried(solutions, monkeypa
     assert found.verdict.grade == "good" and found.verdict.tried[0] == "incremental mapping: way 1 places nothing"
 
 
-def test_photos_left_out_alone_ask_for_no_other_way(solutions):
-    assert len(solutions(verdict("doubtful", "placed"))[1]) == 1
-
-
 def test_photos_none_of_which_match_are_mapped_once(solutions, monkeypatch):
     monkeypatch.setattr(mapping, "_read_pairs", lambda _: [(0, 1, 12)])
     with pytest.raises(InputError, match="way 1 places nothing"):

@@ -102,14 +102,6 @@ def count_shared_points(model: ColmapModel) -> Int[Array, "images images"]:
     return (sees @ sees.T).toarray()
 
 
-def triangulate_points(
-    model: ColmapModel, names: Sequence[str], photos: Path | str
-) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
-    """Points as of `triangulate_model`, and their mean colours over the named images in the folder `photos`."""
-    part = triangulate_model(model, names)
-    return part.points, colour_points(part, [Path(photos) / name for name in part.names])
-
-
 def triangulate_model(model: ColmapModel, names: Sequence[str]) -> ColmapModel:
     """The model of the named images alone, its points found anew from what these see; colours are mid-grey.
 
