@@ -194,8 +194,8 @@ def draw_map(found: ReportFacts) -> str:
     rows, columns = cover.counts.shape
     box = (cover.west, cover.west + columns * cover.cell, cover.south, cover.south + rows * cover.cell)
     counts, colours = np.ma.masked_equal(cover.counts, 0), colormaps["viridis"].with_extremes(under=FEW)
-    limits = {"vmin": found.need, "vmax": max(int(cover.counts.max()), found.need + 1)}
-    shown = axes.imshow(counts, colours, **limits, extent=box, origin="lower", interpolation="nearest")
+    shown = axes.imshow(counts, colours, extent=box, origin="lower", interpolation="nearest")
+    shown.set_clim(found.need, max(int(cover.counts.max()), found.need + 1))
     figure.colorbar(
         shown, label=f"photos that see a place (at least {found.need} are needed)", shrink=0.7, extend="min"
     )

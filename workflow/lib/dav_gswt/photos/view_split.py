@@ -48,11 +48,6 @@ def read_view_split(path: Path | str) -> ViewSplit:
     return read_record(path, ViewSplit, "make it again")
 
 
-def count_tests(photos: int) -> int:
-    """The number of test views of so many photos: about one in ten, at least two, none of few."""
-    return 0 if photos < LEAST_WITH_TEST else max(LEAST_TEST, round(TEST_SHARE * photos))
-
-
 def split_views(
     model: "ColmapModel", frame: SceneFrame, start: int, rng: np.random.Generator, whole: bool = False
 ) -> ViewSplit:
@@ -86,13 +81,14 @@ def split_views(
 
 def choose_test_views(model: "ColmapModel", ground: Bounds, among: list[int]) -> list[int]:
     """Test views that are spread over the inner half of the ground (by area), if enough images look
-    there.
+    there: about one image in ten, at least two, none of few.
 
     At the border few other images see the same ground, so a test there would measure the border.
     The first view looks nearest to the middle, each next one is the farthest from those before.
     """
-    if not (count := count_tests(len(among))):
+    if len(among) < LEAST_WITH_TEST:
         return []
+    count = max(LEAST_TEST, round(TEST_SHARE * len(among)))
     low, high = np.reshape(ground, (2, 2))
     aims = np.stack([find_aim_point(camera) for camera in model.cameras])
     off = (np.abs(aims - (low + high) / 2) / (high - low)).max(1)

@@ -116,10 +116,10 @@ def _level_field(field: GaussianField, up: Float[Array, "3"], rng: np.random.Gen
 
 
 def _transform_field(
-    field: GaussianField, rotation: Float[Array, "3 3"], scale: float = 1.0, shift: Float[Array, "3"] | None = None
+    field: GaussianField, rotation: Float[Array, "3 3"], scale: float, shift: Float[Array, "3"]
 ) -> GaussianField:
     """The field in another world frame: p becomes scale * rotation @ p + shift. Colours of degree 0 do not turn."""
-    means = scale * field.means.astype(float) @ rotation.T + (0.0 if shift is None else shift)
+    means = scale * field.means.astype(float) @ rotation.T + shift
     # Rotation composes in x y z w and normalises; a length that float32 cannot square must not overflow on the way.
     quats = field.quats / np.abs(field.quats).max(1, keepdims=True)
     turned = (Rotation.from_matrix(rotation) * Rotation.from_quat(quats[:, [1, 2, 3, 0]])).as_quat()
