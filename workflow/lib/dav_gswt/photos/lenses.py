@@ -25,13 +25,15 @@ FOCAL = (0.01, 1000.0)  # in longer sides: beyond, the number is in another unit
 SAME = 1e-6  # pixels: two pinholes are one
 ASPECT = 0.01  # a photo whose sides differ more from its lens's, as a share, is of another camera
 
+Pinhole = tuple[float, float, float, float, float, float]  # fx, fy, cx, cy, width, height
+
 
 @dataclass(frozen=True)
 class Lens:
     """A distorted camera at the size of its pictures, and the pinhole (fx, fy, cx, cy, width, height) they have."""
 
     camera: pycolmap.Camera
-    pinhole: tuple[float, ...]
+    pinhole: Pinhole
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class StoredLens:
     pinhole: tuple[PositiveFloat, PositiveFloat, float, float, PositiveFloat, PositiveFloat]
 
 
-def pinhole_parameters(camera: Camera) -> tuple[float, ...]:
+def pinhole_parameters(camera: Camera) -> Pinhole:
     """What of a camera is its lens, not its place."""
     return (camera.fx, camera.fy, camera.cx, camera.cy, float(camera.width), float(camera.height))
 
