@@ -23,7 +23,7 @@ from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.lenses import read_lenses
-from dav_gswt.photos.training_views import read_captured_views
+from dav_gswt.photos.training_views import read_training_view
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.views.scores import list_columns, read_frozen_scales, read_scores
 from dav_gswt.views.selection import read_pose_selection
@@ -78,8 +78,8 @@ def camera(**changes) -> dict:
         ("capture.json", record(**camera(rotation=[[1, 0, 0]] * 3)), "rotation is none"),
         ("capture.json", record(asked=asdict(POSE) | {"elevation": [], "camera": SHOT["got"]}), "elevation: "),
         ("lenses.json", "7", "not as the workflow writes it"),
-        ("lenses.json", json.dumps([LENS | {"model": "BANANA"}]), "BANANA is no camera model"),
-        ("lenses.json", json.dumps([LENS | {"params": [9]}]), "a lens lacks numbers"),
+        ("lenses.json", json.dumps([LENS | {"model": "BANANA"}]), "camera BANANA are not read"),
+        ("lenses.json", json.dumps([LENS | {"params": [9]}]), "needs finite numbers"),
         ("scores.json", '{"scales": {"opacity": 1}, "pixels": {"low": 1, "high": 1' + "0" * 400 + "}}", "too large"),
         ("scores.csv", SCORES.format("nan", 1), "a pose is not finite"),
         ("scores.csv", "pose\udcff", "not a table of scores"),
@@ -138,8 +138,9 @@ def test_manifests_that_were_found_are_refused_soon(bundle, where, value, messag
 def test_a_photo_smaller_than_its_camera_is_refused(tmp_path):
     image_files.write_png(tmp_path / "a.png", np.zeros((6, 8, 3)))
     (tmp_path / "capture.json").write_text(record(**camera(height=65535)))
+    (photo,) = read_capture_record(tmp_path)
     with pytest.raises(InputError, match="a.png: 8 x 6 pixels, its camera takes 8 x 65535"):
-        read_captured_views(tmp_path, 8)
+        read_training_view(photo.name, photo.camera, tmp_path / photo.name, 8)
 
 
 @pytest.mark.parametrize("changes", [{"photo": "../../outside.png"}, {"photo": 3}, {"got": None}, {"sha256": ...}])

@@ -20,7 +20,6 @@ from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
 from dav_gswt.photos.synthetic import scene as synthetic
-from dav_gswt.photos.training_views import read_captured_views
 from dav_gswt.photos.view_split import ViewSplit
 
 WHEN = "2026-05-04T10:00:00"
@@ -162,7 +161,7 @@ def test_where_no_pose_was_chosen_no_agent_is_called(tmp_path, monkeypatch):
     site = Site("dune", scene, scene_frame(flying_height=5.0), tmp_path / "photos", PhotoStore(tmp_path / "captures"))
     capturing.capture_views(site, ViewSplit((), (), ()), [], [], tmp_path / "capture")
     assert json.loads((tmp_path / "capture/capture.json").read_text()) == {"agent": "plan", "shots": []}
-    assert read_captured_views(tmp_path / "capture", 8) == [] and not (tmp_path / "captures").exists()
+    assert read_capture_record(tmp_path / "capture") == [] and not (tmp_path / "captures").exists()
 
 
 def drop(site, places, monkeypatch):

@@ -140,12 +140,6 @@ def test_the_largest_square_equals_brute_force(mask):
     assert mask[row : row + side, column : column + side].all()
 
 
-def test_few_photos_need_two_looks_and_many_need_three(rng):
-    for photos, need in ((8, 2), (9, 3)):
-        few = synth.model(synth.flight(3, 3)[:photos], synth.plain(500, 1.0, rng))
-        assert fit_ground_frame(few, rng)[1].photos_per_cell == need
-
-
 def test_four_in_ten_points_above_the_ground_do_not_tilt_the_plane(rng):
     points = synth.plain(1000, 1.0, rng, relief=0.005)
     points[:400, 2] += rng.uniform(0.05, 0.8, 400) * (points[:400, 0] + 1)  # trees, on one side more than on the other

@@ -9,10 +9,10 @@ from fixtures import photos as synth
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import (
+    colour_points,
     count_shared_points,
     read_colmap_model,
     triangulate_model,
-    triangulate_points,
     write_colmap_model,
 )
 
@@ -64,7 +64,8 @@ def test_rays_that_are_nearly_parallel_are_left_out():
 def test_colours_come_from_the_named_images_alone(flown, tmp_path):
     for i, name in enumerate(flown.names):
         image_files.write_png(tmp_path / name, np.full((synth.HEIGHT, synth.WIDTH, 3), 0.2 if i < 3 else 1.0))
-    _, colours = triangulate_points(flown, flown.names[:3], tmp_path)
+    part = triangulate_model(flown, flown.names[:3])
+    colours = colour_points(part, [tmp_path / name for name in part.names])
     assert colours == pytest.approx(np.full(colours.shape, 0.2), abs=1e-6)
 
 

@@ -89,7 +89,7 @@ def test_up_says_which_side_is_up(rng):
 
 
 @pytest.mark.parametrize(
-    "up, said", [((0, -1, 0), "direction `up`"), ((0, 0, 0), "no direction"), ((0, float("nan"), 1), "no direction")]
+    "up, said", [((0, -1, 0), "direction `up`"), ((0, 0, 0), "level plane"), ((0, float("nan"), 1), "level plane")]
 )
 def test_up_that_no_ground_lies_across_is_refused(rng, up, said):
     with pytest.raises(InputError, match=said):

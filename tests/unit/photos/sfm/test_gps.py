@@ -104,7 +104,7 @@ def settle(best, held, hold=False):
 
 def test_oblique_views_fix_a_focal_length_that_exif_has_wrong(reconstruct):
     best = reconstruct(oblique(), 1.08 * synth.FOCAL)
-    found = settle(best, {1: 1.08 * synth.FOCAL})
+    best, found = settle(best, {1: 1.08 * synth.FOCAL})
     assert "from the side" in found.decision and found.tilt > OBLIQUE
     assert found.used == found.free == best.cameras[1].focal_length == pytest.approx(synth.FOCAL, rel=1e-3)
     assert found.exif == pytest.approx(1.08 * synth.FOCAL)
@@ -116,14 +116,14 @@ def test_a_focal_length_that_shall_be_held_or_that_views_from_above_leave_open_s
     for model, hold, said in ((oblique(), True, "held"), (above, False, "EXIF's")):
         best = reconstruct(model, 1.08 * synth.FOCAL)
         before = best.images[1].cam_from_world().matrix()
-        found = settle(best, {1: 1.08 * synth.FOCAL}, hold)
+        best, found = settle(best, {1: 1.08 * synth.FOCAL}, hold)
         assert said in found.decision and found.used == best.cameras[1].focal_length == 1.08 * synth.FOCAL
         assert np.array_equal(best.images[1].cam_from_world().matrix(), before)
-    assert "confirm" in settle(reconstruct(model), {1: synth.FOCAL}).decision
+    assert "confirm" in settle(reconstruct(model), {1: synth.FOCAL})[1].decision
 
 
 def test_without_exif_the_photos_alone_say_the_focal_length(reconstruct):
-    found = settle(reconstruct(oblique()), {})
+    _, found = settle(reconstruct(oblique()), {})
     assert found.exif is found.free is None and found.used == synth.FOCAL and "straight down" not in found.decision
     with pytest.raises(InputError, match="0.30 picture widths"):
         settle(reconstruct(oblique(), 0.3 * synth.WIDTH), {})

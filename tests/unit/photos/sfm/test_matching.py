@@ -18,10 +18,6 @@ from dav_gswt.photos.sfm.features import (
 from dav_gswt.photos.sfm.localization import localize_photos
 
 
-def test_batches_hold_every_item_once():
-    assert list(features.split_batches(list(range(7)), 3, "count")) == [[0, 1, 2], [3, 4, 5], [6]]
-
-
 def walk(photos, rng, overlap=0.7, each=100):
     """Features of photos along a walk: neighbours share most of theirs."""
     pool = rng.integers(0, 120, (each * photos, 128)).astype(np.uint8)

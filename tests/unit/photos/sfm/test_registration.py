@@ -1,8 +1,6 @@
 """Structure from motion on small made-up photos, and what it says about photos it cannot use."""
 
-from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
@@ -17,7 +15,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
 from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.sfm import gps, mapping, registration
-from dav_gswt.photos.sfm.mapping import Approach, SfmPhoto
+from dav_gswt.photos.sfm.mapping import Approach
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_image
 
 HALF = 1.0  # of the made-up ground
@@ -164,19 +162,6 @@ def test_a_refused_model_stops_before_anything_is_written(photos, solved, tmp_pa
     with pytest.raises(InputError, match="do not fit together to one scene: placed is odd"):
         prepare_photos(photos, tmp_path / "out", OPTIONS)
     assert not (tmp_path / "out").exists()
-
-
-def test_photos_share_a_camera_by_size_and_focal_length(tmp_path):
-    """Two sizes; of the smaller photos two have the focal length of EXIF, and one has none."""
-    kinds = [((320, 240), 300.0), ((320, 240), 300.0), ((320, 240), None), ((160, 120), None)]
-    given = [SfmPhoto(Path(), f"{i}.png", size, *size, focal) for i, (size, focal) in enumerate(kinds)]
-    with closing(pycolmap.Database.open(tmp_path / "database.db")) as store:
-        held = registration._enter_images(given, store)
-        entered = [store.read_camera(image.camera_id) for image in store.read_all_images()]
-    assert len({camera.camera_id for camera in entered}) == 3
-    assert list(held.values()) == [300.0]
-    assert entered[0].focal_length == 300 and entered[3].focal_length == pytest.approx(registration.GUESS * 160)
-    assert entered[0].has_prior_focal_length and not entered[3].has_prior_focal_length
 
 
 def test_an_undistorted_picture_is_what_a_pinhole_camera_sees(tmp_path):

@@ -43,7 +43,7 @@ def solutions(monkeypatch):
             return SfmSolution(Placed(placed[len(asked) - 1]), (), focal, verdicts[len(asked) - 1], unsure)
 
         monkeypatch.setattr(mapping, "_solve", solve)
-        scene = SfmScene("folder", [], {1: 300.0}, None, Path("database.db"))
+        scene = SfmScene("folder", [], {1: 300.0}, {}, Path("database.db"))
         return mapping.find_solution(scene, 0), asked
 
     return give
@@ -76,10 +76,6 @@ def test_where_the_first_way_gives_no_model_others_are_tried(solutions, monkeypa
     found, asked = solutions(None, verdict("doubtful", "tilt"), verdict("good"))
     assert asked[1:] == [Approach("incremental", hold_focal=True), Approach("global", hold_focal=True)]
     assert found.verdict.grade == "good" and found.verdict.tried[0] == "incremental mapping: way 1 places nothing"
-
-
-def test_photos_left_out_alone_ask_for_no_other_way(solutions):
-    assert len(solutions(verdict("doubtful", "placed"))[1]) == 1
 
 
 def test_photos_none_of_which_match_are_mapped_once(solutions, monkeypatch):

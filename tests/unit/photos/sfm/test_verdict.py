@@ -9,7 +9,6 @@ from fixtures import photos as synth
 from dav_gswt.geometry.scene_frame import SfmSign, SfmVerdict
 from dav_gswt.photos.sfm.verdict import (
     THRESHOLDS,
-    SfmEvidence,
     combine_grades,
     judge_model,
 )
@@ -40,7 +39,7 @@ def positions(model, noise: float, seed: int = 3):
 
 def judge(model, **evidence) -> SfmVerdict:
     known = {"error": 0.4, "images": len(model.names)} | evidence
-    return judge_model(model, SfmEvidence(**known), np.random.default_rng(0))
+    return judge_model(model, np.random.default_rng(0), **known)
 
 
 def grades(verdict: SfmVerdict) -> dict[str, str]:

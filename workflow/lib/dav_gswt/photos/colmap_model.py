@@ -46,32 +46,30 @@ def silence_pycolmap() -> None:
     pycolmap.logging.minloglevel = 2
 
 
-def bundle_adjust(stored: pycolmap.Reconstruction, refine_focal_length: bool) -> None:
-    """Bundle adjustment in one thread, in place; the world's frame is held by two cameras."""
-    options, config = _adjustment(stored, refine_focal_length, lenses=True)
-    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    pycolmap.create_default_bundle_adjuster(options, config, stored).solve()
+def bundle_adjust(
+    stored: pycolmap.Reconstruction, refine_focal_length: bool = False, priors: Sequence[pycolmap.PosePrior] = ()
+) -> None:
+    """Bundle adjustment in one thread, in place.
 
-
-def bundle_adjust_with_priors(stored: pycolmap.Reconstruction, priors: list[pycolmap.PosePrior]) -> None:
-    """Bundle adjustment with positions of cameras, their outliers held back, in one thread, in place; lenses stay."""
-    options, config = _adjustment(stored, refine_focal_length=False, lenses=False)
-    robust = pycolmap.PosePriorBundleAdjustmentOptions()
-    robust.ceres.prior_position_loss_function_type = pycolmap.LossFunctionType.CAUCHY
-    robust.alignment_ransac.random_seed = 0
-    pycolmap.create_pose_prior_bundle_adjuster(options, robust, config, priors, stored).solve()
-
-
-def _adjustment(stored: pycolmap.Reconstruction, refine_focal_length: bool, lenses: bool):
+    With `priors`, positions of cameras, whose outliers are held back, lenses stay; without, two cameras hold the
+    world's frame.
+    """
     silence_pycolmap()
     options = pycolmap.BundleAdjustmentOptions(
-        refine_focal_length=refine_focal_length, refine_extra_params=lenses, print_summary=False
+        refine_focal_length=refine_focal_length, refine_extra_params=not priors, print_summary=False
     )
     options.ceres.solver_options.num_threads = 1
     config = pycolmap.BundleAdjustmentConfig()
     for number in stored.reg_image_ids():
         config.add_image(number)
-    return options, config
+    if priors:
+        robust = pycolmap.PosePriorBundleAdjustmentOptions()
+        robust.ceres.prior_position_loss_function_type = pycolmap.LossFunctionType.CAUCHY
+        robust.alignment_ransac.random_seed = 0
+        pycolmap.create_pose_prior_bundle_adjuster(options, robust, config, list(priors), stored).solve()
+    else:
+        config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+        pycolmap.create_default_bundle_adjuster(options, config, stored).solve()
 
 
 def transform_model(
@@ -104,14 +102,6 @@ def count_shared_points(model: ColmapModel) -> Int[Array, "images images"]:
     return (sees @ sees.T).toarray()
 
 
-def triangulate_points(
-    model: ColmapModel, names: Sequence[str], photos: Path | str
-) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
-    """Points as of `triangulate_model`, and their mean colours over the named images in the folder `photos`."""
-    part = triangulate_model(model, names)
-    return part.points, colour_points(part, [Path(photos) / name for name in part.names])
-
-
 def triangulate_model(model: ColmapModel, names: Sequence[str]) -> ColmapModel:
     """The model of the named images alone, its points found anew from what these see; colours are mid-grey.
 
@@ -125,12 +115,12 @@ def triangulate_model(model: ColmapModel, names: Sequence[str]) -> ColmapModel:
         raise InputError(f"{unknown[0]}: no such image in the model; it may not have been registered")
     part = _with_images(model, [i for i, name in enumerate(model.names) if name in set(names)])
     part = replace(part, colours=np.full(model.points.shape, 0.5, np.float32))
-    part = _with_points(part, np.bincount(part.point_of, minlength=len(part.points)) >= 2)
+    part = select_points(part, np.bincount(part.point_of, minlength=len(part.points)) >= 2)
     points, spread = intersect_rays(part)
     part = replace(part, points=points)
     good = spread >= 1 - np.cos(np.radians(LEAST_ANGLE))
     np.logical_and.at(good, part.point_of, reprojection_errors(part) <= WORST_ERROR)
-    return _with_points(part, good)
+    return select_points(part, good)
 
 
 def intersect_rays(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:
@@ -174,7 +164,7 @@ def _with_images(model: ColmapModel, kept: list[int]) -> ColmapModel:
     )
 
 
-def _with_points(model: ColmapModel, kept: Bool[Array, "n"]) -> ColmapModel:
+def select_points(model: ColmapModel, kept: Bool[Array, "n"]) -> ColmapModel:
     """The model of some of its points; all images stay."""
     own = kept[model.point_of]
     return replace(
@@ -222,22 +212,19 @@ def model_from_reconstruction(
     """
     ids = np.array(sorted(stored.points3D), np.int64)
     found = sorted((stored.images[i].name, i) for i in stored.reg_image_ids())
-    cameras, numbers, owners, pixels = [], [], [], []
+    cameras, rows = [], [np.zeros((0, 4))]  # of each observation its point, its image and its pixel
     for i, (_, key) in enumerate(found):
         image = stored.images[key]
         lens = stored.cameras[image.camera_id]
         target = pinholes[image.camera_id] if pinholes else lens
         pose, ((fx, _, cx), (_, fy, cy), _) = image.cam_from_world().matrix(), target.calibration_matrix().tolist()
         cameras.append(Camera(pose[:, :3].copy(), pose[:, 3].copy(), fx, fy, cx, cy, target.width, target.height))
-        seen = [(p.point3D_id, *p.xy) for p in image.get_observation_points2D()]
-        seen = np.array(seen, float).reshape(-1, 3)
+        seen = np.array([(p.point3D_id, i, *p.xy) for p in image.get_observation_points2D()], float).reshape(-1, 4)
         if pinholes:
-            seen[:, 1:] = target.img_from_cam(np.c_[lens.cam_from_img(seen[:, 1:]), np.ones(len(seen))])
-        numbers.append(np.searchsorted(ids, seen[:, 0].astype(np.int64)))
-        owners.append(np.full(len(seen), i))
-        pixels.append(seen[:, 1:])
-    empty = np.zeros(0, int)
-    point_of, image_of = np.concatenate([empty, *numbers]), np.concatenate([empty, *owners])
+            seen[:, 2:] = target.img_from_cam(np.c_[lens.cam_from_img(seen[:, 2:]), np.ones(len(seen))])
+        rows.append(seen)
+    observed = np.concatenate(rows)
+    point_of, image_of = np.searchsorted(ids, observed[:, 0].astype(np.int64)), observed[:, 1].astype(int)
     order = np.lexsort((image_of, point_of))
     points = [stored.points3D[i] for i in ids]
     return ColmapModel(
@@ -247,7 +234,7 @@ def model_from_reconstruction(
         (np.array([p.color for p in points]).reshape(-1, 3) / 255).astype(np.float32),
         point_of[order],
         image_of[order],
-        np.concatenate([np.zeros((0, 2)), *pixels])[order],
+        observed[order, 2:],
     )
 
 

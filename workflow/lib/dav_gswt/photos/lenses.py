@@ -6,22 +6,26 @@ pinhole camera of its pictures. A scene without lenses.json has exact pinhole ca
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 import pycolmap
 from jaxtyping import Float32
 from numpy import ndarray as Array
+from pydantic import PositiveFloat
 from scipy.ndimage import map_coordinates
 
 from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import parse_record, read_json, write_json
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 
+FOCAL = (0.01, 1000.0)  # in longer sides: beyond, the number is in another unit
 SAME = 1e-6  # pixels: two pinholes are one
 ASPECT = 0.01  # a photo whose sides differ more from its lens's, as a share, is of another camera
+
+Pinhole = tuple[float, float, float, float, float, float]  # fx, fy, cx, cy, width, height
 
 
 @dataclass(frozen=True)
@@ -29,10 +33,21 @@ class Lens:
     """A distorted camera at the size of its pictures, and the pinhole (fx, fy, cx, cy, width, height) they have."""
 
     camera: pycolmap.Camera
-    pinhole: tuple[float, ...]
+    pinhole: Pinhole
 
 
-def pinhole_parameters(camera: Camera) -> tuple[float, ...]:
+@dataclass(frozen=True)
+class StoredLens:
+    """A lens as lenses.json has it. model, params: as COLMAP names and orders them."""
+
+    model: str
+    width: int
+    height: int
+    params: tuple[float, ...]
+    pinhole: tuple[PositiveFloat, PositiveFloat, float, float, PositiveFloat, PositiveFloat]
+
+
+def pinhole_parameters(camera: Camera) -> Pinhole:
     """What of a camera is its lens, not its place."""
     return (camera.fx, camera.fy, camera.cx, camera.cy, float(camera.width), float(camera.height))
 
@@ -45,16 +60,10 @@ def find_main_camera(cameras: Sequence[Camera]) -> Camera:
 
 def write_lenses(folder: Path | str, lenses: Sequence[Lens]) -> None:
     """Write lenses.json into a photos/ folder, the lens of most pictures first."""
-    rows = [
-        {
-            "model": lens.camera.model_name,
-            "width": lens.camera.width,
-            "height": lens.camera.height,
-            "params": [float(v) for v in lens.camera.params],
-            "pinhole": list(lens.pinhole),
-        }
-        for lens in lenses
-    ]
+    rows = []
+    for lens in lenses:
+        camera, params = lens.camera, tuple(lens.camera.params.tolist())
+        rows.append(asdict(StoredLens(camera.model_name, camera.width, camera.height, params, lens.pinhole)))
     write_json(Path(folder) / "lenses.json", rows)
 
 
@@ -67,25 +76,30 @@ def read_lenses(folder: Path | str) -> list[Lens]:
     if not path.exists():
         return []
     try:
-        return [_parse_lens(row) for row in read_json(path)]
-    except (KeyError, TypeError, ValueError, OverflowError, RuntimeError) as error:
+        rows = [parse_record(row, StoredLens) for row in read_json(path)]
+    except (TypeError, ValueError) as error:
+        problem = f"not as the workflow writes it ({summarize_error(error)})"
+        raise InputError(f"{path}: {problem}; make the photos stage again") from error
+    return [Lens(make_camera(row.model, row.width, row.height, row.params, str(path)), row.pinhole) for row in rows]
+
+
+def make_camera(model: str, width: int, height: int, params: tuple[float, ...], where: str) -> pycolmap.Camera:
+    """A camera of one of COLMAP's models. Raises: InputError: unknown, spherical, or numbers that no lens has."""
+    if model not in pycolmap.CameraModelId.__members__ or model in ("INVALID", "EQUIRECTANGULAR"):
+        raise InputError(f"{where}: pictures of a camera {model} are not read; export pictures of a perspective camera")
+    if not (min(width, height) >= 1 and width * height <= image_files.MAX_PIXELS):
+        most = image_files.MAX_PIXELS // 10**6
+        raise InputError(f"{where}: pictures of {width} x {height} pixels; 1 pixel to {most} megapixels are read")
+    camera = pycolmap.Camera(model=model, width=width, height=height, params=[float(v) for v in params])
+    if not camera.verify_params() or not np.isfinite(camera.params).all():
+        raise InputError(f"{where}: {model} needs finite numbers for {camera.params_info}, not {list(params)[:16]}")
+    low, high = (side * max(width, height) for side in FOCAL)
+    if not all(low <= f <= high for f in (camera.focal_length_x, camera.focal_length_y)):
         raise InputError(
-            f"{path}: not as the workflow writes it ({summarize_error(error)}); make the photos stage again"
-        ) from error
-
-
-def _parse_lens(row: dict) -> Lens:
-    if row["model"] not in pycolmap.CameraModelId.__members__ or row["model"] == "INVALID":
-        raise ValueError(f"{str(row['model'])[:40]} is no camera model")
-    camera = pycolmap.Camera(
-        model=row["model"], width=row["width"], height=row["height"], params=np.array(row["params"], float)
-    )
-    pinhole = tuple(map(float, row["pinhole"]))
-    if not camera.verify_params() or len(pinhole) != 6 or not np.isfinite([*camera.params, *pinhole]).all():
-        raise ValueError("a lens lacks numbers")
-    if not 0 < camera.width * camera.height <= image_files.MAX_PIXELS or not min(pinhole[0], pinhole[1]) > 0:
-        raise ValueError("a number of a lens is out of range")
-    return Lens(camera, pinhole)
+            f"{where}: focal lengths {camera.focal_length_x:g}, {camera.focal_length_y:g} for {width} x {height} "
+            "pixels; they must be positive and in pixels (of OpenSfM: in longer sides)"
+        )
+    return camera
 
 
 def undistort_scene_photo(

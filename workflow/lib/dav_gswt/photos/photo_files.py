@@ -66,9 +66,7 @@ def read_gps_position(path: Path | str) -> tuple[float, float, float] | None:
     tags = _read_tags(path)
 
     def read(name: str) -> list[float]:
-        return np.array(
-            _read_numbers(tags, f"GPS GPS{name}"), np.float32
-        ).tolist()  # single precision is enough: 0.1 mm
+        return np.array(_read_numbers(tags, f"GPS GPS{name}"), np.float32).tolist()  # that is enough: 0.1 mm
 
     angles = []
     for name, negative, most in (("Latitude", "S", 90.0), ("Longitude", "W", 180.0)):

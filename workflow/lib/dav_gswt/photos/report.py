@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float
 from matplotlib import colormaps
-from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Rectangle
 from numpy import ndarray as Array
 
@@ -31,43 +30,32 @@ from dav_gswt.photos.colmap_model import (
     transform_model,
 )
 from dav_gswt.photos.ground_frame import Coverage, count_coverage
-from dav_gswt.photos.sfm import mapping
 from dav_gswt.photos.view_split import find_aim_point
 from dav_gswt.templates import render_template
 
 LEAST_POINTS, LEAST_SHARE = 100, 0.2  # points that hold a photo: as a number, and as a share of the set's median
 WORST_ERROR = 2.0  # pixels: a photo's mean error, above which its place is doubtful or its lens is another
-WORST_MEAN = 1.0  # pixels: the set's mean error, likewise
 LEAST_SIDE = 0.5  # flying heights: side of an exemplar with room for tiles that differ
 TOO_FEW = 0.02  # share of the exemplar that may be seen by fewer photos than are needed
-NAMES = ("upper", "upper right", "right", "lower right", "lower", "lower left", "left", "upper left")
 DOWN = 5.0  # degrees off straight down, within which a camera has no arrow
 THUMBNAIL = 200  # pixels of the longer side
 MASKED = np.array([0.85, 0.1, 0.5], np.float32)
 FEW, MARK = "#b3471f", "#d55e00"  # colours of ground that too few photos see, and of photos that are weakly placed
-MOST_COLOURS = 6
-
-
-@dataclass(frozen=True)
-class PhotoFacts:
-    """A photo of the model. tests: it is used for testing alone. weak: reasons to doubt its place."""
-
-    name: str
-    tests: bool
-    weak: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class ReportFacts:
     """A scene's photos.
 
-    need: how many photos must see a place. cover: in world units, without test photos. error: mean
-    reprojection error in pixels; None where it is unknown.
+    tests: names of those that only test. weak: reasons to doubt the place of others, by name. need: how many photos
+    must see a place. cover: in world units, without test photos. error: mean reprojection error in pixels; None where
+    it is unknown.
     """
 
     frame: SceneFrame
     model: ColmapModel
-    photos: tuple[PhotoFacts, ...]
+    tests: frozenset[str]
+    weak: dict[str, list[str]]
     need: int
     cover: Coverage
     error: float | None
@@ -79,9 +67,8 @@ def write_report(folder: Path | str, template: Path | str, scene: str, out: Path
     Raises: InputError: the folder is not readable, or the template uses a name that has no value.
     """
     found = collect_facts(folder)
-    names = progress([photo.name for photo in found.photos], "shrink photos")
-    pictures = [make_thumbnail(Path(folder) / "images" / name) for name in names]
-    frame = found.frame
+    frame, names = found.frame, sorted(found.model.names, key=lambda name: name in found.tests)
+    pictures = {name: make_thumbnail(Path(folder) / "images" / name) for name in progress(names, "shrink photos")}
     values = {
         "scene": scene,
         "summary": _summarize(found),
@@ -90,7 +77,9 @@ def write_report(folder: Path | str, template: Path | str, scene: str, out: Path
         "facts": _list_facts(found),
         "verdict": frame.verdict,
         "left_out": frame.left_out,
-        "photos": sorted(zip(found.photos, pictures, strict=True), key=lambda pair: pair[0].tests),
+        "photos": pictures,
+        "tests": found.tests,
+        "weak": found.weak,
     }
     with atomic_file(out) as part:
         part.write_text(render_template(template, values), encoding="utf-8")
@@ -100,7 +89,7 @@ def collect_facts(folder: Path | str) -> ReportFacts:
     """The facts of a photos/ folder. Raises: InputError: what it holds is not readable."""
     folder = Path(folder)
     frame, model = read_scene_frame(folder / "ground.json"), read_colmap_model(folder / "sparse")
-    tests, unit = set(frame.test or ()), frame.flying_height
+    tests, unit = frozenset(frame.test or ()), frame.flying_height
     flat = transform_model(model, 1 / unit, np.eye(3), np.zeros(3))
     cameras = tuple(c for name, c in zip(model.names, flat.cameras, strict=True) if name not in tests)
     empty = Coverage(0.0, 0.0, 1.0, np.zeros((1, 1), int))
@@ -109,45 +98,35 @@ def collect_facts(folder: Path | str) -> ReportFacts:
     need = frame.photos_per_cell or (3 if len(cameras) >= 9 else 2)
     off = reprojection_errors(model)
     error = float(off.mean()) if frame.reprojection_error is None and len(off) else frame.reprojection_error
-    return ReportFacts(frame, model, _assess_photos(model, off, tests), need, cover, error)
+    return ReportFacts(frame, model, tests, find_weaknesses(model, off, tests), need, cover, error)
 
 
-def _assess_photos(model: ColmapModel, off: Array, tests: set[str]) -> tuple[PhotoFacts, ...]:
-    """Each photo of the model, and what is weak about it. off: reprojection errors of the observations."""
+def find_weaknesses(model: ColmapModel, off: Float[Array, "m"], tests: frozenset[str]) -> dict[str, list[str]]:
+    """What is weak about photos that do not only test, in words. off: reprojection errors of the observations."""
     shared = count_shared_points(model)
     points = np.diag(shared).copy()
     np.fill_diagonal(shared, 0)
-    usual = float(np.median([n for n, name in zip(points, model.names, strict=True) if name not in tests] or [0]))
-    found = []
-    for i, name in enumerate(model.names):
-        own = off[model.image_of == i]
-        error = float(own.mean()) if len(own) else 0.0
-        weak = () if name in tests else find_weaknesses(int(points[i]), error, int(shared[i].max()), usual)
-        found.append(PhotoFacts(name, name in tests, weak))
-    return tuple(found)
-
-
-def find_weaknesses(points: int, error: float, shared: int, usual: float) -> tuple[str, ...]:
-    """What is weak about a photo, in words.
-
-    points: how many it sees; `usual` is the median over the set. error: their mean distance from
-    where they should be, pixels. shared: points in common with the photo that shares most.
-    """
-    said = []
-    if points < max(LEAST_POINTS, LEAST_SHARE * usual):
-        said.append(f"sees only {points} points; the median is {usual:.0f}")
-    if not error <= WORST_ERROR:
-        said.append(f"its points are {error:.1f} px off on average")
-    if shared < view_split.LINK:
-        said.append(f"shares at most {shared} points with any other photo")
-    return tuple(said)
+    used = [i for i, name in enumerate(model.names) if name not in tests]
+    usual = float(np.median(points[used])) if used else 0.0
+    found = {}
+    for i in used:
+        own, said = off[model.image_of == i], []
+        if points[i] < max(LEAST_POINTS, LEAST_SHARE * usual):
+            said.append(f"sees only {points[i]} points; the median is {usual:.0f}")
+        if len(own) and not own.mean() <= WORST_ERROR:
+            said.append(f"its points are {own.mean():.1f} px off on average")
+        if shared[i].max() < view_split.LINK:
+            said.append(f"shares at most {shared[i].max()} points with any other photo")
+        if said:
+            found[model.names[i]] = said
+    return found
 
 
 def _summarize(found: ReportFacts) -> str:
     frame, side = found.frame, f"{found.frame.exemplar.side:.2f} {found.frame.unit}s"
-    tests = sum(photo.tests for photo in found.photos)
     if frame.kind == "synthetic":
-        first = f"{len(found.photos) - tests} photos were rendered, and {tests} for testing; their cameras are exact."
+        tests, photos = len(found.tests), len(found.model.names)
+        first = f"{photos - tests} photos were rendered, and {tests} for testing; their cameras are exact."
     else:
         first = f"{frame.registered} of {frame.images} photos were placed."
     return f"{first} Tiles are cut from a square of ground that is {side} wide, the exemplar (dashed on the map)."
@@ -164,19 +143,14 @@ def list_advice(found: ReportFacts) -> list[str]:
             f"{len(frame.left_out)} of {frame.images} photos were left out for the reasons below. Photos taken between "
             "them and the others can help."
         )
-    said += _advise_on_coverage(found)
-    if weak := [photo.name for photo in found.photos if photo.weak]:
+    if (share := measure_sparse_share(found)) > TOO_FEW:
+        said.append(
+            f"{100 * share:.0f} % of the exemplar is seen by fewer than {found.need} photos (brown on the map): take "
+            "more photos of it."
+        )
+    if weak := list(found.weak):
         names = ", ".join(weak[:5]) + (f" and {len(weak) - 5} more" if len(weak) > 5 else "")
         said.append(f"Weakly placed photos: {names}. If the field looks blurred there, leave them out.")
-    if found.error is not None and found.error > WORST_MEAN:
-        said.append(f"Points are {found.error:.1f} px off on average: use sharp photos of one camera at one zoom.")
-    lens = frame.focal
-    if lens and lens.exif is None and lens.tilt < mapping.OBLIQUE:
-        said.append("The focal length is unsure, and heights with it: set the scene's `focal`, or add oblique photos.")
-    elif lens and lens.exif and lens.free and abs(lens.free / lens.exif - 1) > mapping.HELD:
-        said.append(
-            f"The photos alone suggest {lens.free / lens.exif:.2f} times the focal length of EXIF: check the heights."
-        )
     side = frame.exemplar.side / frame.flying_height
     if side < LEAST_SIDE:
         said.append(
@@ -185,32 +159,14 @@ def list_advice(found: ReportFacts) -> list[str]:
     return said
 
 
-def _advise_on_coverage(found: ReportFacts) -> list[str]:
-    """Parts of the exemplar that few photos see."""
-    counts, said = crop_to_exemplar(found), []
-    if min(counts.shape) < 3:
-        return ["The exemplar is too small on the map to say how often its parts are seen. Photograph more ground."]
-    for i, band in enumerate(np.array_split(counts, 3, axis=0)):
-        for j, part in enumerate(np.array_split(band, 3, axis=1)):
-            if (typical := int(np.median(part))) <= found.need:
-                place = "middle" if i == j == 1 else NAMES[round(np.degrees(np.arctan2(j - 1, i - 1)) / 45) % 8]
-                said.append(f"{place} ({typical})")
-    if said:
-        return [f"Photograph these parts of the exemplar again, which few photos see: {', '.join(said)}."]
-    if (short := float((counts < found.need).mean())) > TOO_FEW:
-        return [
-            f"{100 * short:.0f} % of the exemplar is seen by fewer than {found.need} photos. Take more photos of it."
-        ]
-    return []
-
-
-def crop_to_exemplar(found: ReportFacts) -> Int[Array, "rows columns"]:
-    """How many photos see each cell of the exemplar."""
+def measure_sparse_share(found: ReportFacts) -> float:
+    """The share of the exemplar that fewer photos see than are needed."""
     square, cover = found.frame.exemplar, found.cover
     rows, columns = cover.counts.shape
     y = cover.south + (np.arange(rows) + 0.5) * cover.cell
     x = cover.west + (np.arange(columns) + 0.5) * cover.cell
-    return cover.counts[np.ix_((y > square.south) & (y < square.north), (x > square.west) & (x < square.east))]
+    counts = cover.counts[np.ix_((y > square.south) & (y < square.north), (x > square.west) & (x < square.east))]
+    return float((counts < found.need).mean()) if counts.size else 1.0
 
 
 def _list_facts(found: ReportFacts) -> list[tuple[str, str]]:
@@ -237,22 +193,19 @@ def draw_map(found: ReportFacts) -> str:
     axes = figure.subplots()
     rows, columns = cover.counts.shape
     box = (cover.west, cover.west + columns * cover.cell, cover.south, cover.south + rows * cover.cell)
-    most = max(int(cover.counts.max()), found.need)
-    bounds = np.unique(np.linspace(found.need, most + 1, MOST_COLOURS + 1).astype(int))
-    colours = [FEW, *colormaps["viridis"](np.linspace(0.25, 1, len(bounds) - 1))]
-    norm = BoundaryNorm([1, *bounds], len(colours))  # at least two photos are needed
-    counts = np.ma.masked_equal(cover.counts, 0)
-    shown = axes.imshow(counts, ListedColormap(colours), norm, extent=box, origin="lower", interpolation="nearest")
-    figure.colorbar(shown, label=f"photos that see a place (at least {found.need} are needed)", shrink=0.7)
+    counts, colours = np.ma.masked_equal(cover.counts, 0), colormaps["viridis"].with_extremes(under=FEW)
+    shown = axes.imshow(counts, colours, extent=box, origin="lower", interpolation="nearest")
+    shown.set_clim(found.need, max(int(cover.counts.max()), found.need + 1))
+    figure.colorbar(
+        shown, label=f"photos that see a place (at least {found.need} are needed)", shrink=0.7, extend="min"
+    )
     square = frame.exemplar
     side = Rectangle((square.west, square.south), square.side, square.side, fill=False, ls="--", lw=1.5, ec="k")
     axes.add_patch(side)
-    for photo, camera in zip(found.photos, found.model.cameras, strict=True):
-        _draw_camera(axes, camera, MARK if photo.weak else "k", photo.tests, frame.flying_height)
-        if photo.weak:
-            axes.annotate(
-                photo.name, tuple(camera.centre[:2]), (4, 4), textcoords="offset points", fontsize=7, color=MARK
-            )
+    for name, camera in zip(found.model.names, found.model.cameras, strict=True):
+        _draw_camera(axes, camera, MARK if name in found.weak else "k", name in found.tests, frame.flying_height)
+        if name in found.weak:
+            axes.annotate(name, tuple(camera.centre[:2]), (4, 4), textcoords="offset points", fontsize=7, color=MARK)
     if frame.georeference:
         turn = np.radians(frame.georeference.north)
         tip = np.array([0.93, 0.93]) + 0.07 * np.array([-np.sin(turn), np.cos(turn)])

@@ -15,6 +15,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import read_capture_record
+from dav_gswt.photos.view_split import find_ground_pixels
 
 WHOLE = 0.99  # of a shrunk pixel that must not be masked for it to count
 IN_MEMORY = 300e6  # bytes of all photos, beyond which they lie in files (a fit holds them about four times)
@@ -110,22 +111,9 @@ def read_training_view(
     return TrainingView(name, camera, image, weight, arrays=arrays).with_pixels(image=image, weight=weight)
 
 
-def read_captured_views(folder: Path | str, size: int, arrays: ArrayFile | None = None) -> list[TrainingView]:
-    """The photos that one round's capture/ folder holds, in the order they were taken.
-
-    Raises: InputError: see `read_capture_record`.
-    """
-    folder = Path(folder)
-    return [read_training_view(p.name, p.camera, folder / p.name, size, arrays) for p in read_capture_record(folder)]
-
-
 def mask_outside_ground(view: TrainingView, west: float, south: float, east: float, north: float) -> TrainingView:
     """The view with weight 0 where its ray does not meet the plane z = 0 inside the rectangle."""
-    origin, step = view.camera.rays()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = -origin[..., 2] / step[..., 2]
-        x, y = origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
-    hit = (t > 0) & (x > west) & (x < east) & (y > south) & (y < north)
+    hit = find_ground_pixels(view.camera, (west, south, east, north))
     return view.with_pixels(weight=view.weight * hit.astype(np.float32))
 
 
@@ -144,13 +132,10 @@ def read_training_views(
     from dav_gswt.photos.colmap_model import read_colmap_model  # not above: it loads pycolmap
 
     known = read_colmap_model(model)
-    cameras = [known.camera(name) for name in names]
-    taken = [photo.camera for folder in captures for photo in read_capture_record(folder)]
-    sides = [image_files.fit_size(camera.width, camera.height, size) for camera in [*cameras, *taken]]
+    photos = [(name, known.camera(name), Path(images_folder) / name) for name in names]
+    for folder in captures:
+        photos += [(shot.name, shot.camera, Path(folder) / shot.name) for shot in read_capture_record(folder)]
+    sides = [image_files.fit_size(camera.width, camera.height, size) for _, camera, _ in photos]
     large = sum(12 * width * height for width, height in sides) > IN_MEMORY
     arrays = ArrayFile(files) if files is not None and large else None
-    start = [
-        read_training_view(name, camera, Path(images_folder) / name, size, arrays)
-        for name, camera in zip(names, cameras, strict=True)
-    ]
-    return start + [view for folder in captures for view in read_captured_views(folder, size, arrays)]
+    return [read_training_view(name, camera, path, size, arrays) for name, camera, path in photos]

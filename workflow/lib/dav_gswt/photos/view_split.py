@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
@@ -48,11 +48,6 @@ def read_view_split(path: Path | str) -> ViewSplit:
     return read_record(path, ViewSplit, "make it again")
 
 
-def count_tests(photos: int) -> int:
-    """The number of test views of so many photos: about one in ten, at least two, none of few."""
-    return 0 if photos < LEAST_WITH_TEST else max(LEAST_TEST, round(TEST_SHARE * photos))
-
-
 def split_views(
     model: "ColmapModel", frame: SceneFrame, start: int, rng: np.random.Generator, whole: bool = False
 ) -> ViewSplit:
@@ -86,13 +81,14 @@ def split_views(
 
 def choose_test_views(model: "ColmapModel", ground: Bounds, among: list[int]) -> list[int]:
     """Test views that are spread over the inner half of the ground (by area), if enough images look
-    there.
+    there: about one image in ten, at least two, none of few.
 
     At the border few other images see the same ground, so a test there would measure the border.
     The first view looks nearest to the middle, each next one is the farthest from those before.
     """
-    if not (count := count_tests(len(among))):
+    if len(among) < LEAST_WITH_TEST:
         return []
+    count = max(LEAST_TEST, round(TEST_SHARE * len(among)))
     low, high = np.reshape(ground, (2, 2))
     aims = np.stack([find_aim_point(camera) for camera in model.cameras])
     off = (np.abs(aims - (low + high) / 2) / (high - low)).max(1)
@@ -139,14 +135,17 @@ def shows_enough(camera: Camera, ground: Bounds) -> bool:
 
 def measure_picture_share(camera: Camera, ground: Bounds, grid: int = 16) -> float:
     """The share of a picture that shows the plane z = 0 between these bounds."""
+    return float(find_ground_pixels(camera.resized(grid, grid), ground).mean())
+
+
+def find_ground_pixels(camera: Camera, ground: Bounds) -> Bool[Array, "h w"]:
+    """Whether the ray of each pixel meets the plane z = 0 between these bounds."""
     west, south, east, north = ground
-    at = (np.arange(grid) + 0.5) / grid
-    x, y = np.meshgrid((at * camera.width - camera.cx) / camera.fx, (at * camera.height - camera.cy) / camera.fy)
-    rays = np.stack([x.ravel(), y.ravel(), np.ones(x.size)], 1) @ camera.rotation
-    falls = rays[:, 2] * camera.centre[2] < 0
-    hits = camera.centre[:2] - rays[:, :2] * (camera.centre[2] / np.where(falls, rays[:, 2], 1.0))[:, None]
-    inside = (hits > [west, south]).all(1) & (hits < [east, north]).all(1)
-    return float((inside & falls).mean())
+    origin, step = camera.rays()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = -origin[..., 2] / step[..., 2]
+        x, y = origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
+    return (t > 0) & (x > west) & (x < east) & (y > south) & (y < north)
 
 
 def measure_visible_share(camera: Camera, ground: Bounds, grid: int = 16) -> float:

@@ -10,7 +10,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.photos.colmap_model import read_colmap_model, triangulate_points
+from dav_gswt.photos.colmap_model import colour_points, read_colmap_model, triangulate_model
 from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import discs, ground, objects, observation
@@ -61,9 +61,9 @@ def read_start_views(
     whole: model all ground that the photos show, not just a margin around the exemplar.
     """
     model = read_colmap_model(model_folder)
-    known = [view.name for view in views if view.name in set(model.names)]
-    points, colours = triangulate_points(model, known, images)
-    return StartViews(frame, views, points, colours, ground.WHOLE if whole else ground.MARGIN)
+    part = triangulate_model(model, [view.name for view in views if view.name in set(model.names)])
+    colours = colour_points(part, [Path(images) / name for name in part.names])
+    return StartViews(frame, views, part.points, colours, ground.WHOLE if whole else ground.MARGIN)
 
 
 def fit_coarse_field(

@@ -7,25 +7,25 @@ world of the model. A further format needs a reader that returns an `ImportedMod
 """
 
 import logging
-from collections.abc import Sequence
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
 import pycolmap
 
 from dav_gswt.errors import InputError
-from dav_gswt.geometry.cameras import Camera
-from dav_gswt.photos.colmap_model import ColmapModel
-from dav_gswt.photos.importers.checks import ImportedModel, read_untrusted_json
+from dav_gswt.files import read_json
+from dav_gswt.photos.colmap_model import WORST_ERROR, ColmapModel, reprojection_errors, select_points
+from dav_gswt.photos.importers.checks import LARGEST_JSON, ImportedModel, check_size
 from dav_gswt.photos.importers.colmap import find_colmap_folder, import_colmap
-from dav_gswt.photos.importers.lens_models import camera_key, undistort_camera
+from dav_gswt.photos.importers.lens_models import QUARTER, camera_key, require_invertible
 from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.opensfm import import_opensfm
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder, match_photos_to_images
-from dav_gswt.photos.importers.points import Observations, collect_observations, triangulate_features
+from dav_gswt.photos.importers.points import triangulate_features
 from dav_gswt.photos.sfm.gps import GpsPositions
 from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS
-from dav_gswt.photos.sfm.registration import Registration, SfmOptions
+from dav_gswt.photos.sfm.registration import Registration, SfmOptions, replace_lenses
 
 __all__ = ["import_model"]
 
@@ -45,18 +45,18 @@ def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> R
     placed, left_out = match_photos_to_images(given, photos, path)
     if len(placed) < LEAST_PHOTOS:
         raise InputError(
-            f"{path}: {len(placed)} of its {len(given.shots)} images have a photo in {folder}; at least {LEAST_PHOTOS} "
-            "are needed: give the folder of the photos that the model was made of, under the same names"
+            f"{path}: {len(placed)} of its {len(given.images)} images have a photo in {folder}; at least "
+            f"{LEAST_PHOTOS} are needed: give the folder of the photos that the model was made of, under the same names"
         )
     for name, reason in left_out:
         _log.warning("%s is left out: %s", name, reason)
-    seen = collect_observations(given, placed) if len(given.point_of) else triangulate_features(placed, options)
-    made: dict[tuple, tuple[pycolmap.Camera, pycolmap.Camera]] = {}  # lens and pinhole at picture size
-    for place in placed:
-        if (key := camera_key(place.lens)) not in made:
-            made[key] = undistort_camera(place.lens, options.side, f"{path}: {place.path.name}")
-    pairs = [made[camera_key(place.lens)] for place in placed]
-    model = _make_sparse_model(placed, [pinhole for _, pinhole in pairs], seen)
+    known, sources = _place_photos(placed, given.points), {place.key: place.path for place in placed}
+    if not known.num_points3D():
+        known = triangulate_features(known, sources, options)
+    model, lenses = replace_lenses(known, {p.key: (p.lens.width, p.lens.height) for p in placed}, options.side)
+    for name, camera, lens in zip(model.names, model.cameras, lenses, strict=True):
+        require_invertible(lens, camera, f"{path}: {sources[name].name}")
+    model = _drop_wrong_points(model)
     if not len(model.points):
         raise InputError(
             f"{path}: under its cameras the photos share no point; either they are not those that the model was made "
@@ -65,11 +65,11 @@ def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> R
     centres = np.stack([camera.centre for camera in model.cameras])
     return Registration(
         model=model,
-        sources=tuple(p.path for p in placed),
-        lenses=tuple(lens for lens, _ in pairs),
+        sources=tuple(sources[name] for name in model.names),
+        lenses=lenses,
         left_out=left_out,
         focal=None,
-        error=seen.error,
+        error=float(reprojection_errors(model).mean()),
         positions=GpsPositions(given.about, centres) if given.about else None,
     )
 
@@ -83,42 +83,45 @@ def _read_model(path: Path, photos: PhotoFolder) -> ImportedModel:
             f"{path}: no COLMAP model in this folder (cameras and images, as .bin or .txt); of other programs name the "
             "file itself, transforms.json or reconstruction.json"
         )
-    values = read_untrusted_json(path)
-    if isinstance(values, dict) and "frames" in values:
+    check_size(path, LARGEST_JSON)
+    values = read_json(path)
+    if isinstance(values, dict) and isinstance(values.get("frames"), list):
         return import_nerfstudio(path, values, photos.folder, photos.stored_size)
     if isinstance(values, list) and values and isinstance(values[0], dict) and "shots" in values[0]:
         return import_opensfm(path, values, photos.folder)
     raise InputError(
-        f"{path}: neither a transforms.json (an object with `frames`) nor a reconstruction.json (a list of objects "
-        "with `shots`); name one of these, or a folder of COLMAP's"
+        f"{path}: neither a transforms.json (an object with a list `frames`) nor a reconstruction.json (a list of "
+        "objects with `shots`); name one of these, or a folder of COLMAP's"
     )
 
 
-def _make_sparse_model(
-    placed: Sequence[MatchedPhoto], pinholes: list[pycolmap.Camera], seen: Observations
-) -> ColmapModel:
-    """Pinhole cameras, and the observations that fall into their pictures; points that have none are left out."""
-    focal, middle, size = (
-        np.array(column, float)
-        for column in zip(*((p.params[:2], p.params[2:], (p.width, p.height)) for p in pinholes), strict=True)
-    )
-    pixels = seen.rays * focal[seen.image_of] + middle[seen.image_of]
-    with np.errstate(invalid="ignore"):
-        inside = np.asarray((pixels >= 0).all(1) & (pixels <= size[seen.image_of]).all(1))
-    order = np.flatnonzero(inside)
-    order = order[np.lexsort((seen.image_of[order], seen.point_of[order]))]
-    own, point_of = np.unique(seen.point_of[order], return_inverse=True)
-    cameras = (
-        Camera(p.rotation, p.translation, fx, fy, cx, cy, h.width, h.height)
-        for p, h in zip(placed, pinholes, strict=True)
-        for fx, fy, cx, cy in [h.params.tolist()]
-    )
-    return ColmapModel(
-        tuple(p.key for p in placed),
-        tuple(cameras),
-        seen.points[own],
-        seen.colours[own],
-        point_of,
-        seen.image_of[order],
-        pixels[order],
-    )
+def _place_photos(placed: list[MatchedPhoto], points: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
+    """The photos in the model's world, numbered from 1 on, with the points that they see."""
+    known, numbers, tracks = pycolmap.Reconstruction(), {}, defaultdict(list)
+    for i, place in enumerate(placed, 1):
+        if (key := camera_key(place.lens)) not in numbers:
+            lens = pycolmap.Camera(place.lens.todict() | {"camera_id": len(numbers) + 1})
+            numbers[key] = lens.camera_id
+            known.add_camera_with_trivial_rig(lens)
+        turn, given = np.linalg.matrix_power(QUARTER, place.turns), place.image
+        all_seen = points.images[given.number].get_observation_points2D() if points.num_points3D() else []
+        seen = [p for p in all_seen if p.point3D_id in points.points3D]
+        # through rays: a photo may be a scaled copy of the model's picture, or turned by EXIF
+        rays = given.lens.cam_from_img(np.array([p.xy for p in seen]).reshape(-1, 2))
+        pixels = place.lens.img_from_cam(np.c_[rays, np.ones(len(seen))] @ turn.T)
+        for k, p in enumerate(seen):
+            tracks[p.point3D_id].append(pycolmap.TrackElement(i, k))
+        image = pycolmap.Image(name=place.key, keypoints=pixels, camera_id=numbers[key], image_id=i)
+        pose = turn @ np.c_[given.rotation, given.translation]
+        known.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pose))
+    for number, elements in sorted(tracks.items()):
+        point = points.points3D[number]
+        known.add_point3D(point.xyz, pycolmap.Track(elements), point.color)
+    return known
+
+
+def _drop_wrong_points(model: ColmapModel) -> ColmapModel:
+    """The model without points off by more than WORST_ERROR in an image, as rays beyond a lens's reach give."""
+    good = np.bincount(model.point_of, minlength=len(model.points)) > 0
+    np.logical_and.at(good, model.point_of, reprojection_errors(model) <= WORST_ERROR)
+    return select_points(model, good)

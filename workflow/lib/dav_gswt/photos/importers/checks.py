@@ -4,25 +4,26 @@ Sizes, finite numbers, proper rotations, and names that stay in their folder are
 name the file, and the key or image within it.
 """
 
-import json
-import math
 import re
-from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
+from typing import TypeVar
 
 import numpy as np
 import pycolmap
-from jaxtyping import Float, Float32, Int
+from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.errors import InputError
+from dav_gswt.files import parse_record
 from dav_gswt.geometry.georeference import Georeference
+
+Record = TypeVar("Record")
 
 LARGEST_JSON = 1 << 28  # bytes; as Python objects a file takes about ten times its size
 LARGEST = 1 << 31  # bytes of any other file
 LONGEST_NAME = 1024
-MOST_SHOTS = 20_000
+MOST_IMAGES = 20_000
 ORTHONORMAL = 1e-3  # greatest entry of R R^T - I: files with few digits pass, sheared and scaled axes do not
 _DRIVE = re.compile(r"^[A-Za-z]:")
 
@@ -33,100 +34,50 @@ class ImportedImage:
     right, y down).
 
     name: relative to the photos' folder, with slashes. lens: at the size that the model gives, of the picture as it is
-    stored; None where no size is known because there is no such photo.
+    stored. number: of the image among the model's points.
     """
 
     name: str
-    lens: pycolmap.Camera | None
+    lens: pycolmap.Camera
     rotation: Float[Array, "3 3"]
     translation: Float[Array, "3"]
+    number: int = 0
 
 
 @dataclass(frozen=True)
 class ImportedModel:
-    """The images of a model. If the file has observations, image image_of[k] sees point point_of[k]
-    at pixels[k].
+    """The images of a model. points: what the file says of points and of the images that see them, if anything.
 
-    colours: sRGB in [0, 1]. about: the place of the world's origin, if the world is known to be in
-    metres east, north and up.
+    about: the place of the world's origin, if the world is known to be in metres east, north and up.
     """
 
-    shots: tuple[ImportedImage, ...]
-    points: Float[Array, "n 3"] = field(default_factory=lambda: np.zeros((0, 3)))
-    colours: Float32[Array, "n 3"] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
-    point_of: Int[Array, "m"] = field(default_factory=lambda: np.zeros(0, int))
-    image_of: Int[Array, "m"] = field(default_factory=lambda: np.zeros(0, int))
-    pixels: Float[Array, "m 2"] = field(default_factory=lambda: np.zeros((0, 2)))
+    images: tuple[ImportedImage, ...]
+    points: pycolmap.Reconstruction = field(default_factory=pycolmap.Reconstruction)
     about: Georeference | None = None
 
 
-def check_size(path: Path, most: int) -> int:
-    """The size of a file. Raises: InputError: there is none, or it is larger than `most` bytes."""
+def check_size(path: Path, most: int) -> None:
+    """Raises: InputError: there is no such file, or it is larger than `most` bytes."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file")
     if (size := path.stat().st_size) > most:
         raise InputError(f"{path}: {size} bytes; at most {most} are read: leave out images, or points, in the export")
-    return size
 
 
-def read_untrusted_json(path: Path):
-    """The JSON of a file, in which no object has a key twice. Raises: InputError: malformed or too large."""
-
-    def require_unique_keys(pairs: list) -> dict:
-        values = dict(pairs)
-        if len(values) < len(pairs):
-            twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
-            raise InputError(f"{path}: the key {twice[:80]!r} is there twice; remove one")
-        return values
-
-    check_size(path, LARGEST_JSON)
+def parse_part(values, kind: type[Record], where: str) -> Record:
+    """A part of a file as a dataclass. Raises: InputError: a value is missing or of another type."""
     try:
-        return json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=require_unique_keys)
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not readable as JSON ({summarize_error(error)}); export or copy it again") from error
+        return parse_record(values, kind)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}; correct it or export the file again") from error
 
 
-def check_entry(values, key: str, kind: type, where: str):
-    """The value of an object's key. Raises: InputError: no object, it is missing, or not of this kind."""
-    if not isinstance(values, dict) or key not in values:
-        raise InputError(f"{where}: {key} is missing; export the file again")
-    if not isinstance(values[key], kind) or isinstance(values[key], bool):
-        raise InputError(f"{where}: {key} is not {_KINDS[kind]}; export the file again")
-    return values[key]
+def check_pose(pose: Float[Array, "3 4"], where: str) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
+    """Rotation and translation; the rotation is the nearest to a matrix that is one but for rounding.
 
-
-_KINDS = {dict: "an object", list: "a list", str: "a text"}
-
-
-def check_number(value, where: str) -> float:
-    """A finite number. Raises: InputError."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        try:
-            if math.isfinite(found := float(value)):
-                return found
-        except OverflowError:  # an integer of hundreds of digits
-            pass
-    raise InputError(f"{where} is {str(value)[:40]!r}, which is no finite number; correct it or export the file again")
-
-
-def check_numbers(values, shape: tuple[int, ...], where: str) -> Array:
-    """Nested lists of finite numbers as an array. Raises: InputError: another shape, or a number that is not finite."""
-    if not isinstance(values, list) or len(values) != shape[0]:
-        raise InputError(f"{where} does not hold {' x '.join(map(str, shape))} numbers; export the file again")
-    if len(shape) == 1:
-        return np.array([check_number(v, where) for v in values])
-    return np.array([check_numbers(row, shape[1:], where) for row in values])
-
-
-def check_finite(values: Array, where: str) -> Array:
-    """The array itself. Raises: InputError: some number in it is not finite."""
-    if not np.isfinite(values).all():
-        raise InputError(f"{where}: a number is not finite; remove that entry or export the file again")
-    return values
-
-
-def nearest_rotation(matrix: Float[Array, "3 3"], where: str) -> Float[Array, "3 3"]:
-    """The rotation nearest to a matrix that is one but for rounding. Raises: InputError: sheared, scaled, mirrored."""
+    Raises: InputError: sheared, scaled, mirrored or not finite.
+    """
+    matrix = pose[:, :3]
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(matrix @ matrix.T - np.eye(3)).max()
     if not off <= ORTHONORMAL or np.linalg.det(matrix) < 0:
@@ -134,8 +85,10 @@ def nearest_rotation(matrix: Float[Array, "3 3"], where: str) -> Float[Array, "3
             f"{where}: its rotation is none (R R^T differs from 1 by {off:.2g}, or it mirrors); export poses that are "
             "rigid, without scale or shear"
         )
+    if not np.isfinite(pose).all():
+        raise InputError(f"{where}: a number of its position is not finite; remove that entry or export it again")
     u, _, vt = np.linalg.svd(matrix)
-    return u @ vt
+    return u @ vt, pose[:, 3].copy()
 
 
 def check_image_name(value: str, folder: Path, where: str) -> str:
@@ -157,12 +110,7 @@ def check_image_name(value: str, folder: Path, where: str) -> str:
     return str(path)
 
 
-def check_distinct(names: list[str], where: str) -> None:
-    """Raises: InputError: a name is there twice."""
-    seen = set()
-    for each in names:
-        if each in seen:
-            raise InputError(f"{where}: {each} is there twice; remove one of them")
-        seen.add(each)
-    if len(names) > MOST_SHOTS:
-        raise InputError(f"{where}: {len(names)} images; at most {MOST_SHOTS} are read: leave some out")
+def check_count(images: int, where: str) -> None:
+    """Raises: InputError: more images than are read."""
+    if images > MOST_IMAGES:
+        raise InputError(f"{where}: {images} images; at most {MOST_IMAGES} are read: leave some out")

@@ -9,14 +9,13 @@ import struct
 import tempfile
 from pathlib import Path
 
-import numpy as np
 import pycolmap
 
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.photos.colmap_model import silence_pycolmap
 from dav_gswt.photos.importers import checks
-from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel, check_distinct, check_finite
-from dav_gswt.photos.importers.lens_models import make_camera
+from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel
+from dav_gswt.photos.lenses import make_camera
 
 _PLACES = ("", "sparse", "sparse/0", "0")  # where a model may be below the folder that is given
 _PARTS = ("cameras", "images", "points3D")
@@ -39,34 +38,17 @@ def import_colmap(folder: Path, photos: Path) -> ImportedModel:
     kind = "bin" if _has_both(folder, "bin") else "txt"
     files = {part: folder / f"{part}.{kind}" for part in _PARTS}
     stored = _read_reconstruction(files)
+    checks.check_count(len(stored.images), str(files["images"]))
     cameras = {
         number: make_camera(c.model_name, c.width, c.height, tuple(c.params), f"{files['cameras']}: camera {number}")
         for number, c in sorted(stored.cameras.items())
     }
-    ids = np.array(sorted(stored.points3D), np.uint64)
-    shots, references, owners, pixels = [], [], [], []
-    for i, (_, image) in enumerate(sorted(stored.images.items())):
+    images = []
+    for number, image in sorted(stored.images.items()):
         name = checks.check_image_name(image.name, photos, str(files["images"]))
-        where = f"{files['images']}: image {name}"
-        pose = check_finite(image.cam_from_world().matrix(), where)
-        rotation = checks.nearest_rotation(pose[:, :3], where)
-        shots.append(ImportedImage(name, cameras[image.camera_id], rotation, pose[:, 3].copy()))
-        seen = image.get_observation_points2D() if len(ids) else []
-        references.append(np.array([p.point3D_id for p in seen], np.uint64))
-        pixels.append(check_finite(np.array([p.xy for p in seen]).reshape(-1, 2), where))
-        owners.append(np.full(len(seen), i))
-    check_distinct([s.name for s in shots], str(files["images"]))
-    if not shots or not len(ids):
-        return ImportedModel(tuple(shots))
-    flat, owner = np.concatenate(references), np.concatenate(owners)
-    missing = np.flatnonzero(~np.isin(flat, ids))
-    if len(missing):
-        point, name = flat[missing[0]], shots[owner[missing[0]]].name
-        raise InputError(f"{files['points3D']}: has no point {point}, which {name} sees; export the model again")
-    points = [stored.points3D[int(i)] for i in ids]
-    places = check_finite(np.array([p.xyz for p in points]), str(files["points3D"]))
-    colours = (np.array([p.color for p in points]) / 255).astype(np.float32)
-    return ImportedModel(tuple(shots), places, colours, np.searchsorted(ids, flat), owner, np.concatenate(pixels))
+        pose = checks.check_pose(image.cam_from_world().matrix(), f"{files['images']}: image {name}")
+        images.append(ImportedImage(name, cameras[image.camera_id], *pose, number))
+    return ImportedModel(tuple(images), stored)
 
 
 def _read_reconstruction(files: dict[str, Path]) -> pycolmap.Reconstruction:

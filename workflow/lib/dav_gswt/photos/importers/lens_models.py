@@ -2,59 +2,35 @@
 
 import numpy as np
 import pycolmap
-from jaxtyping import Float
-from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.images import image_files
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.photos.lenses import make_camera
 
-FOCAL = (0.01, 1000.0)  # in longer sides: beyond, the number is in another unit
 QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # turns the picture clockwise: right becomes down
 TURNS = {1: 0, 6: 1, 3: 2, 8: 3}  # quarter turns clockwise that EXIF's orientation asks for; the others mirror
 STRAY = 2.0  # pixels by which a pinhole's border may look past the photo's
 _SWAPPED = {"fx": "fy", "fy": "fx", "cy": "cx"}
-_MODELS = pycolmap.CameraModelId.__members__
 
 
-def make_perspective_camera(
-    width: int, height: int, pinhole: tuple, k: tuple = (), p: tuple = (), where: str = ""
+def make_lens(
+    size: tuple[int, int], pinhole: tuple, k: tuple, p: tuple = (), fisheye: bool = False, where: str = ""
 ) -> pycolmap.Camera:
-    """A lens after Brown. pinhole: fx, fy, cx, cy. k: up to three radial terms; p: OpenCV's two tangential ones.
+    """A lens by pinhole (fx, fy, cx, cy), up to four radial terms k, and OpenCV's two tangential ones p.
 
-    With x, y before the camera at depth 1 and r^2 = x^2 + y^2 the picture is at
+    After Brown: with x, y before the camera at depth 1 and r^2 = x^2 + y^2 the picture is at
     x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and y likewise with p1 and p2 exchanged.
+    A fisheye, after Kannala and Brandt: a ray at the angle t off the axis lands at t (1 + k1 t^2 + ... + k4 t^8).
     """
-    k1, k2, k3 = (*k, 0.0, 0.0, 0.0)[:3]
+    k1, k2, k3, k4 = (*k, 0.0, 0.0, 0.0, 0.0)[:4]
     p1, p2 = (*p, 0.0, 0.0)[:2]
+    if fisheye:
+        return make_camera("OPENCV_FISHEYE", *size, (*pinhole, k1, k2, k3, k4), where)
     if k3:
-        return make_camera("FULL_OPENCV", width, height, (*pinhole, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0), where)
+        return make_camera("FULL_OPENCV", *size, (*pinhole, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0), where)
     if k1 or k2 or p1 or p2:
-        return make_camera("OPENCV", width, height, (*pinhole, k1, k2, p1, p2), where)
-    return make_camera("PINHOLE", width, height, pinhole, where)
-
-
-def make_fisheye_camera(width: int, height: int, pinhole: tuple, k: tuple = (), where: str = "") -> pycolmap.Camera:
-    """A fisheye after Kannala and Brandt: a ray at the angle t off the axis lands at t (1 + k1 t^2 + ... + k4 t^8)."""
-    return make_camera("OPENCV_FISHEYE", width, height, (*pinhole, *(*k, 0.0, 0.0, 0.0, 0.0)[:4]), where)
-
-
-def make_camera(model: str, width: int, height: int, params: tuple, where: str) -> pycolmap.Camera:
-    """A camera of one of COLMAP's models. Raises: InputError: unknown, spherical, or numbers that no lens has."""
-    if model not in _MODELS or model in ("INVALID", "EQUIRECTANGULAR"):
-        raise InputError(f"{where}: pictures of a camera {model} are not read; export pictures of a perspective camera")
-    if not (min(width, height) >= 1 and width * height <= image_files.MAX_PIXELS):
-        most = image_files.MAX_PIXELS // 10**6
-        raise InputError(f"{where}: pictures of {width} x {height} pixels; 1 pixel to {most} megapixels are read")
-    camera = pycolmap.Camera(model=model, width=width, height=height, params=[float(v) for v in params])
-    if not camera.verify_params() or not np.isfinite(camera.params).all():
-        raise InputError(f"{where}: {model} needs finite numbers for {camera.params_info}, not {list(params)[:16]}")
-    low, high = (side * max(width, height) for side in FOCAL)
-    if not all(low <= f <= high for f in (camera.focal_length_x, camera.focal_length_y)):
-        raise InputError(
-            f"{where}: focal lengths {camera.focal_length_x:g}, {camera.focal_length_y:g} for {width} x {height} "
-            "pixels; they must be positive and in pixels (of OpenSfM: in longer sides)"
-        )
-    return camera
+        return make_camera("OPENCV", *size, (*pinhole, k1, k2, p1, p2), where)
+    return make_camera("PINHOLE", *size, pinhole, where)
 
 
 def fit_camera_to_photo(
@@ -82,53 +58,29 @@ def fit_camera_to_photo(
     )
 
 
-def undistort_camera(camera: pycolmap.Camera, side: int, where: str) -> tuple[pycolmap.Camera, pycolmap.Camera]:
-    """The lens at the size of the picture, at most `side` pixels long, and the pinhole camera that replaces it.
+def require_invertible(lens: pycolmap.Camera, pinhole: Camera, where: str) -> None:
+    """Raises: InputError: the distortion of a lens folds over within the picture of its pinhole camera.
 
-    Raises: InputError: the distortion folds over within the picture, so that it cannot be undone.
+    What the pinhole sees must lie in the photo, and the way back must lead to the same ray.
     """
-    small = shrink_camera(camera, side)
-    limits = pycolmap.UndistortCameraOptions(blank_pixels=0, max_image_size=side)
-    found = pycolmap.undistort_camera(limits, small)
-    if not _is_invertible(small, found):
-        raise InputError(
-            f"{where}: the distortion of its camera cannot be undone over the whole picture (parameters "
-            f"{camera.params_info}: {camera.params_to_string()}); check them, or calibrate again with fewer terms"
-        )
-    return small, found
-
-
-def shrink_camera(camera: pycolmap.Camera, side: int) -> pycolmap.Camera:
-    """The lens of the picture shrunk to at most `side` pixels; pictures are never enlarged."""
-    return _scale_camera(camera, *image_files.fit_size(camera.width, camera.height, side))
-
-
-def unproject_pixels(camera: pycolmap.Camera, pixels: Float[Array, "m 2"]) -> Float[Array, "m 2"]:
-    """Where rays cross depth 1; NaN where the lens has no such ray (the library then gives anything)."""
-    found = np.array(camera.cam_from_img(np.ascontiguousarray(pixels)), float).reshape(-1, 2)
-    back = np.asarray(camera.img_from_cam(np.c_[found, np.ones(len(found))])).reshape(-1, 2)
-    with np.errstate(invalid="ignore"):
-        found[~(np.abs(back - pixels).max(1, initial=0.0) < 0.01)] = np.nan
-    return found
+    params = [pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy]
+    if np.isfinite(params).all() and min(params[:2]) > 0:
+        x, y = np.meshgrid(np.linspace(0, pinhole.width, 17), np.linspace(0, pinhole.height, 17))
+        rays = np.stack([(x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy], -1).reshape(-1, 2)
+        seen = np.asarray(lens.img_from_cam(np.c_[rays, np.ones(len(rays))]))
+        back = np.asarray(lens.cam_from_img(np.ascontiguousarray(seen)))
+        inside = (seen >= -STRAY) & (seen <= np.array([lens.width, lens.height]) + STRAY)
+        if inside.all() and (np.abs(back - rays).max(1) * max(params[:2]) < 1).all():
+            return
+    raise InputError(
+        f"{where}: the distortion of its camera cannot be undone over the whole picture (parameters "
+        f"{lens.params_info}: {lens.params_to_string()}); check them, or calibrate again with fewer terms"
+    )
 
 
 def camera_key(camera: pycolmap.Camera) -> tuple:
     """What two equal lenses have in common."""
     return camera.model_name, camera.width, camera.height, *camera.params.tolist()
-
-
-def _is_invertible(small: pycolmap.Camera, found: pycolmap.Camera) -> bool:
-    """Whether what the pinhole sees lies in the photo, and the way back leads to the same ray."""
-    if not np.isfinite(found.params).all() or min(found.params[:2]) <= 0:
-        return False
-    x, y = np.meshgrid(np.linspace(0, found.width, 17), np.linspace(0, found.height, 17))
-    (fx, fy, cx, cy), size = found.params, np.array([small.width, small.height])
-    at = np.stack([(x - cx) / fx, (y - cy) / fy], -1).reshape(-1, 2)
-    seen = np.asarray(small.img_from_cam(np.c_[at, np.ones(len(at))]))
-    if not ((seen >= -STRAY) & (seen <= size + STRAY)).all():
-        return False
-    back = np.asarray(small.cam_from_img(np.ascontiguousarray(seen)))
-    return bool((np.abs(back - at).max(1) * max(fx, fy) < 1).all())
 
 
 def _same_shape(camera: pycolmap.Camera, size: tuple[int, int]) -> bool:
@@ -139,8 +91,7 @@ def _same_shape(camera: pycolmap.Camera, size: tuple[int, int]) -> bool:
 
 def _scale_camera(camera: pycolmap.Camera, width: int, height: int) -> pycolmap.Camera:
     camera = pycolmap.Camera(camera.todict())
-    if (camera.width, camera.height) != (width, height):
-        camera.rescale(width, height)
+    camera.rescale(width, height)
     return camera
 
 

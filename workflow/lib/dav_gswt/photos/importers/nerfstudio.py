@@ -6,33 +6,62 @@ not depend on them. Pixel centres are at half integers, as in COLMAP.
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pycolmap
-from jaxtyping import Float
-from numpy import ndarray as Array
+from pydantic import Field
 
 from dav_gswt.errors import InputError
 from dav_gswt.photos.importers.checks import (
     ImportedImage,
     ImportedModel,
-    check_distinct,
-    check_entry,
+    check_count,
     check_image_name,
-    check_number,
-    check_numbers,
-    nearest_rotation,
+    check_pose,
+    parse_part,
 )
-from dav_gswt.photos.importers.lens_models import make_fisheye_camera, make_perspective_camera
+from dav_gswt.photos.importers.lens_models import make_lens
 
 PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV")
 FISHEYE = "OPENCV_FISHEYE"
 OPENGL = np.array([1.0, -1.0, -1.0])  # its camera looks along -z with y up
-NUMBERS = (
-    *(("w",), ("h",), ("fl_x", "camera_angle_x"), ("fl_y", "camera_angle_y"), ("cx",), ("cy",)),
-    *((key,) for key in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")),
-)  # of a lens; of alternatives the first is used
+Angle = Annotated[float, Field(gt=0, lt=math.pi)]  # a field of view
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame of the file. transform_matrix: its first three or all four rows; takes the camera to the world."""
+
+    file_path: str
+    transform_matrix: Annotated[list[tuple[float, float, float, float]], Field(min_length=3, max_length=4)]
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """What the file says of a lens. camera_angle_x, camera_angle_y: fields of view, used where fl_x or fl_y is not
+    given."""
+
+    w: float | None = None
+    h: float | None = None
+    fl_x: float | None = None
+    fl_y: float | None = None
+    camera_angle_x: Angle | None = None
+    camera_angle_y: Angle | None = None
+    cx: float | None = None
+    cy: float | None = None
+    k1: float = 0.0
+    k2: float = 0.0
+    k3: float = 0.0
+    k4: float = 0.0
+    k5: float = 0.0
+    k6: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    camera_model: str | None = None
+    is_fisheye: bool = False
 
 
 def import_nerfstudio(
@@ -43,77 +72,53 @@ def import_nerfstudio(
 
     size_of: of a photo by its name, for files that give no size. Raises: InputError: with file, frame and key.
     """
-    frames = check_entry(values, "frames", list, str(path))
-    shots, lens_of = [], {}
-    for i, frame in enumerate(frames):
-        label = check_entry(frame, "file_path", str, f"{path}: frame {i}")
-        name = check_image_name(label, photos, f"{path}: frame {i}")
+    check_count(len(values["frames"]), str(path))
+    images, lens_of = [], {}
+    for i, part in enumerate(values["frames"]):
+        frame = parse_part(part, Frame, f"{path}: frame {i}")
+        name = check_image_name(frame.file_path, photos, f"{path}: frame {i}")
         where = f"{path}: frame {name}"
-        rotation, translation = _pose(frame, where)
-        intrinsics = _intrinsics(values, frame, name, size_of, where)
-        if intrinsics is not None and intrinsics not in lens_of:
-            lens_of[intrinsics] = _lens(dict(intrinsics), where)
-        shots.append(ImportedImage(name, lens_of.get(intrinsics), rotation, translation))
-    check_distinct([s.name for s in shots], str(path))
-    return ImportedModel(tuple(shots))
+        if frame.transform_matrix[3:] not in ([], [(0, 0, 0, 1)]):
+            raise InputError(f"{where}: transform_matrix: its last row is not 0 0 0 1; export the file again")
+        turn, centre = check_pose(np.array(frame.transform_matrix[:3]), f"{where}: transform_matrix")
+        turn = turn * OPENGL
+        said = _read_intrinsics(values, part, where)
+        if said.w is None or said.h is None:
+            if not (size := size_of(name)):
+                continue  # there is no such photo
+            said = replace(said, w=float(size[0]), h=float(size[1]))
+        if said not in lens_of:
+            lens_of[said] = _make_lens(said, where)
+        images.append(ImportedImage(name, lens_of[said], turn.T, -turn.T @ centre))
+    return ImportedModel(tuple(images))
 
 
-def _pose(frame: dict, where: str) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
-    """Rotation and translation into the camera, with x right and y down."""
-    values, where = check_entry(frame, "transform_matrix", list, where), f"{where}: transform_matrix"
-    rows = 4 if len(values) == 4 else 3
-    matrix = np.eye(4)
-    matrix[:rows] = check_numbers(values, (rows, 4), where)
-    if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
-        raise InputError(f"{where}: its last row is not 0 0 0 1; export the file again")
-    turn = nearest_rotation(matrix[:3, :3], where) * OPENGL
-    return turn.T, -turn.T @ matrix[:3, 3]
+def _read_intrinsics(values: dict, frame: dict, where: str) -> Intrinsics:
+    """What the file says about a frame's lens, for the frame before for all."""
+    keys = [field.name for field in fields(Intrinsics)]
+    own, shared = ({key: part[key] for key in keys if part.get(key) is not None} for part in (frame, values))
+    for axis in "xy":
+        if f"camera_angle_{axis}" in own:
+            shared.pop(f"fl_{axis}", None)
+    return parse_part(shared | own, Intrinsics, where)
 
 
-def _intrinsics(values: dict, frame: dict, name: str, size_of: Callable, where: str) -> tuple | None:
-    """What the file says about a frame's lens, for the frame before for all; None where there is no size."""
-    out = {}
-    for keys in NUMBERS:
-        said = [(key, source[key]) for source in (frame, values) for key in keys if source.get(key) is not None]
-        for key, value in said[:1]:
-            out[key] = check_number(value, f"{where}: {key}")
-    if "w" not in out or "h" not in out:
-        if (size := size_of(name)) is None:
-            return None
-        out |= {"w": float(size[0]), "h": float(size[1])}
-    model = frame.get("camera_model") or values.get("camera_model")
-    fisheye = frame.get("is_fisheye") is True or values.get("is_fisheye") is True
-    return (("model", str(model or (FISHEYE if fisheye else "OPENCV"))), *sorted(out.items()))
-
-
-def _lens(intrinsics: dict, where: str) -> pycolmap.Camera:
+def _make_lens(said: Intrinsics, where: str) -> pycolmap.Camera:
     """The lens that a frame's intrinsics describe."""
-    for key in ("w", "h"):
-        if intrinsics[key] != round(intrinsics[key]) or not 1 <= intrinsics[key] < 1e6:
-            raise InputError(f"{where}: {key} is {intrinsics[key]:g}; it is a number of pixels")
-    width, height, model = round(intrinsics["w"]), round(intrinsics["h"]), intrinsics["model"]
-    for axis, side in (("x", width), ("y", height)):
-        if (angle := intrinsics.get(f"camera_angle_{axis}")) is not None:
-            if not 0 < angle < math.pi:
-                raise InputError(f"{where}: camera_angle_{axis} is {angle:g}; a field of view lies between 0 and 3.14")
-            intrinsics[f"fl_{axis}"] = 0.5 * side / math.tan(0.5 * angle)
-    if "fl_x" not in intrinsics:
+    assert said.w is not None and said.h is not None
+    width, height = round(said.w), round(said.h)
+    fx = said.fl_x or (0.5 * width / math.tan(0.5 * said.camera_angle_x) if said.camera_angle_x else None)
+    fy = said.fl_y or (0.5 * height / math.tan(0.5 * said.camera_angle_y) if said.camera_angle_y else fx)
+    if fx is None or fy is None:
         raise InputError(f"{where}: neither fl_x nor camera_angle_x; add the focal length in pixels, for all or for it")
-    pinhole = (
-        intrinsics["fl_x"],
-        intrinsics.get("fl_y", intrinsics["fl_x"]),
-        intrinsics.get("cx", width / 2),
-        intrinsics.get("cy", height / 2),
-    )
-    k = tuple(intrinsics.get(f"k{i}", 0.0) for i in range(1, 5))
-    p = tuple(intrinsics.get(key, 0.0) for key in ("p1", "p2"))
+    cx, cy = width / 2 if said.cx is None else said.cx, height / 2 if said.cy is None else said.cy
+    model = said.camera_model or (FISHEYE if said.is_fisheye else "OPENCV")
     if model != FISHEYE and model not in PERSPECTIVE:
         known = ", ".join((*PERSPECTIVE, FISHEYE))
         raise InputError(f"{where}: camera_model {model[:40]} is not read, only {known}; undistort the pictures first")
     unused = ("k5", "k6", "p1", "p2") if model == FISHEYE else ("k4", "k5", "k6")  # programs differ in their meaning
     for key in unused:
-        if intrinsics.get(key, 0.0) != 0:
+        if getattr(said, key) != 0:
             raise InputError(f"{where}: {key} is not read with camera_model {model}; calibrate without it")
-    if model == FISHEYE:
-        return make_fisheye_camera(width, height, pinhole, k, where)
-    return make_perspective_camera(width, height, pinhole, k[:3], p, where)
+    k, p = (said.k1, said.k2, said.k3, said.k4), (said.p1, said.p2)
+    return make_lens((width, height), (fx, fy, cx, cy), k, p, model == FISHEYE, where)

@@ -5,34 +5,27 @@ from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-import numpy as np
 import pycolmap
-from jaxtyping import Float
-from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos.importers import lens_models
-from dav_gswt.photos.importers.checks import ImportedModel
+from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel
 from dav_gswt.photos.importers.lens_models import fit_camera_to_photo
 from dav_gswt.photos.photo_files import name_pictures, split_stem
 
 
 @dataclass(frozen=True)
 class MatchedPhoto:
-    """A photo and its place. lens: upright, at the photo's size. index: of the shot in the model.
+    """A photo and its image in the model. lens: upright, at the photo's size.
 
-    turns: quarter turns clockwise from the picture that the model speaks of to the upright one; rotation and
-    translation are the upright camera's.
+    turns: quarter turns clockwise from the picture that the model speaks of to the upright one.
     """
 
     path: Path
     key: str
-    index: int
+    image: ImportedImage
     lens: pycolmap.Camera
     turns: int
-    rotation: Float[Array, "3 3"]
-    translation: Float[Array, "3"]
 
 
 class PhotoFolder:
@@ -73,16 +66,16 @@ def match_photos_to_images(
     A photo without a camera is reported where another photo of the same folder has one.
     Raises: InputError: a photo that does not fit its camera, or is that of two images.
     """
-    owners: dict[str, int] = {}
+    owners: dict[str, ImportedImage] = {}
     left_out = []
-    for i, shot in enumerate(given.shots):
-        found = folder.find(shot.name)
+    for image in given.images:
+        found = folder.find(image.name)
         if found is None:
-            left_out.append((shot.name, f"{folder.folder} has no photo of this name (or several of this file name)"))
+            left_out.append((image.name, f"{folder.folder} has no photo of this name (or several of this file name)"))
         elif found in owners:
-            raise InputError(f"{source}: {given.shots[owners[found]].name} and {shot.name} are one photo: {found}")
+            raise InputError(f"{source}: {owners[found].name} and {image.name} are one photo: {found}")
         else:
-            owners[found] = i
+            owners[found] = image
     homes = {PurePosixPath(name).parent for name in owners}
     for name in folder.photos:
         if name not in owners and PurePosixPath(name).parent in homes:
@@ -90,10 +83,8 @@ def match_photos_to_images(
     out = []
     names = sorted(owners)
     for name, key in zip(names, name_pictures(names), strict=True):
-        shot, path = given.shots[owners[name]], folder.photos[name]
+        image, path = owners[name], folder.photos[name]
         width, height, orientation = image_files.read_stored_size(path)
-        assert shot.lens is not None  # its photo is there, so its size is known
-        lens, turns = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
-        turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
-        out.append(MatchedPhoto(path, key, owners[name], lens, turns, turn @ shot.rotation, turn @ shot.translation))
+        lens, turns = fit_camera_to_photo(image.lens, (width, height), orientation, f"{source}: {image.name}")
+        out.append(MatchedPhoto(path, key, image, lens, turns))
     return sorted(out, key=lambda p: p.key), tuple(left_out)

@@ -50,15 +50,12 @@ def fit_field_frame(
     Only the colour that is the same from all sides is kept (degree 0).
     Raises: InputError: too few opaque Gaussians, or no ground across `up`.
     """
-    direction = np.asarray(up, float)
-    if direction.shape != (3,) or not np.linalg.norm(direction) > 0 or not np.isfinite(direction).all():
-        raise InputError(f"up: {list(up)} is no direction; give three numbers that are not all 0")
     before, degree = len(field), field.sh_degree
     if degree > 0:
         _log.warning("view-dependent colour (degree %d) is dropped: the colour from all sides is kept", degree)
         field = replace(field, sh=np.ascontiguousarray(field.sh[:, :1]))
     field = field[_select_near(field)]
-    field, relief = _level_field(field, direction, rng)
+    field, relief = _level_field(field, np.array(up, float), rng)
     field, side, height = _center_on_exemplar(field)
     extent = find_extent(*_opaque_ground(*_project_discs(field), CELLS))
     side, relief = float(side / height), float(relief / height)
@@ -119,10 +116,10 @@ def _level_field(field: GaussianField, up: Float[Array, "3"], rng: np.random.Gen
 
 
 def _transform_field(
-    field: GaussianField, rotation: Float[Array, "3 3"], scale: float = 1.0, shift: Float[Array, "3"] | None = None
+    field: GaussianField, rotation: Float[Array, "3 3"], scale: float, shift: Float[Array, "3"]
 ) -> GaussianField:
     """The field in another world frame: p becomes scale * rotation @ p + shift. Colours of degree 0 do not turn."""
-    means = scale * field.means.astype(float) @ rotation.T + (0.0 if shift is None else shift)
+    means = scale * field.means.astype(float) @ rotation.T + shift
     # Rotation composes in x y z w and normalises; a length that float32 cannot square must not overflow on the way.
     quats = field.quats / np.abs(field.quats).max(1, keepdims=True)
     turned = (Rotation.from_matrix(rotation) * Rotation.from_quat(quats[:, [1, 2, 3, 0]])).as_quat()

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.photos.colmap_model import bundle_adjust_with_priors
+from dav_gswt.photos.colmap_model import bundle_adjust
 from dav_gswt.photos.photo_files import read_gps_position
 
 _log = logging.getLogger(__name__)
@@ -89,8 +89,16 @@ def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]
         _log.warning("the photos' GPS positions are %.0f m off where the photos themselves place them: unused", off)
         return False
     best.transform(pycolmap.Sim3d(scale, pycolmap.Rotation3d(turn), shift))
-    priors = [_make_pose_prior(best.images[i], at[best.images[i].name]) for i in numbers]
-    bundle_adjust_with_priors(best, priors)
+    priors = [
+        pycolmap.PosePrior(
+            corr_data_id=best.images[i].data_id,
+            position=position,
+            position_covariance=np.diag([ACROSS**2, ACROSS**2, UP**2]),
+            coordinate_system=pycolmap.PosePriorCoordinateSystem.CARTESIAN,
+        )
+        for i, position in zip(numbers, positions, strict=True)
+    ]
+    bundle_adjust(best, priors=priors)
     _log.info("GPS: the photos lie in metres, %.1f m from their positions (median)", off)
     return True
 
@@ -115,11 +123,3 @@ def fit_similarity(
         off = np.linalg.norm(scale * a @ turn.T + shift - b, axis=1)
         weight = (1 + (off / ACROSS) ** 2) ** -2
     return scale, turn, shift, float(np.median(off))
-
-
-def _make_pose_prior(image: pycolmap.Image, at: Float[Array, "3"]) -> pycolmap.PosePrior:
-    """A GPS position (metres east, north and up) as bundle adjustment takes it, with the error of a receiver."""
-    prior = pycolmap.PosePrior(corr_data_id=image.data_id, position=at)
-    prior.position_covariance = np.diag([ACROSS**2, ACROSS**2, UP**2])
-    prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.CARTESIAN
-    return prior

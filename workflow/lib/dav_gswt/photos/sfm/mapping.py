@@ -26,8 +26,7 @@ from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import bundle_adjust, model_from_reconstruction
 from dav_gswt.photos.ground_frame import fit_plane
 from dav_gswt.photos.sfm.features import run_cancellable
-from dav_gswt.photos.sfm.gps import GpsPositions
-from dav_gswt.photos.sfm.verdict import COVERAGE, LEAST_INLIERS, SfmEvidence, judge_model
+from dav_gswt.photos.sfm.verdict import COVERAGE, LEAST_INLIERS, judge_model
 
 _log = logging.getLogger(__name__)
 
@@ -69,20 +68,14 @@ class SfmPhoto:
 
 @dataclass(frozen=True)
 class SfmScene:
-    """The input of mapping. held: EXIF's focal lengths by camera. database: COLMAP's, of features and matches."""
+    """The input of mapping. held: EXIF's focal lengths by camera. gps: positions by the images' names; empty if the
+    photos have none. database: COLMAP's, of features and matches."""
 
     folder: Path | str
     photos: list[SfmPhoto]
     held: dict[int, float]
-    positions: GpsPositions | None
+    gps: dict[str, Float[Array, "3"]]
     database: Path
-
-    @property
-    def gps(self) -> dict[str, Float[Array, "3"]]:
-        """GPS positions by the images' names; empty if the photos have none."""
-        if self.positions is None:
-            return {}
-        return {photo.key: at for photo, at in zip(self.photos, self.positions.at, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -170,15 +163,16 @@ def _solve(approach: Approach, scene: SfmScene, seed: int) -> SfmSolution:
             "overlap by more than half and show texture: take more from closer positions, or remove what shows "
             "something else"
         )
-    settled = settle_focal_length(best, scene.held, np.random.default_rng(seed), approach.hold_focal)
+    best, settled = settle_focal_length(best, scene.held, np.random.default_rng(seed), approach.hold_focal)
     model = model_from_reconstruction(best)
-    evidence = SfmEvidence(
+    verdict = judge_model(
+        model,
+        np.random.default_rng(seed),
         error=float(best.compute_mean_reprojection_error()),
         images=len(photos),
         focal_ratio=settled.free / settled.exif if settled.free and settled.exif else None,
         positions=np.stack([gps[name] for name in model.names]) if gps else None,
     )
-    verdict = judge_model(model, evidence, np.random.default_rng(seed))
     return SfmSolution(best, left_out, settled, verdict, unsure)
 
 
@@ -258,8 +252,8 @@ def _map_globally(known: bool, database: Path, scratch: Path, seed: int) -> list
 
 def settle_focal_length(
     best: pycolmap.Reconstruction, held: dict[int, float], rng: np.random.Generator, hold: bool = False
-) -> FocalLength:
-    """Settle the focal length of a reconstruction, in place. held: EXIF's by camera, kept so far. hold: it stays.
+) -> tuple[pycolmap.Reconstruction, FocalLength]:
+    """The reconstruction with its settled focal length. held: EXIF's by camera, kept so far. hold: it stays.
 
     Raises: InputError: a solution that no lens gives.
     """
@@ -285,7 +279,7 @@ def settle_focal_length(
         else:
             decision = f"EXIF's: the photos alone would say {ratio:.3f} times that, but look too straight down to know"
         if fixes and not hold:
-            _take_over(best, free)
+            best = free
     else:
         decision = "found by the photos alone: no EXIF says it"
         if not fixes:
@@ -297,19 +291,10 @@ def settle_focal_length(
                 f"the photos lead to a focal length of {sides:.2f} picture widths, which no usual lens has: they do "
                 "not fix it; add photos that look from the side, or give the scene's `focal` in the config"
             )
-    return FocalLength(
+    return best, FocalLength(
         float(np.median(exif)) if exif else None,
         float(np.median([best.cameras[c].focal_length for c in used])),
         float(np.median([free.cameras[c].focal_length for c in used])) if free else None,
         float(np.percentile(tilts, 95)),
         decision,
     )
-
-
-def _take_over(best: pycolmap.Reconstruction, free: pycolmap.Reconstruction) -> None:
-    for number, camera in free.cameras.items():
-        best.cameras[number].params = camera.params
-    for image in (free.images[number] for number in best.reg_image_ids()):
-        best.frames[image.frame_id].rig_from_world = free.frames[image.frame_id].rig_from_world
-    for number, point in free.points3D.items():
-        best.points3D[number].xyz = point.xyz

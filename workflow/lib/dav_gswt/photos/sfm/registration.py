@@ -7,6 +7,7 @@ and its random numbers start from the seed. Mapping uses one thread. So a run re
 
 import logging
 import tempfile
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +26,7 @@ from dav_gswt.photos.lenses import undistort_photo
 from dav_gswt.photos.photo_files import convert_equivalent, name_pictures, read_focal_length
 from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
 from dav_gswt.photos.sfm.gps import GpsPositions, align_to_gps, read_gps_positions
-from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS, SfmPhoto, SfmScene, SfmSolution, find_solution
+from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS, SfmPhoto, SfmScene, find_solution
 from dav_gswt.photos.sfm.verdict import require_trust
 from dav_gswt.threads import map_ahead
 
@@ -95,24 +96,32 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
             held = _enter_images(photos, store)
         extract_features(Path(scratch), database, options.size, options.features, options.threads)
         match_photos(len(photos), database, NEIGHBOURS, options.threads, options.seed)
-        scene = SfmScene(folder, photos, held, positions, database)
-        solution = find_solution(scene, options.seed)
+        gps = dict(zip(keys, positions.at, strict=True)) if positions else {}
+        solution = find_solution(SfmScene(folder, photos, held, gps, database), options.seed)
     for name, reason in solution.left_out:
         _log.warning("%s is left out: %s", name, reason)
     _log.info("focal length: %s", solution.focal.decision)
     verdict = solution.verdict
-    if verdict.grade == "good":
-        _log.info("structure from motion: good, by %s", ", ".join(sign.name for sign in verdict.signs))
+    for text in verdict.tried:
+        _log.info("structure from motion: %s", text)
     for sign in verdict.objections:
         _log.warning("structure from motion is %s: %s", sign.grade, sign.reason)
-    for text in verdict.tried[1:]:
-        _log.info("tried: %s", text)
     require_trust(verdict)
-    if positions and not align_to_gps(solution.best, scene.gps):
+    if positions and not align_to_gps(solution.best, gps):
         positions = None
-    made = _finish_registration(photos, solution, options, positions)
-    require_parallax(intersect_rays(made.model)[1])
-    return made
+    model, lenses = replace_lenses(solution.best, {photo.key: photo.full for photo in photos}, options.side)
+    require_parallax(intersect_rays(model)[1])
+    by_key = {photo.key: photo.path for photo in photos}
+    return Registration(
+        model,
+        tuple(by_key[name] for name in model.names),
+        lenses,
+        solution.left_out,
+        solution.focal,
+        float(solution.best.compute_mean_reprojection_error()),
+        positions,
+        verdict,
+    )
 
 
 def require_parallax(spread: Float[Array, "n"]) -> None:
@@ -172,28 +181,20 @@ def _write_shrunk_photos(photos: list[SfmPhoto], folder: Path, threads: int) -> 
         pass
 
 
-def _finish_registration(
-    photos: list[SfmPhoto], solution: SfmSolution, options: SfmOptions, positions: GpsPositions | None
-) -> Registration:
-    """Bring cameras to the size of the pictures, and give each its pinhole."""
-    best = solution.best
-    by_key = {photo.key: photo for photo in photos}
-    limits = pycolmap.UndistortCameraOptions(blank_pixels=0, max_image_size=options.side)
+def replace_lenses(
+    best: pycolmap.Reconstruction, full: Mapping[str, tuple[int, int]], side: int
+) -> tuple[ColmapModel, tuple[pycolmap.Camera, ...]]:
+    """The model with a pinhole in place of each lens, and the lenses of its images, both at the size of the pictures.
+
+    full: sizes of the photos by the images' names.
+    """
+    limits = pycolmap.UndistortCameraOptions(blank_pixels=0, max_image_size=side)
     numbers = {best.images[i].name: best.images[i].camera_id for i in best.reg_image_ids()}
-    found, pinholes = {}, {}
+    lenses, pinholes = {}, {}
     for name, number in numbers.items():
-        if number not in found:
+        if number not in lenses:
             lens = pycolmap.Camera(best.cameras[number].todict())
-            lens.rescale(*image_files.fit_size(*by_key[name].full, options.side))
-            found[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
-    sparse = model_from_reconstruction(best, pinholes=pinholes)
-    return Registration(
-        sparse,
-        tuple(by_key[name].path for name in sparse.names),
-        tuple(found[numbers[name]] for name in sparse.names),
-        solution.left_out,
-        solution.focal,
-        float(best.compute_mean_reprojection_error()),
-        positions,
-        solution.verdict,
-    )
+            lens.rescale(*image_files.fit_size(*full[name], side))
+            lenses[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
+    model = model_from_reconstruction(best, pinholes=pinholes)
+    return model, tuple(lenses[numbers[name]] for name in model.names)

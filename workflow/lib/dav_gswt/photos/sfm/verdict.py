@@ -5,7 +5,6 @@ two signs, one of them refused, or three doubts refuse the model.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -18,28 +17,19 @@ from dav_gswt.photos.colmap_model import ColmapModel
 from dav_gswt.photos.ground_frame import fit_plane, make_upright_rotation
 from dav_gswt.photos.sfm.gps import ACROSS, LEAST_SPREAD, WORST, fit_similarity, measure_spread
 
-
-@dataclass(frozen=True)
-class Threshold:
-    """Beyond which a sign is doubtful, and beyond which refused. alone: refused, it refuses the model by itself."""
-
-    doubtful: float
-    refused: float
-    why: str
-    alone: bool = False
-
-
+# Of each sign the values beyond which it is doubtful, and beyond which refused.
 THRESHOLDS = {
-    "reprojection error": Threshold(0.9, 2.0, "pixels; good sets have 0.18 to 0.57, one of fog had 1.39", alone=True),
-    "track length": Threshold(1 / 2.6, 1 / 2.2, "1 / photos a point; points by chance have two, others three or more"),
-    "GPS": Threshold(0.5, 0.7, "of the flight's extent; receivers that lag have 0.35, positions by chance 0.8"),
-    "ground": Threshold(30.0, 50.0, "degrees between the ground's normal and the vertical; slopes stay below 30"),
-    "tilt": Threshold(75.0, 85.0, "degrees off the vertical, median; ground seen so flat fills no square"),
-    "focal length": Threshold(1.25, 1.6, "times EXIF's or its inverse; from above, free estimates end up to 1.15 off"),
-    "roughness": Threshold(0.04, 0.1, "of the distance, between points side by side in a photo; fog has no surface"),
-    "relief": Threshold(0.2, 1 / 3, "of the flying height; above a third no plane is a ground"),
-    "placed": Threshold(0.5, 0.9, "of the photos that found no place; then the set is not what was meant"),
-}  # fmt: skip
+    "reprojection error": (0.9, 2.0),  # pixels; good sets have 0.18 to 0.57, one of fog had 1.39
+    "track length": (1 / 2.6, 1 / 2.2),  # 1 / photos a point; points by chance have two, others three or more
+    "GPS": (0.5, 0.7),  # of the flight's extent; receivers that lag have 0.35, positions by chance 0.8
+    "ground": (30.0, 50.0),  # degrees between the ground's normal and the vertical; slopes stay below 30
+    "tilt": (75.0, 85.0),  # degrees off the vertical, median; ground seen so flat fills no square
+    "focal length": (1.25, 1.6),  # times EXIF's or its inverse; from above, free estimates end up to 1.15 off
+    "roughness": (0.04, 0.1),  # of the distance, between points side by side in a photo; fog has no surface
+    "relief": (0.2, 1 / 3),  # of the flying height; above a third no plane is a ground
+    "placed": (0.5, 0.9),  # of the photos that found no place; then the set is not what was meant
+}
+ALONE = ("reprojection error",)  # refused, it refuses the model by itself
 FAR = 10 * ACROSS  # metres: no receiver is so wrong, however long the flight
 COVERAGE = ("placed",)  # signs about what is missing: they contradict nothing
 NEIGHBOURS = 6  # points beside a point in a photo
@@ -47,40 +37,40 @@ LEAST_INLIERS = 30  # matches that hold two photos together; mapping needs as ma
 FEW = 5  # photos; in smaller sets tracks are short anyway
 
 
-@dataclass(frozen=True)
-class SfmEvidence:
-    """What is known beside the model.
+def judge_model(
+    model: ColmapModel,
+    rng: np.random.Generator,
+    error: float,
+    images: int,
+    focal_ratio: float | None = None,
+    positions: Float[Array, "n 3"] | None = None,
+) -> SfmVerdict:
+    """The verdict on a model, its world frame being any, by what is known beside it.
 
     error: mean reprojection error at the size of features, pixels. images: of the set. focal_ratio: the freely adjusted
     focal length over EXIF's. positions: by GPS, of the model's images, metres east, north and up; NaN where a photo has
     none.
     """
-
-    error: float
-    images: int
-    focal_ratio: float | None = None
-    positions: Float[Array, "n 3"] | None = None
-
-
-def judge_model(model: ColmapModel, evidence: SfmEvidence, rng: np.random.Generator) -> SfmVerdict:
-    """The verdict on a model, its world frame being any."""
     normal, offset, spread = fit_plane(model.points, rng)
-    signs: list[SfmSign | None] = [
-        _grade("reprojection error", evidence.error, f"points lie {evidence.error:.2f} px off on average")
-    ]
+    signs: list[SfmSign | None] = [_grade("reprojection error", error, f"points lie {error:.2f} px off on average")]
     if len(model.names) >= FEW and len(model.points):
         length = len(model.pixels) / len(model.points)
         signs.append(_grade("track length", 1 / length, f"a point is seen by {length:.1f} photos on average"))
-    turn, gps = _judge_gps(model, evidence.positions, normal)
-    signs += [gps, *_judge_directions(model, normal, turn)]
-    if ratio := evidence.focal_ratio:
-        reason = f"the photos alone say {ratio:.2f} times the focal length of EXIF"
-        signs.append(_grade("focal length", max(ratio, 1 / ratio), reason))
+    turn, gps = _judge_gps(model, positions, normal)
+    signs.append(gps)
+    tilt = float(np.median([_measure_angle(camera.forward, normal) for camera in model.cameras]))
+    signs.append(_grade("tilt", tilt, f"photos look {tilt:.0f} degrees off the ground's vertical (median)"))
+    if turn is not None:
+        angle = _measure_angle(turn[2], normal)
+        signs.append(_grade("ground", angle, f"the ground lies {angle:.0f} degrees from level, as GPS says it"))
+    if focal_ratio:
+        reason = f"the photos alone say {focal_ratio:.2f} times the focal length of EXIF"
+        signs.append(_grade("focal length", max(focal_ratio, 1 / focal_ratio), reason))
     signs.append(_judge_roughness(model))
     heights = np.array([camera.centre @ normal for camera in model.cameras]) - offset
     relief = spread / max(abs(float(np.median(heights))), 1e-12)
     signs.append(_grade("relief", relief, f"points lie {relief:.2f} flying heights off their plane"))
-    placed, images = len(model.names), evidence.images
+    placed = len(model.names)
     signs.append(_grade("placed", 1 - placed / images, f"{placed} of {images} photos found a place"))
     known = tuple(sign for sign in signs if sign)
     return SfmVerdict(combine_grades(known), known)
@@ -91,14 +81,14 @@ def combine_grades(signs: Iterable[SfmSign]) -> Grade:
     bad = [sign for sign in signs if sign.grade != "good"]
     against = [sign for sign in bad if sign.name not in COVERAGE]
     refused = [sign for sign in against if sign.grade == "refused"]
-    if len(against) >= 3 or (refused and len(against) >= 2) or any(THRESHOLDS[sign.name].alone for sign in refused):
+    if len(against) >= 3 or (refused and len(against) >= 2) or any(sign.name in ALONE for sign in refused):
         return "refused"
     return "doubtful" if bad else "good"
 
 
 def _grade(name: str, value: float, reason: str) -> SfmSign:
-    limit = THRESHOLDS[name]
-    grade = "refused" if value > limit.refused else "doubtful" if not value <= limit.doubtful else "good"
+    doubtful, refused = THRESHOLDS[name]
+    grade = "refused" if value > refused else "doubtful" if not value <= doubtful else "good"
     return SfmSign(name, grade, reason)
 
 
@@ -133,20 +123,9 @@ def _judge_gps(
     return (turn if off <= WORST * ACROSS and says_up else None), sign
 
 
-def _judge_directions(model: ColmapModel, normal: Float[Array, "3"], turn: Float[Array, "3 3"] | None) -> list[SfmSign]:
-    """How flat the ground is seen, and its normal against the vertical where GPS says it."""
-    forward = np.stack([camera.forward for camera in model.cameras])
-    tilt = float(np.median(_measure_angles(forward, normal)))
-    signs = [_grade("tilt", tilt, f"photos look {tilt:.0f} degrees off the ground's vertical (median)")]
-    if turn is not None:
-        angle = float(_measure_angles(turn[2][None], normal)[0])
-        signs.append(_grade("ground", angle, f"the ground lies {angle:.0f} degrees from level, as GPS says it"))
-    return signs
-
-
-def _measure_angles(lines: Float[Array, "n 3"], line: Float[Array, "3"]) -> Float[Array, "n"]:
-    """Degrees between lines and another, all of unit vectors."""
-    return np.degrees(np.arccos(np.clip(np.abs(lines @ line), 0, 1)))
+def _measure_angle(one: Float[Array, "3"], other: Float[Array, "3"]) -> float:
+    """Degrees between two lines along unit vectors."""
+    return float(np.degrees(np.arccos(np.clip(abs(one @ other), 0, 1))))
 
 
 def _judge_roughness(model: ColmapModel) -> SfmSign | None:
