@@ -40,8 +40,8 @@ def no_long_waits(monkeypatch):
     monkeypatch.setattr(serial_rig, "POLL", 0.005)
     monkeypatch.setattr(serial_protocol, "SLICE", 0.01)
     monkeypatch.setattr(serial_rig, "SETTLE", 0.0)
-    monkeypatch.setattr(serial_rig, "ANSWER_TIMEOUT", 0.05)  # a machine that stalls for longer only asks again
-    monkeypatch.setattr(serial_rig, "RETRIES", 60)
+    monkeypatch.setattr(serial_protocol, "ANSWER_TIMEOUT", 0.05)  # a machine that stalls for longer only asks again
+    monkeypatch.setattr(serial_protocol, "RETRIES", 60)
     monkeypatch.setattr(serial_rig, "PHOTO_TIMEOUT", 10.0)
 
 
@@ -49,7 +49,7 @@ def no_long_waits(monkeypatch):
 def shoot(tmp_path, monkeypatch):
     """Have places photographed by a rig with faults; returns the rig, what it ended with, and the store.
 
-    Changed names in capitals are constants of the agent, others keys of the config.
+    Changed names in capitals are constants, others keys of the config.
     """
     (tmp_path / "inbox").mkdir()
     store = PhotoStore(tmp_path / "captures")
@@ -57,7 +57,7 @@ def shoot(tmp_path, monkeypatch):
     def shot(faults=None, places=PLACES, seed=0, **changed):
         scene = {"agent": "serial"}
         for name in filter(str.isupper, list(changed)):
-            monkeypatch.setattr(serial_rig, name, changed.pop(name))
+            monkeypatch.setattr(serial_protocol if name == "RETRIES" else serial_rig, name, changed.pop(name))
         with SimulatedRig(tmp_path / "inbox", faults, seed) as device:
             shot.device = device
             scene["rig"] = RIG | {"port": device.port, "inbox": str(tmp_path / "inbox")} | changed
@@ -225,9 +225,8 @@ def test_what_was_in_the_inbox_before_is_not_taken_for_a_photo(shoot, tmp_path):
 def test_a_photo_written_over_another_is_new(tmp_path):
     image_files.write_png(tmp_path / "capt.png", np.zeros((48, 64, 3)))
     before = serial_rig.list_photos(tmp_path)
-    assert serial_rig.wait_for_photo(tmp_path, before, 0.0) is None
     image_files.write_png(tmp_path / "capt.png", np.random.default_rng(0).random((48, 64, 3)))
-    assert serial_rig.wait_for_photo(tmp_path, before, 5.0) == tmp_path / "capt.png"
+    assert serial_rig.wait_for_photo(tmp_path, before) == tmp_path / "capt.png"
 
 
 @pytest.mark.parametrize("place", [PLACES[1], (90.0, 200.0, 2.0), (12.0, 359.9999, 1.0)])
@@ -239,10 +238,10 @@ def test_axes_and_cameras_are_each_others_inverse(place):
     back = mount.camera_at(axes, camera)
     np.testing.assert_allclose(back.rotation, camera.rotation, atol=2e-5)
     np.testing.assert_allclose(back.translation, camera.translation, atol=1e-4)
-    assert mount.find_violation(camera) is None
+    np.testing.assert_array_equal(mount.find_place(camera, np.array([[-1e6, 1e6]] * 3), axes[0]), axes)
     rotation, translation = look_at(camera.centre, [3.0, 1.5, 0.0])
     turned = replace(camera, rotation=rotation, translation=translation)
-    assert "degrees away from how the rig looks" in mount.find_violation(turned)
+    assert "degrees away from how the rig looks" in mount.find_place(turned, rig_limits.UNLIMITED, 0.0)
 
 
 def test_what_is_missing_is_said_and_only_poses_where_the_rig_may_stand_are_candidates(shoot, tmp_path):
@@ -259,9 +258,9 @@ def test_what_is_missing_is_said_and_only_poses_where_the_rig_may_stand_are_cand
 def test_a_port_that_is_in_use_is_refused(tmp_path):
     with (
         SimulatedRig(tmp_path) as device,
-        serial_protocol.open_line(device.port, 115200, 1.0, 1),
+        serial_protocol.open_line(device.port),
         pytest.raises(InputError, match="does not open"),
-        serial_protocol.open_line(device.port, 115200, 1.0, 1),
+        serial_protocol.open_line(device.port),
     ):
         pass
 

@@ -7,7 +7,6 @@ limits that hold at both ends.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -16,7 +15,6 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.scene_frame import SceneFrame
 
 AXES = ("pan", "tilt", "radius")
 TURN = 360.0
@@ -26,6 +24,7 @@ SLACK = np.array([0.5, 0.5, 2.0])  # degrees, degrees, millimetres: tolerance of
 Axes = Float[Array, "3"]
 AxisLimits = Float[Array, "3 2"]  # lowest and highest value of each axis
 AxisRanges = Mapping[str, Sequence[float | int]]  # of the config: lowest and highest value by axis
+UNLIMITED = np.array([[-np.inf, np.inf]] * 3)
 
 
 @dataclass(frozen=True)
@@ -57,21 +56,14 @@ class Mount:
         )
         return replace(like, rotation=posed.rotation, translation=posed.translation)
 
-    def find_violation(self, camera: Camera) -> str | None:
-        """Say why no position of the axes gives this camera's orientation; None if one does."""
+    def find_place(self, camera: Camera, limits: AxisLimits, pan: float) -> Axes | str:
+        """The axes at which the rig can hold a camera, at the whole turn nearest to `pan`, or why there are none."""
         axes = self.axes_of(camera)
-        if not axes[2] > 0:
-            return "it is at the centre that the rig turns about"
         held = self.camera_at(axes, camera).rotation
         angle = np.degrees(np.arccos(np.clip((np.trace(held.T @ camera.rotation) - 1) / 2, -1, 1)))
-        if angle <= TOLERANCE:
-            return None
-        return f"it is turned {angle:.1f} degrees away from how the rig looks: at the exemplar's centre, upright"
-
-
-def build_mount(rig: Mapping[str, Any], frame: SceneFrame) -> Mount:
-    """The mount of the config's `rig`."""
-    return Mount(frame.exemplar.centre, float(rig["millimetres"]))
+        if angle > TOLERANCE:
+            return f"it is turned {angle:.1f} degrees away from how the rig looks: at the exemplar's centre, upright"
+        return choose_turn(limits, axes, pan)
 
 
 def combine_limits(limits: AxisRanges, device: AxisLimits) -> AxisLimits:
@@ -79,12 +71,13 @@ def combine_limits(limits: AxisRanges, device: AxisLimits) -> AxisLimits:
 
     Raises: InputError: a range from high to low, or limits without overlap.
     """
-    if wrong := [axis for axis in AXES if not limits[axis][0] <= limits[axis][1]]:
-        raise InputError(f"config: rig: limits: {wrong[0]} goes from high to low; the lower end comes first")
     requested = np.array([limits[axis] for axis in AXES], float)
     both = np.stack([np.maximum(requested[:, 0], device[:, 0]), np.minimum(requested[:, 1], device[:, 1])], 1)
     if empty := [axis for axis, (low, high) in zip(AXES, both, strict=True) if not low <= high]:
-        raise InputError(f"config: rig: limits: {empty[0]}: nothing of it is within what the rig itself allows")
+        raise InputError(
+            f"config: rig: limits: {empty[0]} goes from high to low, or nothing of it is within what the rig itself "
+            "allows"
+        )
     return both
 
 
