@@ -47,7 +47,7 @@ def listed(site, requested, tmp_path):
     """The page's folder and its text."""
     write_field(made.field(), tmp_path / "field.ply")
     with pytest.raises(InputError):
-        handheld.take_photos(site, requested, tmp_path / "field.ply")
+        handheld.take_photos(replace(site, field=tmp_path / "field.ply"), requested)
     folder = site.store.folder / "shot-list"
     return folder, (folder / "index.html").read_text()
 

@@ -80,7 +80,7 @@ def replay(request: Any) -> list[Any]:
 
     site, remaining, photos = request.site, {pose.name: camera for pose, camera in request.remaining}, []
     for pose, camera in request.poses[: len(remaining)]:
-        distance = {name: view_distance(camera, other, site.unit) for name, other in remaining.items()}
+        distance = {name: view_distance(camera, other, site.frame) for name, other in remaining.items()}
         name = min(distance, key=lambda n: (distance[n], n))
         shutil.copyfile(site.photos / "images" / name, request.folder / name)
         photos.append(CapturedPhoto(name, pose, camera, remaining.pop(name), distance[name]))

@@ -38,13 +38,8 @@ class Site:
     photos: Path
     store: PhotoStore
     field: Path | str | None = None
-    shot_list_template: Path | str | None = None
+    shot_list_template: Path | str = ""
     requested: tuple[Camera, ...] = ()
-
-    @property
-    def unit(self) -> float:
-        """The flying height in world units."""
-        return self.frame.flying_height
 
     def lacks_photo(self, camera: Camera) -> bool:
         """Whether the store has no photo of a pose."""
@@ -64,11 +59,11 @@ class CaptureRequest:
     folder: Path
 
 
-def view_distance(a: Camera, b: Camera, unit: float) -> float:
-    """Distance of two views: between the centres in units of `unit` (the flying height), plus the angle between the
-    viewing directions in radians."""
+def view_distance(a: Camera, b: Camera, frame: SceneFrame) -> float:
+    """Distance of two views: between the centres in flying heights, plus the angle between the viewing directions in
+    radians."""
     angle = np.arccos(np.clip(a.forward @ b.forward, -1, 1))
-    return float(np.linalg.norm(a.centre - b.centre) / unit + angle)
+    return float(np.linalg.norm(a.centre - b.centre) / frame.flying_height + angle)
 
 
 def filter_attainable(
@@ -120,5 +115,5 @@ def _undistort_stored(request: CaptureRequest, pose: Pose, camera: Camera) -> Ca
     stored = site.store.photos_of(camera)[0]
     picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera)
     image_files.write_png(request.folder / name, picture)
-    distance = view_distance(camera, stored.camera, site.unit)
+    distance = view_distance(camera, stored.camera, site.frame)
     return CapturedPhoto(name, pose, camera, stored.camera, distance, stored.taken)

@@ -21,8 +21,6 @@ from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.views.candidates import Candidates
 
-NamedCamera = tuple[str, Camera]
-
 WAYPOINT, RETURN, TAKEOFF, DELAY, SPEED, GIMBAL, SHUTTER = 16, 20, 22, 93, 178, 205, 2000  # MAV_CMD
 RELATIVE, NO_PLACE = 3, 2  # MAV_FRAME: position with altitude above home; command without position
 PX4, QUADROTOR = 12, 2  # MAV_AUTOPILOT, MAV_TYPE
@@ -38,21 +36,12 @@ SAME = 0.01  # metres: nearer positions count as equal
 class FlightRules:
     """Safety limits of a flight, in metres above the plane of the ground and metres per second.
 
-    No photo is taken below min_altitude; below clearance the vehicle only moves vertically.
+    No photo is asked for below min_altitude; below clearance the vehicle only moves vertically.
     """
 
     min_altitude: float = 2.0
     clearance: float = 5.0
     speed: float = 3.0
-
-
-@dataclass(frozen=True)
-class Flight:
-    """A plan: content of its file, duration in seconds, and a description."""
-
-    content: dict
-    duration: float
-    description: str
 
 
 def filter_reachable(scene: dict, frame: SceneFrame, candidates: Candidates) -> Candidates:
@@ -76,8 +65,8 @@ def filter_reachable(scene: dict, frame: SceneFrame, candidates: Candidates) -> 
 def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     """Import dropped photos; for those still missing write a mission.
 
-    Raises: InputError: photos are missing (the message says which, and what to fly), the scene has no georeference,
-        its ground is too steep, or a pose is too low to fly to.
+    Raises: InputError: photos are missing (the message says which, and what to fly), the scene has no georeference, or
+        its ground is too steep.
     """
     missing = drop_folder.import_dropped_photos(site, requested, "plan")
     if not missing:
@@ -92,11 +81,11 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     home = np.array([exemplar.west + exemplar.side / 2, exemplar.south])
     rules = FlightRules(**{key: float(value) for key, value in site.scene.get("drone", {}).items()})
     _check_level(site, place, missing, home, rules)
-    flight = plan_flight([(pose.name, camera) for pose, camera in missing], place, home, rules)
+    plan, description = plan_flight([camera for _, camera in missing], place, home, rules)
     path = site.store.folder / "mission.plan"
-    write_json(path, flight.content)
+    write_json(path, plan)
     raise InputError(
-        f"{path}: fly this mission (QGroundControl: Plan, Open), {flight.description}: "
+        f"{path}: fly this mission (QGroundControl: Plan, Open), {description}: "
         + drop_folder.describe_missing(site, missing)
     )
 
@@ -123,19 +112,15 @@ def _check_level(
         )
 
 
-def plan_flight(views: list[NamedCamera], place: Georeference, home: Float[Array, "2"], rules: FlightRules) -> Flight:
+def plan_flight(
+    views: list[Camera], place: Georeference, home: Float[Array, "2"], rules: FlightRules
+) -> tuple[dict, str]:
     """Plan a flight from a point on the ground (`home`, world units) past all views and back.
 
-    Raises: InputError: views below rules.min_altitude, by name.
+    Returns: the content of the mission's file, and a description with length and duration.
     """
     scale = place.metres_per_unit
-    at = scale * np.array([camera.centre for _, camera in views])
-    low = [name for (name, _), z in zip(views, at[:, 2], strict=True) if z < rules.min_altitude]
-    if low:
-        raise InputError(
-            f"{', '.join(low)}: lower than {rules.min_altitude:g} m above the ground, where no photo is taken from "
-            "the air (drone.min_altitude of the scene's entry); take a rig or agent: handheld for poses this low"
-        )
+    at = scale * np.array([camera.centre for camera in views])
     start = scale * np.array([*home, 0.0]) + [0.0, 0.0, rules.clearance]
     mission, path = _Mission(place, scale * np.array([*home, 0.0])), [start]
     mission.add_waypoint(TAKEOFF, start)
@@ -147,7 +132,7 @@ def plan_flight(views: list[NamedCamera], place: Georeference, home: Float[Array
             path.append(corner)
         path.append(stop)
         if i is not None:
-            mission.add_photo(stop, views[i][1])
+            mission.add_photo(stop, views[i])
     mission.add_command(RETURN)
     length = route.path_length(np.array(path))
     duration = length / rules.speed + len(views) * (HOLD + SETTLE + WRITE)
@@ -156,7 +141,7 @@ def plan_flight(views: list[NamedCamera], place: Georeference, home: Float[Array
         f"a flight of {length:.0f} m, about {np.ceil(duration / 60):.0f} min, up to {at[:, 2].max():.0f} m above the "
         f"ground; take off from the ground near {latitude:.6f}, {longitude:.6f}"
     )
-    return Flight(mission.to_plan(rules.speed), duration, description)
+    return mission.to_plan(rules.speed), description
 
 
 def plan_detour(a: Float[Array, "3"], b: Float[Array, "3"], clearance: float) -> list[Float[Array, "3"]]:

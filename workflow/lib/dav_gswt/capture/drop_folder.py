@@ -39,7 +39,7 @@ def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str
         _log.warning("%s: it could not be localised; it must overlap photos of the scene", path.name)
     open_poses = [(pose, camera) for pose, camera in requested if site.lacks_photo(camera)]
     pairs = [
-        (view_distance(camera, got, site.unit), pose.name, path.name, path)
+        (view_distance(camera, got, site.frame), pose.name, path.name, path)
         for path, got in found
         for pose, camera in open_poses
     ]

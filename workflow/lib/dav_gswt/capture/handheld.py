@@ -32,17 +32,15 @@ BLANK = 0.8  # grey where nothing is known
 CLOSE, TURNED = 0.2, 15  # flying heights, degrees: a photo nearer than this to its pose is always assigned to it
 
 
-def take_photos(site: Site, requested: list[RequestedPose], field: Path | str | None = None) -> None:
-    """Import dropped photos; for those still missing write a shot list.
+def take_photos(site: Site, requested: list[RequestedPose]) -> None:
+    """Import dropped photos; for those still missing write a shot list, with pictures of the site's field if it has one.
 
-    field: the current field, for the map and the expected pictures; by default the site's, if it has one.
     Raises: InputError: photos are missing (the message says which, and names the page to follow).
     """
     missing = drop_folder.import_dropped_photos(site, requested, "handheld")
     if not missing:
         return
-    path = field or site.field
-    page = write_shot_list(site, missing, read_field(path) if path else None)
+    page = write_shot_list(site, missing, read_field(site.field) if site.field else None)
     raise InputError(
         f"{page}: take this page with you, printed or its folder copied to a phone: "
         + drop_folder.describe_missing(site, missing)
@@ -54,8 +52,6 @@ def write_shot_list(site: Site, missing: list[RequestedPose], field: GaussianFie
 
     Returns: the page.
     """
-    if site.shot_list_template is None:
-        raise ValueError("the agent handheld needs the template of its page")
     by, ground = directions.make_ruler(site.frame), np.array([camera.centre[:2] for _, camera in missing])
     ordered = route.order_stops(ground)
     places = [missing[i] for i in ordered]
