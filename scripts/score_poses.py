@@ -18,7 +18,8 @@ with logging_to(snakemake.log[0]):
     remaining = candidates.list_remaining(scene, frame, paths.model, split, captures)
     remaining = filter_attainable(scene, frame, grid, fitted, remaining)
     taken = read_training_views(paths.images, paths.model, split.start, captures, scoring.PHOTO_WIDTH)
-    prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, paths.get("lpips"))
+    given, lpips = params.prior, paths.get("lpips")
+    prior = prior_sampling.open_prior(given, params.p_drop, params.seed, lpips) if given else None
     first = scores.read_frozen_scales(paths.frozen) if paths.get("frozen") else None
     scored = scoring.score_poses(fitted, grid, remaining, taken, frame, prior, first)
     scores.write_scores(out.scores, scored.scores)

@@ -10,7 +10,6 @@ from fixtures import ground as patch
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.inpainting import build
-from dav_gswt.prior.interface import DecodedViews
 from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.reconstruction import underlay
@@ -27,7 +26,7 @@ BAND = 8  # pixels of a picture that have one of them
 class BandPrior:
     """Samples are bands of two colours where the render is not valid, and the render itself elsewhere."""
 
-    name, size = "bands", 32
+    name, size, small = "bands", 32, False
 
     def __init__(self, spoil=None, light=1.0):
         self.spoil, self.light = spoil, np.float32(light)
@@ -44,7 +43,7 @@ class BandPrior:
         planes = np.ascontiguousarray(latents.transpose(0, 1, 3, 4, 2))
         if self.spoil is not None:
             planes[0, 0, 3, 4, self.spoil] = np.nan
-        return DecodedViews(planes[..., :4], None)
+        return planes[..., :4]
 
 
 def config(prior=None, samples=2):

@@ -11,7 +11,6 @@ from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.images import image_files
 from dav_gswt.prior import conditions
-from dav_gswt.prior.interface import DecodedViews
 from dav_gswt.views import coverage, pose_maps, scores, scoring
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import FrozenScales
@@ -25,7 +24,7 @@ MIDDLE = [1.6, 1.6, 0.0]
 class KnownDisagreement:
     """Samples that disagree where the render is blue, and by how much; pictures are the latents themselves."""
 
-    name, size = "known disagreement", 32
+    name, size, small = "known disagreement", 32, False
 
     def sample(self, condition, m, p_drop, steps, seed, common=True):
         blue = condition.colour[..., 2]
@@ -34,12 +33,12 @@ class KnownDisagreement:
 
     def decode(self, latents):
         pictures = np.clip(0.5 + latents, 0, 1).transpose(0, 1, 3, 4, 2)
-        return DecodedViews(np.ascontiguousarray(pictures), None)
+        return np.ascontiguousarray(pictures)
 
 
 class Blind(KnownDisagreement):
     def decode(self, latents):
-        return DecodedViews(np.nan * super().decode(latents).rgba, None)
+        return np.nan * super().decode(latents)
 
 
 def pool(*eyes, width=40, height=40):

@@ -221,15 +221,26 @@ def train_prior(
     if not done.exists():
         every = torch.cat([pictures.truth, pictures.render, pictures.photo])
         losses = train_autoencoder(network, every, plan, checkpoints / "autoencoder.safetensors")
-        weights.save_weights(network, done, {"losses": json.dumps(losses)}, torch.float32)
+        save_weights(network, done, {"losses": json.dumps(losses)}, torch.float32)
     else:
         losses = json.loads(weights.load_weights(network, done)["losses"])
     denoiser_losses = train_denoiser(
         network, encode_pictures(network, pictures), denoiser_plan, checkpoints / "denoiser.safetensors"
     )
-    weights.save_weights(network, out, {"examples": str(len(pictures.truth))})
+    save_weights(network, out, {"examples": str(len(pictures.truth))})
     done.unlink(missing_ok=True)
     return {"coder": losses, "denoiser": denoiser_losses}
+
+
+def save_weights(network: Network, path: Path | str, facts: dict[str, str], dtype: torch.dtype = torch.float16) -> None:
+    """Write the prior's weights as `weights.load_weights` reads them. facts: metadata for the header."""
+    stored = {own: name for name, own in weights.STORED_PARTS.items()}
+    values = {}
+    for name, value in network.state_dict().items():
+        part, dot, rest = name.partition(".")
+        values[stored.get(part, part) + dot + rest] = value.detach().to("cpu", dtype).contiguous()
+    with atomic_file(path) as unfinished:
+        save_file(values, str(unfinished), metadata=facts)
 
 
 def write_losses(path: Path | str, losses: dict[str, list[float]]) -> None:

@@ -251,7 +251,7 @@ def inpaint_view(
     with one_thread():
         known = np.logical_not(touched)[None]
         latents = model.sample(condition, config.samples, 0.0, config.steps, config.seed, known=known, common=False)
-        rgba = model.decode(latents).rgba[0].mean(0, dtype=np.float32)
+        rgba = model.decode(latents)[0].mean(0, dtype=np.float32)
     if not np.isfinite(rgba).all():
         raise ValueError("the prior's picture of a view is not finite")
     alpha, render = rgba[..., 3], condition.colour[0]
