@@ -75,7 +75,5 @@ def test_controls_are_what_they_say(model):
     np.testing.assert_allclose(found["spread"], np.mean(pairs, 0), rtol=1e-4)
     apart = ((drawn.mean(1) - model.encode(pack_render(condition)).numpy()) ** 2).sum(1)
     np.testing.assert_allclose(found["residual"], apart, rtol=1e-4)
-    other = SimpleNamespace(
-        name="other", size=64, small=False, **dict.fromkeys(METHODS, print)
-    )  # not the project's own
+    other = SimpleNamespace(name="not the project's own", size=64, small=False, **dict.fromkeys(METHODS, print))
     assert judging.control_maps(replace(prior, model=other), condition) == {}

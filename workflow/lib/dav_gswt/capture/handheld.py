@@ -33,7 +33,9 @@ CLOSE, TURNED = 0.2, 15  # flying heights, degrees: a photo nearer than this to 
 
 
 def take_photos(site: Site, requested: list[RequestedPose]) -> None:
-    """Import dropped photos; for those still missing write a shot list, with pictures of the site's field if it has one.
+    """Import dropped photos; for those still missing write a shot list.
+
+    The map and the expected pictures are of the site's field, if it has one.
 
     Raises: InputError: photos are missing (the message says which, and names the page to follow).
     """
