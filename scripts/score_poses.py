@@ -27,4 +27,4 @@ with logging_to(snakemake.log[0]):
     image_files.write_exr_parts(out.shown, scoring.make_exr_parts(scored, fitted, grid))
     inputs = {name: paths[name] for name in ("field", "ground", "views", "weights", "lpips") if paths.get(name)}
     about = {"prior": params.prior, "p_drop": params.p_drop, "seed": params.seed}
-    scores.write_frozen_scales(out.facts, scored.frozen, scored.describe(), inputs, about)
+    scores.write_frozen_scales(out.facts, scored.frozen, scored.scores, inputs, about)

@@ -175,7 +175,7 @@ def test_maps_are_read_as_written_and_stand_in_an_exr_with_their_poses(tmp_path)
 
 def test_frozen_scales_are_read_as_written_and_other_files_are_refused(tmp_path):
     first = FrozenScales(Scales({"w2_sq": 1 / 3, "coverage": 0.0}), Quantiles(0.1, 2 / 3))
-    scores.write_frozen_scales(tmp_path / "scores.json", first, {"candidates": 3}, {}, {})
+    scores.write_frozen_scales(tmp_path / "scores.json", first, scored().scores, {}, {})
     assert scores.read_frozen_scales(tmp_path / "scores.json") == first
     for bad in ("{}", '{"scales": [], "pixels": null}', '{"scales": {"w2_sq": -1}, "pixels": null}'):
         (tmp_path / "scores.json").write_text(bad)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter, map_coordinates
 
@@ -63,7 +63,7 @@ class InpaintingResult:
 
 @dataclass(frozen=True)
 class _Scene:
-    """Input of all steps. ground_colour: mean colour of the discs that photos saw."""
+    """Input of all steps. ground_colour: mean colour of the discs that photos saw, or of all if none did."""
 
     grid: Ground
     frame: SceneFrame
@@ -92,7 +92,9 @@ def inpaint_field(
         return InpaintingResult(field, cells, cells)
     targets = find_targets(grid, cells, frame.flying_height)
     references = conditions.prepare_photos(photos, frame, config.model.size)
-    scene = _Scene(grid, frame, references, config, _mean_ground_colour(field, grid))
+    seen = grid.seen.ravel() if grid.seen.any() else np.ones(grid.heights.size, bool)
+    ground_colour = np.clip(field.base_colours[: seen.size][seen], 0, 1).mean(0, dtype=float)
+    scene = _Scene(grid, frame, references, config, ground_colour)
     coloured, left = _colour_cells(scene, field, cells, targets)
     done = cells & ~left
     if not done.any():
@@ -104,12 +106,6 @@ def inpaint_field(
     result = replace(coloured, uncertainty=uncertainty, imagined=field.imagined | marked)
     _log.info("%d cells inpainted", done.sum())
     return InpaintingResult(result, cells, done)
-
-
-def _mean_ground_colour(field: GaussianField, grid: Ground) -> Float[Array, "3"]:
-    """Mean colour of the discs that a photo saw, or of all if none did."""
-    seen = grid.seen.ravel() if grid.seen.any() else np.ones(grid.heights.size, bool)
-    return np.clip(field.base_colours[: seen.size][seen], 0, 1).mean(0, dtype=float)
 
 
 def _colour_cells(
@@ -139,30 +135,17 @@ def _colour_discs(
     good: Bool[Array, "s s"],
 ) -> tuple[GaussianField, Bool[Array, "rows columns"]]:
     """The field with the colours of a picture's good pixels on the discs of cells that are left, and what is left."""
-    rows, pixels = _find_visible(field, left, camera, good)
-    sh = field.sh.copy()
-    sh[rows], sh[rows, :1] = 0, rgb_to_sh(_sample_picture(picture, pixels))
-    still = left.ravel().copy()
-    still[rows] = False
-    return replace(field, sh=sh), still.reshape(left.shape)
-
-
-def _find_visible(
-    field: GaussianField, cells: Bool[Array, "rows columns"], camera: Camera, good: Bool[Array, "s s"]
-) -> tuple[Int[Array, "n"], Float[Array, "n 2"]]:
-    """The discs of cells that a good pixel shows, and their pixels."""
-    rows = np.flatnonzero(cells)
+    rows = np.flatnonzero(left)
     pixels, depth = camera.project(field.means[rows].astype(float))
     inside = (depth > 0) & (pixels > INSET).all(1) & (pixels < len(good) - INSET).all(1)
     rows, pixels = rows[inside], pixels[inside]
     visible = good[tuple(pixels.astype(int).T[::-1])]
-    return rows[visible], pixels[visible]
-
-
-def _sample_picture(picture: Float32[Array, "s s 3"], pixels: Float[Array, "n 2"]) -> Float[Array, "n 3"]:
-    """Colours of a picture, bilinear."""
-    at = pixels.T[::-1] - 0.5
-    return np.stack([map_coordinates(picture[..., c], at, order=1, mode="nearest") for c in range(3)], 1).astype(float)
+    rows, at = rows[visible], pixels[visible].T[::-1] - 0.5
+    colours = [map_coordinates(picture[..., c], at, order=1, mode="nearest") for c in range(3)]  # bilinear
+    sh, still = field.sh.copy(), left.ravel().copy()
+    sh[rows], sh[rows, :1] = 0, rgb_to_sh(np.stack(colours, 1).astype(float))
+    still[rows] = False
+    return replace(field, sh=sh), still.reshape(left.shape)
 
 
 def _colour_underlay(field: GaussianField, grid: Ground, marked: Bool[Array, "n"]) -> GaussianField:
@@ -182,8 +165,6 @@ def find_targets(grid: Ground, cells: Bool[Array, "rows columns"], flying_height
     Blocks with few marked cells come first: they have most known ground around them.
     """
     centres = grid.centres[cells.ravel()]
-    if not len(centres):
-        return []
     at = np.floor((centres[:, :2] - [grid.west, grid.south]) / (BLOCK * flying_height)).astype(int)
     _, block, count = np.unique(at, axis=0, return_inverse=True, return_counts=True)
     return [centres[block.ravel() == i].mean(0) for i in np.argsort(count, kind="stable")]

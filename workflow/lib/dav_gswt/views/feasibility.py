@@ -40,11 +40,8 @@ class _GroundMesh:
     points, normals: the test points; each is a vertex, so none lies below a triangle.
     """
 
-    grid: Ground
     middle: Float[Array, "3"]
     side: float
-    x: Float[Array, "columns"]
-    y: Float[Array, "rows"]
     mesh: trimesh.Trimesh
     points: Float[Array, "m 3"]
     normals: Float[Array, "m 3"]
@@ -111,7 +108,7 @@ def _build_mesh(grid: Ground) -> _GroundMesh:
     east, north = (slope[np.ix_(rows[i], columns[j])].ravel() for slope in grid.slopes())
     normals = np.stack([-east, -north, np.ones(len(east))], 1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return _GroundMesh(grid, middle, side, x, y, mesh, vertices[places], normals)
+    return _GroundMesh(middle, side, mesh, vertices[places], normals)
 
 
 def _make_faces(rows: int, columns: int) -> Int[Array, "n 3"]:
@@ -159,14 +156,9 @@ def _in_picture(camera: Camera, points: Float[Array, "m 3"]) -> Bool[Array, "m"]
 def _cast_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
     """Distance to the ground along rays of unit direction; infinite for misses."""
     found = np.full(len(origins), np.inf)
-    face = site.mesh.ray.intersects_first(origins, ways)
-    hit = np.flatnonzero(face >= 0)
-    a, b, c = np.moveaxis(site.mesh.vertices[site.mesh.faces[face[hit]]], 1, 0)
-    normal = np.cross(b - a, c - a)
-    along = np.einsum("ni,ni->n", normal, ways[hit])
-    rise = np.einsum("ni,ni->n", normal, a - origins[hit])
-    found[hit] = rise / np.where(along == 0, np.nan, along)  # a ray within its triangle's plane
-    return np.nan_to_num(found, nan=0.0, posinf=np.inf)
+    places, hit, _ = site.mesh.ray.intersects_location(origins, ways, multiple_hits=False)
+    found[hit] = np.linalg.norm(places - origins[hit], axis=1)
+    return found
 
 
 def find_inside_objects(centres: Float[Array, "n 3"], field: GaussianField) -> Bool[Array, "n"]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float32, Float64
+from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
@@ -15,7 +15,7 @@ from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
-from dav_gswt.raster import Rasterizer, make_rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.top_view import render_top_view
 from dav_gswt.views import prior_sampling
@@ -43,10 +43,6 @@ class ScoringResult:
     maps: PoseMaps
     frozen: FrozenScales
     gaussians: Float32[Array, "gaussians"]
-
-    def describe(self) -> dict:
-        """Summary for scores.json: number of candidates, and available terms."""
-        return {"candidates": len(self.scores), "terms": list(self.scores.terms)}
 
 
 def make_exr_parts(result: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
@@ -86,7 +82,9 @@ def score_poses(
         terms |= {name: values.astype(np.float64) for name, values in sampled.items()}
     for name, values in terms.items():
         require_finite(values, name, names)
-    frozen = frozen or _freeze_scales(terms, w2_sq)
+    if frozen is None:
+        quantiles = None if w2_sq is None else Quantiles.from_values(w2_sq.ravel())
+        frozen = FrozenScales(Scales.from_terms(terms), quantiles)
     maps = PoseMaps(names, _stack_maps(renders.uncertainty), w2_sq, renders.seen.pixels)
     gaussians = _gaussian_uncertainty(field, candidates, w2_sq, frozen)
     return ScoringResult(Scores(poses, terms, frozen.scales), maps, frozen, gaussians)
@@ -106,21 +104,19 @@ def build_conditions(
 
 
 def _render_candidates(field: GaussianField, grid: Ground, candidates: Candidates, taken: list[Camera]) -> Renders:
-    """One render a candidate: its rendered uncertainty, and the pixels that show each cell of the ground."""
+    """One render a candidate: its rendered uncertainty, and the pixels that show each cell of the ground.
+
+    The uncertainty of a pixel is blend-weighted, plus the transmittance.
+    """
     raster, cells = make_rasterizer(), GroundCells(field, grid)
     cameras = [scoring_camera(camera) for _, camera in candidates]
     maps, pixels = [], []
     for camera in progress(cameras, "score poses"):
-        maps.append(render_uncertainty(field, camera, raster))
+        seen = raster.forward(**to_raster_arrays(field, field.uncertainty[:, None]), camera=camera)
+        maps.append(np.clip(seen.colour[..., 0] + 1 - seen.alpha, 0, 1))  # nothing is known where light passes
         pixels.append(cells.count_pixels(raster))
     masks = [ground_mask(grid, camera) for camera in cameras]
     return Renders(maps, masks, cells, cells.gather_views(cameras, pixels), cells.view(taken))
-
-
-def render_uncertainty(field: GaussianField, camera: Camera, raster: Rasterizer) -> Float32[Array, "h w"]:
-    """Uncertainty of each pixel: blend-weighted, plus the transmittance, where nothing is known."""
-    seen = raster.forward(**to_raster_arrays(field, field.uncertainty[:, None]), camera=camera)
-    return np.clip(seen.colour[..., 0] + 1 - seen.alpha, 0, 1)
 
 
 def _stack_maps(maps: list[Float32[Array, "_ _"]]) -> Float32[Array, "n h w"]:
@@ -137,11 +133,6 @@ def ground_mask(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
     shape = camera.height, camera.width
     blank = TrainingView("", camera, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32))
     return mask_outside_ground(blank, *grid.judged).weight
-
-
-def _freeze_scales(terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"] | None) -> FrozenScales:
-    pixels = None if w2_sq is None or not w2_sq.size else Quantiles.from_values(w2_sq.ravel())
-    return FrozenScales(Scales.from_terms(terms), pixels)
 
 
 def _gaussian_uncertainty(
