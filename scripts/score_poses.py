@@ -24,7 +24,8 @@ with logging_to(snakemake.log[0]):
     scored = scoring.score_poses(fitted, grid, remaining, taken, frame, prior, first)
     scores.write_scores(out.scores, scored.scores)
     pose_maps.write_pose_maps(out.maps, scored.maps, scored.gaussians)
-    image_files.write_exr_parts(out.shown, scoring.make_exr_parts(scored, fitted, grid))
+    shown = {"uncertainty": scoring.render_above(scored, fitted, grid)}, {"camera": "straight above"}
+    image_files.write_exr_parts(out.shown, {"above": shown})
     inputs = {name: paths[name] for name in ("field", "ground", "views", "weights", "lpips") if paths.get(name)}
     about = {"prior": params.prior, "p_drop": params.p_drop, "seed": params.seed}
     scores.write_frozen_scales(out.facts, scored.frozen, scored.scores, inputs, about)

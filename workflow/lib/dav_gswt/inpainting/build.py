@@ -17,7 +17,6 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior import conditions
-from dav_gswt.prior.conditions import ReferencePhotos
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import underlay
@@ -61,17 +60,6 @@ class InpaintingResult:
         return counts | {"exemplar": inside, "changed": bool(self.field.imagined.any())}
 
 
-@dataclass(frozen=True)
-class _Scene:
-    """Input of all steps. ground_colour: mean colour of the discs that photos saw, or of all if none did."""
-
-    grid: Ground
-    frame: SceneFrame
-    photos: ReferencePhotos
-    config: PriorConfig
-    ground_colour: Float[Array, "3"]
-
-
 def inpaint_field(
     field: GaussianField, grid: Ground, frame: SceneFrame, photos: list[TrainingView], config: PriorConfig
 ) -> InpaintingResult:
@@ -90,12 +78,20 @@ def inpaint_field(
     _log.info("%d of %d cells of the ground were seen by no photo", cells.sum(), cells.size)
     if not cells.any():
         return InpaintingResult(field, cells, cells)
-    targets = find_targets(grid, cells, frame.flying_height)
-    references = conditions.prepare_photos(photos, frame, config.model.size)
-    seen = grid.seen.ravel() if grid.seen.any() else np.ones(grid.heights.size, bool)
-    ground_colour = np.clip(field.base_colours[: seen.size][seen], 0, 1).mean(0, dtype=float)
-    scene = _Scene(grid, frame, references, config, ground_colour)
-    coloured, left = _colour_cells(scene, field, cells, targets)
+    size, height = config.model.size, frame.flying_height
+    references = conditions.prepare_photos(photos, frame, size)
+    seen = grid.seen.ravel() if grid.seen.any() else np.ones(cells.size, bool)
+    ground_colour = np.clip(field.base_colours[: cells.size][seen], 0, 1).mean(0, dtype=float)
+    coloured, left = field, cells  # the cells that no picture showed
+    for target in progress(find_targets(grid, cells, height), "inpaint unseen ground"):
+        for pose, camera in place_camera(target, coloured, grid, frame, size):
+            condition = conditions.build_condition(coloured, [(pose, camera)], references, height, size)
+            shows, shows_left = (
+                render_share(coloured, select_gaussians(field, grid, some), camera) for some in (cells, left)
+            )
+            picture, alpha = inpaint_view(config, condition, shows_left > TOUCHED, ground_colour)
+            good = (shows > LOOKS) & (alpha > LEAST_ALPHA)
+            coloured, left = _colour_discs(coloured, left, camera, picture, good)
     done = cells & ~left
     if not done.any():
         _log.info("none of them is visible: known objects cover them all")
@@ -106,25 +102,6 @@ def inpaint_field(
     result = replace(coloured, uncertainty=uncertainty, imagined=field.imagined | marked)
     _log.info("%d cells inpainted", done.sum())
     return InpaintingResult(result, cells, done)
-
-
-def _colour_cells(
-    scene: _Scene, field: GaussianField, cells: Bool[Array, "rows columns"], targets: list[Float[Array, "3"]]
-) -> tuple[GaussianField, Bool[Array, "rows columns"]]:
-    """The field with generated colours, and the unseen cells that no picture showed."""
-    coloured, left, size = field, cells, scene.config.model.size
-    for target in progress(targets, "inpaint unseen ground"):
-        for pose, camera in place_camera(target, coloured, scene.grid, scene.frame, size):
-            view = [(pose, camera)]
-            condition = conditions.build_condition(coloured, view, scene.photos, scene.frame.flying_height, size)
-            shows, shows_left = (
-                render_share(coloured, select_gaussians(field, scene.grid, some), camera) for some in (cells, left)
-            )
-            touched = shows_left > TOUCHED
-            picture, alpha = inpaint_view(scene.config, condition, touched, scene.ground_colour)
-            good = (shows > LOOKS) & (alpha > LEAST_ALPHA)
-            coloured, left = _colour_discs(coloured, left, camera, picture, good)
-    return coloured, left
 
 
 def _colour_discs(

@@ -177,7 +177,13 @@ def load_networks(folder: Path | str) -> Zero123Networks:
         raise InputError(f"{folder}: {size / 2**30:.1f} GiB of weights are not those of Zero-1-to-3; {HELP}")
     unet = _build_network(folder / "unet", UNet2DConditionModel.from_config)
     vae = _build_network(folder / "vae", AutoencoderKL.from_config)
-    clip = _build_network(folder / "image_encoder", _clip_factory())
+    try:  # here: only this prior needs it
+        from transformers import CLIPVisionConfig, CLIPVisionModelWithProjection
+    except ImportError as error:
+        raise InputError(f"the prior zero123 needs transformers: pip install '{EXTRA}' ({error})") from error
+    clip = _build_network(
+        folder / "image_encoder", lambda config: CLIPVisionModelWithProjection(CLIPVisionConfig.from_dict(config))
+    )
     with torch.device("meta"):
         projection = nn.Linear(clip.config.projection_dim + POSE, unet.config.cross_attention_dim)
     prefix = PROJECTIONS[projection_folder]
@@ -208,15 +214,6 @@ def _find_weights(folder: Path) -> Path:
     if pickles := sorted(p for kind in ("bin", "pt", "pth", "ckpt") for p in folder.glob(f"*.{kind}")):
         raise InputError(f"{pickles[0]}: a pickle could run anything and is not read; convert it, {HELP}")
     raise InputError(f"{folder}: there is no {names[0]} or {names[1]} in it; {HELP}")
-
-
-def _clip_factory() -> Callable[[dict[str, Any]], Network]:
-    """The function that builds CLIP's image encoder. transformers is imported here: only this prior needs it."""
-    try:
-        from transformers import CLIPVisionConfig, CLIPVisionModelWithProjection
-    except ImportError as error:
-        raise InputError(f"the prior zero123 needs transformers: pip install '{EXTRA}' ({error})") from error
-    return lambda config: CLIPVisionModelWithProjection(CLIPVisionConfig.from_dict(config))
 
 
 def _build_network(folder: Path, make: Callable[[dict[str, Any]], Network]) -> Network:

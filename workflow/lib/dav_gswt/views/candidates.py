@@ -114,12 +114,6 @@ def read_captured_cameras(model_folder: Path | str, split: ViewSplit, captures: 
     return start + [photo.camera for folder in captures for photo in read_capture_record(folder)]
 
 
-def select_by_name(candidates: Candidates, chosen: list[Pose]) -> Candidates:
-    """Return the candidates of chosen poses, by their names."""
-    by_name = {pose.name: (pose, camera) for pose, camera in candidates}
-    return [by_name[pose.name] for pose in chosen]
-
-
 def _used_names(folder: Path | str) -> list[str]:
     """Names of requested poses and of captured photos: a photo taken in place of another is used too."""
     return [name for photo in read_capture_record(folder) for name in (photo.pose.name, photo.name)]

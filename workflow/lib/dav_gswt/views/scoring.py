@@ -8,7 +8,6 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import select_farthest_poses
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images.image_files import enlarge_map
 from dav_gswt.logs import progress
@@ -21,7 +20,7 @@ from dav_gswt.reconstruction.top_view import render_top_view
 from dav_gswt.views import prior_sampling
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.coverage import GroundCells
-from dav_gswt.views.pose_maps import Part, PoseMaps
+from dav_gswt.views.pose_maps import PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import FrozenScales, Scores
 from dav_gswt.views.terms import Renders, compute_terms
@@ -30,7 +29,6 @@ from dav_gswt.views.uncertainty import Quantiles, Scales, normalise, require_fin
 WIDTH = 96  # pixels along the longer side of a picture for scoring
 PHOTO_WIDTH = 384  # pixels across a captured photo that conditions a prior, before cropping and shrinking
 UNSEEN = 0.99  # uncertainty of a Gaussian from which on no photo so far shows it
-SHOWN = 16  # candidates whose maps are written for display
 SIDE = 64  # pixels of the pictures from which blend weights are computed
 SEEN = 0.05  # total blend weight, in pixels, from which a Gaussian counts as seen
 
@@ -45,12 +43,9 @@ class ScoringResult:
     gaussians: Float32[Array, "gaussians"]
 
 
-def make_exr_parts(result: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
-    """Maps for display as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
-    above = render_top_view(replace(field, uncertainty=result.gaussians), grid).uncertainty[::-1]
-    parts = {"above": ({"uncertainty": above}, {"camera": "straight above"})}
-    names = [result.scores.names[i] for i in select_farthest_poses(result.scores.poses, SHOWN)]
-    return parts | {name: result.maps.exr_part(result.scores, name) for name in names}
+def render_above(result: ScoringResult, field: GaussianField, grid: Ground) -> Float32[Array, "rows columns"]:
+    """The uncertainty of the field from straight above, rows from north to south as in EXR files."""
+    return render_top_view(replace(field, uncertainty=result.gaussians), grid).uncertainty[::-1]
 
 
 def scoring_camera(camera: Camera) -> Camera:
