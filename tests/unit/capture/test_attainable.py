@@ -7,7 +7,6 @@ import pytest
 from fixtures import ground as patch
 from fixtures.frames import scene_frame
 
-from dav_gswt.capture import serial_rig
 from dav_gswt.capture.capturing import filter_attainable
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
@@ -49,9 +48,3 @@ def test_a_drone_is_sent_no_lower_than_it_may_fly():
     assert kept(place, 2.0) == ["above"]
     with pytest.raises(InputError, match="all 3 candidate poses are lower than 12 m"):
         kept(place, 12.0)
-
-
-def test_only_a_rig_is_checked_for_reach(monkeypatch):
-    monkeypatch.setattr(serial_rig, "filter_reachable", lambda scene, frame, pool: [])
-    assert names({"agent": "serial"}) == []
-    assert names({"agent": "render"}) == ["above"]

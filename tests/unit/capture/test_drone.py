@@ -100,14 +100,6 @@ def test_sideways_ways_stay_above_the_clearance(items):
             assert min(a[2], b[2]) >= 5 - 0.002
 
 
-def test_detours_are_only_made_where_they_are_needed():
-    a, low, high = np.array([0, 0, 9.0]), np.array([4, 0, 2.0]), np.array([4, 0, 12.0])
-    assert drone.plan_detour(a, high, 5.0) == []
-    assert drone.plan_detour(low, high, 5.0) == []  # straight up
-    np.testing.assert_array_equal(drone.plan_detour(a, low, 5.0), [[4, 0, 5]])
-    np.testing.assert_array_equal(drone.plan_detour(low, low + [1, 0, 0], 5.0), [[4, 0, 5], [5, 0, 5]])
-
-
 def test_the_message_says_what_to_fly_what_is_missing_and_where_to_put_it(site, requested, monkeypatch):
     with pytest.raises(InputError) as said:
         drone.take_photos(site, requested[:2])

@@ -154,13 +154,6 @@ def test_a_sample_has_one_mask_with_and_without_the_photo(prior):
     torch.testing.assert_close(*found, atol=1e-5, rtol=0)
 
 
-def test_what_is_not_finite_or_makes_no_sense_is_refused_by_name(prior):
-    view = condition()
-    view.photo[1, 0, 0] = np.nan
-    with pytest.raises(ValueError, match="photo of view 1"):
-        prior.sample(view, 2, 0.1, 2, 0)
-
-
 def test_drawn_over_white_the_picture_is_what_was_painted():
     painted = np.random.default_rng(0).uniform(0.8, 1, (2, 5, 5, 3)).astype(np.float32)
     painted[0, 0, 0], painted[0, 0, 1], painted[0, 0, 2] = 1, (0.95, 1, 1), (0.9, 1, 1)

@@ -52,13 +52,6 @@ def scored(prior=None, **more):
     return scoring.score_poses(patch.field(), patch.grid(), pool(), patch.photos(), patch.FRAME, prior, **more)
 
 
-def test_a_photo_counts_alike_upright_or_across():
-    pose, sizes = cameras.look_at((0.0, 0.0, 1.0), (0.3, 0.0, 0.0)), ((400, 300), (300, 400))
-    small, turned = (scoring.scoring_camera(cameras.Camera(*pose, 400.0, 400.0, w / 2, h / 2, w, h)) for w, h in sizes)
-    assert (small.width, small.height) == (turned.height, turned.width) == (96, 72)
-    assert small.fx == turned.fx
-
-
 def test_w2_is_the_disagreement_of_the_samples_over_the_frozen_scale():
     still, dropped = (scored(PriorConfig(KnownDisagreement(), 2, 4, p)) for p in (0.0, 0.2))
     assert not still.scores.terms["w2_sq"].any() and still.scores.scales.by_term["w2_sq"] == 0

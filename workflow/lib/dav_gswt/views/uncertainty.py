@@ -134,9 +134,9 @@ def combine_terms(
     of W2; the appendix's aggregate of both is their sum.
     Source: DAV-GSWT, Eq. (uncert_latent), Eq. (uncert_img).
     """
-    total = _divide_by_scale(name, first, scales)
+    total = divide_by_scale(name, first, scales)
     if lpips is not None:
-        return total + lam * _divide_by_scale("lpips", lpips, scales)
+        return total + lam * divide_by_scale("lpips", lpips, scales)
     if lam > 0:
         _log.warning(
             "the scores lack LPIPS, its term is left out: the uncertainty is %s alone; "
@@ -146,7 +146,8 @@ def combine_terms(
     return total
 
 
-def _divide_by_scale(name: str, values: Float[Array, "n"], scales: Scales) -> Float64[Array, "n"]:
+def divide_by_scale(name: str, values: Float[Array, "n"], scales: Scales) -> Float64[Array, "n"]:
+    """Values of a term over its scale; 0 where that is 0."""
     scale = scales.by_term[name]
     return values.astype(np.float64) / scale if scale > 0 else np.zeros(len(values))
 
