@@ -13,7 +13,7 @@ with logging_to(snakemake.log[0]):
     paths, name = snakemake.input, snakemake.wildcards.scene
     store = PhotoStore(Path("captures") / name)
     photos = Path(paths.images).parent
-    frame, files = read_scene_frame(paths.frame), (paths.get("field"), paths.get("template"))
+    frame, files = read_scene_frame(paths.frame), (paths.get("field"), paths.get("template", ""))
     site = Site(name, snakemake.params.scene, frame, photos, store, *files)
     before = list(paths.captures)
     chosen = read_pose_selection(paths.poses).poses

@@ -15,7 +15,7 @@ with logging_to(snakemake.log[0]):
     paths, out, params = snakemake.input, snakemake.output, snakemake.params
     fitted, grid, names = read_field(paths.field), ground.read_ground(paths.ground), read_view_split(paths.views).start
     photos = read_training_views(paths.images, paths.model, names, list(paths.captures), scoring.PHOTO_WIDTH)
-    config = prior_sampling.open_inpainting_prior(params.prior, params.seed)
+    config = prior_sampling.open_prior(params.prior, 0.0, params.seed)
     result = build.inpaint_field(fitted, grid, read_scene_frame(paths.frame), photos, config)
     if result.field is fitted:
         copy_file(paths.field, out.field)

@@ -18,12 +18,14 @@ with logging_to(snakemake.log[0]):
     remaining = candidates.list_remaining(scene, frame, paths.model, split, captures)
     remaining = filter_attainable(scene, frame, grid, fitted, remaining)
     taken = read_training_views(paths.images, paths.model, split.start, captures, scoring.PHOTO_WIDTH)
-    prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, paths.get("lpips"))
+    given, lpips = params.prior, paths.get("lpips")
+    prior = prior_sampling.open_prior(given, params.p_drop, params.seed, lpips) if given else None
     first = scores.read_frozen_scales(paths.frozen) if paths.get("frozen") else None
     scored = scoring.score_poses(fitted, grid, remaining, taken, frame, prior, first)
     scores.write_scores(out.scores, scored.scores)
     pose_maps.write_pose_maps(out.maps, scored.maps, scored.gaussians)
-    image_files.write_exr_parts(out.shown, scoring.make_exr_parts(scored, fitted, grid))
+    shown = {"uncertainty": scoring.render_above(scored, fitted, grid)}, {"camera": "straight above"}
+    image_files.write_exr_parts(out.shown, {"above": shown})
     inputs = {name: paths[name] for name in ("field", "ground", "views", "weights", "lpips") if paths.get(name)}
     about = {"prior": params.prior, "p_drop": params.p_drop, "seed": params.seed}
-    scores.write_frozen_scales(out.facts, scored.frozen, scored.describe(), inputs, about)
+    scores.write_frozen_scales(out.facts, scored.frozen, scored.scores, inputs, about)

@@ -14,7 +14,8 @@ with logging_to(snakemake.log[0]):
     split = read_view_split(paths.views)
     judged = judging.read_target(paths, split, captures, params.size)
     remaining = candidates.list_remaining(params.scene, judged.frame, paths.model, split, captures)
-    prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, paths.get("lpips"))
+    given, lpips = params.prior, paths.get("lpips")
+    prior = prior_sampling.open_prior(given, params.p_drop, params.seed, lpips) if given else None
     scored = scores.read_scores(paths.scores), pose_maps.read_pose_maps(paths.maps)[0]
     some = judging.choose_candidates(remaining, scored[0], paths.images, params.poses)
     found, rows = judging.calibrate_scores(judged, *some, scored, params.lam, params.seed, prior)

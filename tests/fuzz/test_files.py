@@ -27,6 +27,7 @@ from fixtures.fuzzing import (
     read_guarded,
     write_bytes,
 )
+from fixtures.prior_weights import write_weights
 from fixtures.random_field import random_field
 from hypothesis import given
 from plyfile import PlyData, PlyElement
@@ -164,7 +165,7 @@ READERS = [
     ),
     Reader(
         "weights of the prior",
-        lambda folder: weights.save_weights(NETWORK, folder / "a.safetensors", {"what": "a test"}),
+        lambda folder: write_weights(NETWORK, folder / "a.safetensors"),
         lambda path: weights.load_weights(NETWORK, path),
         is_network,
         350,

@@ -15,7 +15,7 @@ from dav_gswt.images import image_files, metrics
 from dav_gswt.photos.training_views import WHOLE, TrainingView, read_training_views
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.prior.interface import Condition
-from dav_gswt.prior.terrain import TerrainPrior
+from dav_gswt.prior.terrain import TerrainPrior, pack_render
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground, read_ground
 from dav_gswt.views.candidates import Candidates
@@ -166,6 +166,6 @@ def control_maps(prior: PriorConfig, condition: Condition) -> dict[str, Float32[
     """
     if not isinstance(prior.model, TerrainPrior):
         return {}
-    render = prior.model.encode_render(condition)
+    render = prior.model.encode(pack_render(condition)).numpy()
     drawn = prior.model.sample(condition, prior.samples, 0.0, prior.steps, prior.seed, common=False)
     return {"spread": w2_sq(drawn)[1], "residual": ((drawn.mean(1) - render) ** 2).sum(1)}

@@ -82,7 +82,8 @@ def _large_deviation_cases() -> list[Case]:
 
 
 def _w2_sq(means: Array, variances: Array) -> Array:
-    return un.w2_sq(means, variances)[1]
+    """The distance between Gaussians: that of their means and of their deviations, as points."""
+    return un.w2_sq(means)[1] + un.w2_sq(np.sqrt(variances, dtype=np.float64))[1]
 
 
 def _uncertainty_cases() -> list[Case]:

@@ -7,7 +7,6 @@ import pytest
 from fixtures import ground as patch
 from fixtures.frames import scene_frame
 
-from dav_gswt.capture import serial_rig
 from dav_gswt.capture.capturing import filter_attainable
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
@@ -41,17 +40,11 @@ def test_a_drone_is_sent_no_lower_than_it_may_fly():
     place = replace(FRAME, georeference=Georeference(48.0, 11.0, 500.0, 0.0, metres_per_unit=4.0))
     low = (Pose("low", 90.0, 0.0, 0.4), cameras.pinhole([0, 0.01, 0.4], [0, 0, 0], 64, 64, 100.0))
 
-    def kept(frame, **scene):
-        found = filter_attainable({"agent": "plan"} | scene, frame, GRID, EMPTY, [*POOL, low])
-        return [pose.name for pose, _ in found]
+    def kept(frame, altitude):
+        scene = {"agent": "plan", "drone": {"min_altitude": altitude}}
+        return [pose.name for pose, _ in filter_attainable(scene, frame, GRID, EMPTY, [*POOL, low])]
 
-    assert kept(FRAME) == ["above", "low"] == kept(place, drone={"min_altitude": 1.5})
-    assert kept(place) == ["above"] == kept(place, drone={"min_altitude": 2.0})
+    assert kept(FRAME, 2.0) == ["above", "low"] == kept(place, 1.5)
+    assert kept(place, 2.0) == ["above"]
     with pytest.raises(InputError, match="all 3 candidate poses are lower than 12 m"):
-        kept(place, drone={"min_altitude": 12.0})
-
-
-def test_only_a_rig_is_checked_for_reach(monkeypatch):
-    monkeypatch.setattr(serial_rig, "filter_reachable", lambda scene, frame, pool: [])
-    assert names({"agent": "serial"}) == []
-    assert names({"agent": "render"}) == ["above"]
+        kept(place, 12.0)

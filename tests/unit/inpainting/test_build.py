@@ -5,14 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 from fixtures import ground as patch
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.inpainting import build
-from dav_gswt.prior.interface import DecodedViews
-from dav_gswt.prior.networks import Network
-from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.reconstruction import discs
 from dav_gswt.views import pose_maps
 from dav_gswt.views.prior_sampling import PriorConfig
@@ -27,7 +23,7 @@ BAND = 8  # pixels of a picture that have one of them
 class BandPrior:
     """Samples are bands of two colours where the render is not valid, and the render itself elsewhere."""
 
-    name, size = "bands", 32
+    name, size, small = "bands", 32, False
 
     def __init__(self, spoil=None, light=1.0):
         self.spoil, self.light = spoil, np.float32(light)
@@ -44,7 +40,7 @@ class BandPrior:
         planes = np.ascontiguousarray(latents.transpose(0, 1, 3, 4, 2))
         if self.spoil is not None:
             planes[0, 0, 3, 4, self.spoil] = np.nan
-        return DecodedViews(planes[..., :4], None)
+        return planes[..., :4]
 
 
 def config(prior=None, samples=2):
@@ -100,14 +96,6 @@ def test_unseen_ground_takes_the_colour_of_the_prior_and_all_else_keeps_its_byte
     assert np.array_equal(marked[rows].reshape(16, 16), np.tile(np.arange(16) >= FIRST // 2, (16, 1)))
 
 
-def test_a_prior_that_paints_all_too_dark_what_is_known_included_gives_about_the_same_ground():
-    field, grid = half_seen()
-    dark, bright = (inpaint(field, grid, BandPrior(light=light)).field.base_colours for light in (0.66, 1.0))
-    unseen_discs = (~grid.seen).ravel()
-    off = (dark - bright)[: len(unseen_discs)][unseen_discs].mean(0)
-    assert np.abs(off).max() < 0.08  # without a match it is 0.17
-
-
 def test_far_from_known_pixels_a_picture_has_the_mean_colour_of_the_ground():
     rng = np.random.default_rng(0)
     picture, ground = rng.uniform(0.4, 0.6, (64, 64, 3)).astype(np.float32), np.array([0.3, 0.5, 0.4])
@@ -156,18 +144,6 @@ def test_a_prior_with_samples_that_are_not_finite_is_refused():
         inpaint(*half_seen(), BandPrior(spoil=3))
 
 
-@pytest.mark.slow
-def test_the_terrain_prior_gives_the_same_bytes_on_any_number_of_threads():
-    torch.manual_seed(5)
-    terrain = TerrainPrior(Network())
-    found, before = [], torch.get_num_threads()
-    for threads in (1, 2):
-        torch.set_num_threads(threads)
-        found.append(inpaint(*half_seen(), terrain).field)
-    torch.set_num_threads(before)
-    assert found[0].imagined.any() and same(found[0], found[1])
-
-
 def blob(place, sizes, colour):
     return GaussianField(
         np.float32([place]),
@@ -191,7 +167,6 @@ def test_every_unseen_cell_is_well_inside_the_picture_of_its_block():
         at, depth = camera.project(grid.centres)
         fresh &= ~((depth > 0) & (at > 2).all(1) & (at < 62).all(1)).reshape(grid.shape)
     assert there.any() and not fresh.any()
-    assert build.find_targets(grid, np.zeros(grid.shape, bool), 6.0) == []
 
 
 def test_no_camera_is_inside_an_object_or_under_the_ground():

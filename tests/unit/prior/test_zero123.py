@@ -57,7 +57,7 @@ def networks():
     return unet, coder, transformers.CLIPVisionModelWithProjection(eye), torch.nn.Linear(WIDTH + 4, WIDTH)
 
 
-def written(folder, place, pipeline):
+def written(folder, place):
     """A folder as diffusers writes it, with the pose's layer in `place`."""
     unet, coder, eye, projection = networks()
     for part, name in ((unet, "unet"), (coder, "vae"), (eye, "image_encoder")):
@@ -65,14 +65,13 @@ def written(folder, place, pipeline):
     (folder / place).mkdir()
     prefix = zero123.PROJECTIONS[place]
     save_file({prefix + name: v for name, v in projection.state_dict().items()}, folder / place / UNET)
-    (folder / "model_index.json").write_text(json.dumps({"_class_name": pipeline, place: ["x", "y"]}))
     return folder
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """The first layout, with the names that older versions gave to the coder's attention and to CLIP's constant."""
-    path = written(tmp_path_factory.mktemp("one") / "zero123-xl", "cc_projection", "Zero1to3StableDiffusionPipeline")
+    path = written(tmp_path_factory.mktemp("one") / "zero123-xl", "cc_projection")
     changed(path / "vae" / CODER, older)
     changed(path / "image_encoder" / EYE, lambda v: v | {"vision_model.embeddings.position_ids": torch.arange(5)[None]})
     return path
@@ -106,23 +105,16 @@ def test_it_is_a_prior_of_the_published_sizes(prior):
     assert isinstance(prior, Prior) and (prior.name, prior.size) == ("zero123", 256)
     assert found.shape == (2, 3, 4, 32, 32) and found.dtype == np.float32
     made = prior.decode(found[:1])
-    assert made.rgba.shape == (1, 3, 256, 256, 4) and made.inverse_depth is None
-    assert made.rgba.min() >= 0 and made.rgba.max() <= 1
+    assert made.shape == (1, 3, 256, 256, 4) and made.min() >= 0 and made.max() <= 1
 
 
 def test_both_layouts_hold_the_same_prior(prior, tmp_path):
-    other = written(tmp_path / "other", "clip_camera_projection", "Zero123Pipeline")
+    other = written(tmp_path / "other", "clip_camera_projection")
     for path in other.rglob("*.safetensors"):  # in half precision, under that variant's name
         changed(path, lambda values: {name: v.half() for name, v in values.items()})
         path.rename(path.with_suffix(".fp16.safetensors"))
     found = Zero123.open(other).sample(condition(), 1, 0.0, 2, 0)
     np.testing.assert_allclose(found, prior.sample(condition(), 1, 0.0, 2, 0), atol=0.05)  # halves have 3 digits
-
-
-def test_a_view_does_not_depend_on_the_others(prior):
-    together, alone = (prior.sample(some, 3, 0.2, 1, 0) for some in (condition(5), condition(5)[4:]))
-    np.testing.assert_allclose(together[4], alone[0], atol=1e-5)
-    assert (together.var(axis=1).mean((1, 2, 3)) > 0).all() and not np.allclose(together[0], together[1])
 
 
 def test_it_samples_as_the_authors_write_it_down(prior):
@@ -150,14 +142,6 @@ def test_it_samples_as_the_authors_write_it_down(prior):
     assert np.abs(Zero123(prior.networks, 1.0).sample(view, 1, 0.0, steps, 5)[:, 0] - x.numpy()).max() > 1e-3
 
 
-def test_latents_are_scaled(prior):
-    latents = np.random.default_rng(0).normal(size=(1, 2, *LATENT)).astype(np.float32)
-    with torch.inference_mode():
-        painted = prior.networks.vae.decode(torch.from_numpy(latents[0]) / 0.18215).sample.clamp(-1, 1)
-    shown = remove_white((painted / 2 + 0.5).numpy().transpose(0, 2, 3, 1))
-    np.testing.assert_allclose(prior.decode(latents).rgba[0], shown, atol=1e-6)
-
-
 def test_a_sample_has_one_mask_with_and_without_the_photo(prior):
     """Without a condition, both passes are the same, so guidance must change nothing, whatever was dropped."""
     noise = torch.randn((6, *LATENT), generator=torch.Generator().manual_seed(3))
@@ -168,13 +152,6 @@ def test_a_sample_has_one_mask_with_and_without_the_photo(prior):
         with torch.inference_mode(), dropout.hold_masks(one.networks.layers, 3, 0.4, 0):
             found.append(one._predict_noise(noise, torch.tensor(500), *nothing))
     torch.testing.assert_close(*found, atol=1e-5, rtol=0)
-
-
-def test_what_is_not_finite_or_makes_no_sense_is_refused_by_name(prior):
-    view = condition()
-    view.photo[1, 0, 0] = np.nan
-    with pytest.raises(ValueError, match="photo of view 1"):
-        prior.sample(view, 2, 0.1, 2, 0)
 
 
 def test_drawn_over_white_the_picture_is_what_was_painted():
@@ -230,20 +207,18 @@ def test_damaged_weights_are_refused_by_name(folder, tmp_path, part, damage, mes
         ("vae/config.json", {"latent_channels": 16}, "has the shape"),
         ("image_encoder/config.json", {"projection_dim": 8}, "has the shape"),
         ("vae/config.json", {"down_block_types": ["Another"]}, "describes no such network"),
+        ("unet/config.json", None, "describes no such network"),  # a text, which diffusers would try to fetch
     ],
 )
 def test_a_config_of_another_model_is_refused_by_name(folder, tmp_path, name, change, message):
     path = shutil.copytree(folder, tmp_path / "copy") / name
-    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    path.write_text(json.dumps(json.loads(path.read_text()) | change if change else "owner/model"))
     with pytest.raises(InputError, match=message):
         Zero123.open(tmp_path / "copy")
 
 
 def test_a_folder_of_something_else_or_of_too_many_bytes_is_refused_by_what_it_is(folder, tmp_path, monkeypatch):
-    with pytest.raises(InputError, match="no model of diffusers"):
-        Zero123.open(tmp_path)
-    (tmp_path / "model_index.json").write_text('{"_class_name": "StableDiffusionPipeline"}')
-    with pytest.raises(InputError, match="StableDiffusionPipeline, not Zero-1-to-3"):
+    with pytest.raises(InputError, match="is not Zero-1-to-3"):
         Zero123.open(tmp_path)
     with monkeypatch.context() as patch, pytest.raises(InputError, match="pip install 'transformers=="):
         patch.setitem(sys.modules, "transformers", None)

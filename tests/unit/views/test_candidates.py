@@ -126,18 +126,13 @@ def verdicts(**move):
     return feasibility.find_infeasible(pool, block, ground(**move), 0.15 * move.get("scale", 1.0))
 
 
-def kinds(reasons):
-    return {name: reason.split(":")[0] for name, reason in reasons.items()}
-
-
 @pytest.fixture(scope="module")
 def usual():
     return verdicts()
 
 
 def test_poses_in_the_ground_near_it_and_behind_the_ridge_are_rejected_and_no_others(usual):
-    assert usual["behind the ridge"] == "hidden: 27 of 81 points of the exemplar are visible"
-    assert kinds(usual) == {
+    assert usual == {
         "behind the ridge": "hidden",
         "in its shadow": "hidden",
         "in the ridge": "buried",
@@ -162,16 +157,14 @@ def test_what_is_in_sight_over_the_ridge_by_hand(height, columns):
 
 @pytest.mark.parametrize("move", [{"shift": (1e6, -1e6, 1e6)}, {"scale": 1e-3}], ids=str)
 def test_the_world_may_lie_anywhere_and_have_any_unit(usual, move):
-    found = verdicts(**move)
-    assert kinds(found) | {"in a tree": "inside an object"} == kinds(usual)
-    assert found["behind the ridge"] == usual["behind the ridge"]  # the same points in sight
+    assert verdicts(**move) | {"in a tree": "inside an object"} == usual
 
 
 def test_pictures_that_miss_the_exemplar_or_all_ground_are_rejected():
     away, half = (-2, 0, 1), (0, 0, 2)
     pool = [candidate("away", away, (-3, 0, 0), fov=40.0), candidate("half", half, (0, 3, 1.5), fov=140.0)]
     found = feasibility.find_infeasible(pool, BLOCK, ground(), 0.1)
-    assert kinds(found) == {"away": "off the exemplar", "half": "past the ground"}
+    assert found == {"away": "off the exemplar", "half": "past the ground"}
 
 
 def test_what_is_kept_and_how_many_are_not_is_said(caplog):

@@ -69,19 +69,6 @@ def test_gains_are_what_the_formula_says(cells):
     assert gain(cells, [taken], one, importance) == pytest.approx(total)
 
 
-def test_gains_of_a_set_add_up_in_any_order(cells):
-    none, views = cells.view([]), cells.view([camera.resized(32, 32) for _, camera in patch.pool(8, 0.7)])
-
-    def sum_gains(chosen):
-        covered, total = coverage.DirectionalCoverage(cells, none, views), 0.0
-        for i in chosen:
-            total += covered.gain(i)
-            covered.take(i)
-        return total
-
-    assert sum_gains([1, 4, 2]) == pytest.approx(sum_gains([2, 4, 1]))
-
-
 def test_importance_has_any_scale_and_none_at_all_is_an_equal_one_and_what_shows_nothing_gains_nothing(cells):
     one, matters = look(2.7, 0.6, 1.0, (2.7, 0.5, 0.0)), np.where(cells.middle[:, 0] > 1.6, 5.0, 1.0)
     assert gain(cells, [], one, 1e-20 * matters) == pytest.approx(gain(cells, [], one, matters))

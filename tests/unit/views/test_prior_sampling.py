@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from fixtures import lpips_arrays
 
-from dav_gswt.prior.interface import Condition, DecodedViews
+from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import SIZE, Network
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.views import prior_sampling, terms
@@ -20,14 +20,14 @@ ALL = np.ones((N, 32, 32), np.float32)  # every pixel counts
 class Grey:
     """Samples that differ in sign."""
 
-    name, size = "grey", 32
+    name, size, small = "grey", 32, False
 
     def sample(self, condition, m, p_drop, steps, seed, common=True):
         signs = np.where(np.arange(m) % 2, -1.0, 1.0)[None, :, None, None, None]
         return (signs * np.ones((len(condition), m, 4, 32, 32))).astype(np.float32)
 
     def decode(self, latents):
-        return DecodedViews(np.full((*latents.shape[:2], 32, 32, 4), 0.5, np.float32), None)
+        return np.full((*latents.shape[:2], 32, 32, 4), 0.5, np.float32)
 
 
 def condition(n):

@@ -3,11 +3,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
-from dav_gswt.geometry import cameras
-from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset, select_farthest_poses
+from dav_gswt.geometry.poses import Pose, select_farthest_poses
 from dav_gswt.views import policies, scores, selection
 from dav_gswt.views.policies import NEEDS_FIELD, POLICIES, SelectionInput, candidate_values, resolve_policy
 from dav_gswt.views.scores import Scores
@@ -127,14 +125,6 @@ def test_scores_are_read_as_written_to_the_bit_and_what_is_no_table_of_scores_is
     for name, reason in (reasons | {"word": "could not convert"}).items():
         with pytest.raises(InputError, match=reason):
             scores.read_scores(tmp_path / f"{name}.csv")
-
-
-def test_a_pose_has_the_place_of_its_camera():
-    frame = scene_frame(exemplar=(1.0, 2.0, 2.0))
-    camera = cameras.pinhole([2.0, 3 + 3.0, 4.0], [2, 3, 0], 10, 10, 40.0)
-    pose = pose_of_camera("x", camera, frame)
-    assert (pose.azimuth, pose.radius) == (pytest.approx(90), pytest.approx(5))
-    np.testing.assert_allclose(pose_offset(pose), [0, 3, 4], atol=1e-12)
 
 
 def test_candidates_are_coloured_by_uncertainty_where_a_prior_was_sampled_else_by_coverage():

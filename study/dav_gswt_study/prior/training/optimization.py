@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 import torch
+from diffusers.models.autoencoders.vae import DiagonalGaussianDistribution
 from jaxtyping import Float, UInt8
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
@@ -32,6 +33,7 @@ WARM_UP = 200  # steps until the full learning rate
 MEAN_DECAY = 0.998  # of the running mean of weights, at most
 WEIGHT_DECAY = 0.01
 GRADIENT_NORM = 1.0  # longer gradients are clipped
+INITIAL_LOG_VARIANCE = -5.0  # of latents before training
 KL_WEIGHT = 1e-6  # of the Kullback-Leibler term of the autoencoder
 MOST_DROPOUT = 0.3  # of attention in training; each batch draws its own rate, a third of them none
 MASKED = 0.35  # share of examples with a part of the render hidden, as where two tiles are joined
@@ -71,6 +73,15 @@ class Pictures:
     relative: Float[Tensor, "n 4"]
 
 
+def _start_with_small_variances(network: Network) -> None:
+    """Give latents INITIAL_LOG_VARIANCE before training, whatever the picture."""
+    last = network.autoencoder.encoder[-1]
+    assert isinstance(last, nn.Conv2d) and last.bias is not None
+    with torch.no_grad():
+        last.weight[LATENT[0] :] = 0
+        last.bias[LATENT[0] :] = INITIAL_LOG_VARIANCE
+
+
 def train_autoencoder(
     network: Network, pictures: UInt8[Tensor, "n 5 s s"], plan: TrainingPlan, checkpoint: Path
 ) -> list[float]:
@@ -82,17 +93,23 @@ def train_autoencoder(
     def loss(step: int, rng: torch.Generator) -> Tensor:
         rows = torch.randint(len(pictures), (plan.batch,), generator=rng)
         true = pictures[rows].float() / 255
-        posterior = network.posterior(true)
+        posterior = _find_posterior(network, true)
         latent = posterior.mean + posterior.std * torch.randn(posterior.mean.shape, generator=rng)
         decoded = (network.autoencoder.decode(latent) + 1) / 2
         return (decoded - true).abs().mean() + KL_WEIGHT * posterior.kl().mean()
 
+    _start_with_small_variances(network)
     losses = train(network.autoencoder, loss, plan, checkpoint, "train autoencoder")
     network.eval()
     with torch.inference_mode():
         some = pictures[:: max(1, len(pictures) // 2048)].float() / 255
-        network.scale.fill_(1 / network.posterior(some).mode().std())
+        network.scale.fill_(1 / _find_posterior(network, some).mode().std())
     return losses
+
+
+def _find_posterior(network: Network, planes: Float[Tensor, "n 5 s s"]) -> DiagonalGaussianDistribution:
+    """The encoder's normal distribution of unscaled latents of pictures."""
+    return DiagonalGaussianDistribution(network.autoencoder.encode(2 * planes - 1))
 
 
 def train_denoiser(network: Network, examples: EncodedExamples, plan: TrainingPlan, checkpoint: Path) -> list[float]:
@@ -221,15 +238,26 @@ def train_prior(
     if not done.exists():
         every = torch.cat([pictures.truth, pictures.render, pictures.photo])
         losses = train_autoencoder(network, every, plan, checkpoints / "autoencoder.safetensors")
-        weights.save_weights(network, done, {"losses": json.dumps(losses)}, torch.float32)
+        save_weights(network, done, {"losses": json.dumps(losses)}, torch.float32)
     else:
         losses = json.loads(weights.load_weights(network, done)["losses"])
     denoiser_losses = train_denoiser(
         network, encode_pictures(network, pictures), denoiser_plan, checkpoints / "denoiser.safetensors"
     )
-    weights.save_weights(network, out, {"examples": str(len(pictures.truth))})
+    save_weights(network, out, {"examples": str(len(pictures.truth))})
     done.unlink(missing_ok=True)
     return {"coder": losses, "denoiser": denoiser_losses}
+
+
+def save_weights(network: Network, path: Path | str, facts: dict[str, str], dtype: torch.dtype = torch.float16) -> None:
+    """Write the prior's weights as `weights.load_weights` reads them. facts: metadata for the header."""
+    stored = {own: name for name, own in weights.STORED_PARTS.items()}
+    values = {}
+    for name, value in network.state_dict().items():
+        part, dot, rest = name.partition(".")
+        values[stored.get(part, part) + dot + rest] = value.detach().to("cpu", dtype).contiguous()
+    with atomic_file(path) as unfinished:
+        save_file(values, str(unfinished), metadata=facts)
 
 
 def write_losses(path: Path | str, losses: dict[str, list[float]]) -> None:

@@ -6,6 +6,7 @@ they need when they are called.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 
@@ -14,9 +15,10 @@ class Agent:
     """Who takes the photos of a scene.
 
     Attributes:
-        take: takes photos. Without `device` it is called with a `CaptureRequest`, writes photos into its folder and
-            returns one record for each. With `device` it is called with a `Site` and the poses that lack photos, fills
-            the photo store, and raises InputError as long as photos are missing.
+        take: takes photos. Without `device` it is called with a `Site`, the poses, all candidates that are not used yet
+            and a folder, writes photos into the folder and returns one record for each. With `device` it is called with
+            a `Site` and the poses that lack photos, fills the photo store, and raises InputError as long as photos are
+            missing.
         kinds: of the scenes that the agent serves.
         device: whether a device or a person takes the photos: on this machine, and never twice.
         keep_reachable: called with the scene's entry, its frame and candidates; returns those that can be reached.
@@ -56,34 +58,34 @@ def list_agents(kind: str) -> tuple[str, ...]:
 
 
 @agent("render", "synthetic", device=False)
-def render(request: Any) -> list[Any]:
+def render(site: Any, poses: list[Any], remaining: list[Any], folder: Path) -> list[Any]:
     """Photos of a synthetic scene are rendered exactly at their poses."""
     from dav_gswt.images.image_files import write_png
     from dav_gswt.logs import progress
     from dav_gswt.photos.capture_record import CapturedPhoto
     from dav_gswt.photos.synthetic import scene as synthetic
 
-    world, photos = synthetic.scene_from_config(request.site.scene), []
-    for pose, camera in progress(request.poses, "render photos"):
+    world, photos = synthetic.scene_from_config(site.scene), []
+    for pose, camera in progress(poses, "render photos"):
         photos.append(CapturedPhoto(f"{pose.name}.png", pose, camera, camera, 0.0))
-        write_png(request.folder / photos[-1].name, synthetic.render(world, camera))
+        write_png(folder / photos[-1].name, synthetic.render(world, camera))
     return photos
 
 
 @agent("replay", "synthetic", "photos", device=False, pool=True)
-def replay(request: Any) -> list[Any]:
+def replay(site: Any, poses: list[Any], remaining: list[Any], folder: Path) -> list[Any]:
     """The photo of the pool that is nearest to each pose is taken, ties by name; fewer if the pool ends."""
     import shutil
 
     from dav_gswt.capture.capturing import view_distance
     from dav_gswt.photos.capture_record import CapturedPhoto
 
-    site, remaining, photos = request.site, {pose.name: camera for pose, camera in request.remaining}, []
-    for pose, camera in request.poses[: len(remaining)]:
-        distance = {name: view_distance(camera, other, site.unit) for name, other in remaining.items()}
+    pool, photos = {pose.name: camera for pose, camera in remaining}, []
+    for pose, camera in poses[: len(pool)]:
+        distance = {name: view_distance(camera, other, site.frame) for name, other in pool.items()}
         name = min(distance, key=lambda n: (distance[n], n))
-        shutil.copyfile(site.photos / "images" / name, request.folder / name)
-        photos.append(CapturedPhoto(name, pose, camera, remaining.pop(name), distance[name]))
+        shutil.copyfile(site.photos / "images" / name, folder / name)
+        photos.append(CapturedPhoto(name, pose, camera, pool.pop(name), distance[name]))
     return photos
 
 

@@ -38,37 +38,15 @@ class Site:
     photos: Path
     store: PhotoStore
     field: Path | str | None = None
-    shot_list_template: Path | str | None = None
+    shot_list_template: Path | str = ""
     requested: tuple[Camera, ...] = ()
 
-    @property
-    def unit(self) -> float:
-        """The flying height in world units."""
-        return self.frame.flying_height
 
-    def lacks_photo(self, camera: Camera) -> bool:
-        """Whether the store has no photo of a pose."""
-        return not self.store.photos_of(camera)
-
-
-@dataclass(frozen=True)
-class CaptureRequest:
-    """Poses to photograph.
-
-    remaining: all candidates that are not used yet, the requested ones included. folder: where the photos go.
-    """
-
-    site: Site
-    poses: list[RequestedPose]
-    remaining: Candidates
-    folder: Path
-
-
-def view_distance(a: Camera, b: Camera, unit: float) -> float:
-    """Distance of two views: between the centres in units of `unit` (the flying height), plus the angle between the
-    viewing directions in radians."""
+def view_distance(a: Camera, b: Camera, frame: SceneFrame) -> float:
+    """Distance of two views: between the centres in flying heights, plus the angle between the viewing directions in
+    radians."""
     angle = np.arccos(np.clip(a.forward @ b.forward, -1, 1))
-    return float(np.linalg.norm(a.centre - b.centre) / unit + angle)
+    return float(np.linalg.norm(a.centre - b.centre) / frame.flying_height + angle)
 
 
 def filter_attainable(
@@ -94,31 +72,34 @@ def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[Pose]
     the agent is not called.
     """
     remaining = pools.list_remaining(site.scene, site.frame, site.photos / "sparse", split, before)
-    requested = pools.select_by_name(remaining, chosen)
+    by_name = {pose.name: (pose, camera) for pose, camera in remaining}
+    requested = [by_name[pose.name] for pose in chosen]
     earlier = [photo.requested for capture in before for photo in read_capture_record(capture)]
     site = replace(site, requested=(*earlier, *(camera for _, camera in requested)))
     folder.mkdir(parents=True, exist_ok=True)
-    photos = take_requested(CaptureRequest(site, requested, remaining, folder)) if requested else []
+    photos = take_requested(site, requested, remaining, folder) if requested else []
     write_capture_record(folder, site.scene["agent"], photos)
 
 
-def take_requested(request: CaptureRequest) -> list[CapturedPhoto]:
-    """Have the scene's agent take photos. A device takes those that the store lacks; all are then undistorted."""
-    site, agent = request.site, AGENTS[request.site.scene["agent"]]
+def take_requested(site: Site, poses: list[RequestedPose], remaining: Candidates, folder: Path) -> list[CapturedPhoto]:
+    """Have the scene's agent take photos. A device takes those that the store lacks; all are then undistorted.
+
+    remaining: all candidates that are not used yet, the requested ones included.
+    """
+    agent = AGENTS[site.scene["agent"]]
     if not agent.device:
-        return agent.take(request)
+        return agent.take(site, poses, remaining, folder)
     with site.store.locked():
-        missing = [(pose, camera) for pose, camera in request.poses if site.lacks_photo(camera)]
+        missing = [(pose, camera) for pose, camera in poses if not site.store.photos_of(camera)]
         if missing:
             agent.take(site, missing)
-        return [_undistort_stored(request, pose, camera) for pose, camera in request.poses]
+        return [_undistort_stored(site, pose, camera, folder) for pose, camera in poses]
 
 
-def _undistort_stored(request: CaptureRequest, pose: Pose, camera: Camera) -> CapturedPhoto:
+def _undistort_stored(site: Site, pose: Pose, camera: Camera, folder: Path) -> CapturedPhoto:
     """Write a pose's oldest stored photo as its pinhole camera would have taken it."""
-    site, name = request.site, f"{pose.name}.png"
-    stored = site.store.photos_of(camera)[0]
+    stored, name = site.store.photos_of(camera)[0], f"{pose.name}.png"
     picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera)
-    image_files.write_png(request.folder / name, picture)
-    distance = view_distance(camera, stored.camera, site.unit)
+    image_files.write_png(folder / name, picture)
+    distance = view_distance(camera, stored.camera, site.frame)
     return CapturedPhoto(name, pose, camera, stored.camera, distance, stored.taken)

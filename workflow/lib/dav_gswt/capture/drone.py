@@ -6,8 +6,6 @@ relative to the take-off point, which must be on the ground of the scene: z = 0.
 Sources: docs.qgroundcontrol.com, "Plan File Format"; mavlink.io, MAV_CMD.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
@@ -21,38 +19,16 @@ from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.views.candidates import Candidates
 
-NamedCamera = tuple[str, Camera]
-
 WAYPOINT, RETURN, TAKEOFF, DELAY, SPEED, GIMBAL, SHUTTER = 16, 20, 22, 93, 178, 205, 2000  # MAV_CMD
 RELATIVE, NO_PLACE = 3, 2  # MAV_FRAME: position with altitude above home; command without position
 PX4, QUADROTOR = 12, 2  # MAV_AUTOPILOT, MAV_TYPE
 ABOVE_HOME = 1  # QGroundControl's AltitudeMode
 TARGETING = 2  # MAV_MOUNT_MODE: the gimbal takes angles
 GROUND_SPEED = 1  # SPEED_TYPE
+CRUISE = 3.0  # metres per second
 HOLD, SETTLE, WRITE = 1.0, 3.0, 1.0  # seconds: to come to rest, for the gimbal to turn, for a photo to be taken
 LEVEL = 0.02  # horizontal part of a viewing direction below which the picture's top gives the heading
 SAME = 0.01  # metres: nearer positions count as equal
-
-
-@dataclass(frozen=True)
-class FlightRules:
-    """Safety limits of a flight, in metres above the plane of the ground and metres per second.
-
-    No photo is taken below min_altitude; below clearance the vehicle only moves vertically.
-    """
-
-    min_altitude: float = 2.0
-    clearance: float = 5.0
-    speed: float = 3.0
-
-
-@dataclass(frozen=True)
-class Flight:
-    """A plan: content of its file, duration in seconds, and a description."""
-
-    content: dict
-    duration: float
-    description: str
 
 
 def filter_reachable(scene: dict, frame: SceneFrame, candidates: Candidates) -> Candidates:
@@ -62,8 +38,7 @@ def filter_reachable(scene: dict, frame: SceneFrame, candidates: Candidates) -> 
     """
     if frame.georeference is None or not candidates:
         return candidates
-    least = scene.get("drone", {}).get("min_altitude", FlightRules.min_altitude)
-    scale = frame.georeference.metres_per_unit
+    least, scale = scene["drone"]["min_altitude"], frame.georeference.metres_per_unit
     found = [(pose, camera) for pose, camera in candidates if scale * camera.centre[2] >= least]
     if not found:
         raise InputError(
@@ -76,8 +51,8 @@ def filter_reachable(scene: dict, frame: SceneFrame, candidates: Candidates) -> 
 def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     """Import dropped photos; for those still missing write a mission.
 
-    Raises: InputError: photos are missing (the message says which, and what to fly), the scene has no georeference,
-        its ground is too steep, or a pose is too low to fly to.
+    Raises: InputError: photos are missing (the message says which, and what to fly), the scene has no georeference, or
+        its ground is too steep.
     """
     missing = drop_folder.import_dropped_photos(site, requested, "plan")
     if not missing:
@@ -90,19 +65,19 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
         )
     exemplar = site.frame.exemplar
     home = np.array([exemplar.west + exemplar.side / 2, exemplar.south])
-    rules = FlightRules(**{key: float(value) for key, value in site.scene.get("drone", {}).items()})
-    _check_level(site, place, missing, home, rules)
-    flight = plan_flight([(pose.name, camera) for pose, camera in missing], place, home, rules)
+    clearance = float(site.scene["drone"]["clearance"])
+    _check_level(site, place, missing, home, clearance)
+    plan, description = plan_flight([camera for _, camera in missing], place, home, clearance)
     path = site.store.folder / "mission.plan"
-    write_json(path, flight.content)
+    write_json(path, plan)
     raise InputError(
-        f"{path}: fly this mission (QGroundControl: Plan, Open), {flight.description}: "
+        f"{path}: fly this mission (QGroundControl: Plan, Open), {description}: "
         + drop_folder.describe_missing(site, missing)
     )
 
 
 def _check_level(
-    site: Site, place: Georeference, missing: list[RequestedPose], home: Float[Array, "2"], rules: FlightRules
+    site: Site, place: Georeference, missing: list[RequestedPose], home: Float[Array, "2"], clearance: float
 ) -> None:
     """Check that the ground is level enough, as a mission assumes: an altitude is wrong by distance times slope.
 
@@ -111,7 +86,7 @@ def _check_level(
     at = place.metres_per_unit * np.stack([camera.centre for _, camera in missing])
     off = np.linalg.norm(at[:, :2] - place.metres_per_unit * home, axis=1) * np.tan(np.radians(place.slope))
     low, worst, drone = off > at[:, 2] / 2, float(off.max()), f"scenes.{site.name}.drone"
-    keys = ["clearance"] * (worst > rules.clearance / 2) + ["min_altitude"] * bool(low.any())
+    keys = ["clearance"] * (worst > clearance / 2) + ["min_altitude"] * bool(low.any())
     if keys:
         names = ", ".join(pose.name for (pose, _), short in zip(missing, low, strict=True) if short)
         raise InputError(
@@ -123,40 +98,37 @@ def _check_level(
         )
 
 
-def plan_flight(views: list[NamedCamera], place: Georeference, home: Float[Array, "2"], rules: FlightRules) -> Flight:
+def plan_flight(
+    views: list[Camera], place: Georeference, home: Float[Array, "2"], clearance: float
+) -> tuple[dict, str]:
     """Plan a flight from a point on the ground (`home`, world units) past all views and back.
 
-    Raises: InputError: views below rules.min_altitude, by name.
+    clearance: metres above the plane of the ground, below which the vehicle only moves vertically.
+    Returns: the content of the mission's file, and a description with length and duration.
     """
     scale = place.metres_per_unit
-    at = scale * np.array([camera.centre for _, camera in views])
-    low = [name for (name, _), z in zip(views, at[:, 2], strict=True) if z < rules.min_altitude]
-    if low:
-        raise InputError(
-            f"{', '.join(low)}: lower than {rules.min_altitude:g} m above the ground, where no photo is taken from "
-            "the air (drone.min_altitude of the scene's entry); take a rig or agent: handheld for poses this low"
-        )
-    start = scale * np.array([*home, 0.0]) + [0.0, 0.0, rules.clearance]
+    at = scale * np.array([camera.centre for camera in views])
+    start = scale * np.array([*home, 0.0]) + [0.0, 0.0, clearance]
     mission, path = _Mission(place, scale * np.array([*home, 0.0])), [start]
     mission.add_waypoint(TAKEOFF, start)
-    mission.add_command(SPEED, GROUND_SPEED, rules.speed, -1)
+    mission.add_command(SPEED, GROUND_SPEED, CRUISE, -1)
     for i in [*route.order_stops(at, start, start), None]:
         stop = start if i is None else at[i]
-        for corner in plan_detour(path[-1], stop, rules.clearance):
+        for corner in plan_detour(path[-1], stop, clearance):
             mission.add_waypoint(WAYPOINT, corner)
             path.append(corner)
         path.append(stop)
         if i is not None:
-            mission.add_photo(stop, views[i][1])
+            mission.add_photo(stop, views[i])
     mission.add_command(RETURN)
     length = route.path_length(np.array(path))
-    duration = length / rules.speed + len(views) * (HOLD + SETTLE + WRITE)
+    duration = length / CRUISE + len(views) * (HOLD + SETTLE + WRITE)
     latitude, longitude = mission.home[:2]
     description = (
         f"a flight of {length:.0f} m, about {np.ceil(duration / 60):.0f} min, up to {at[:, 2].max():.0f} m above the "
         f"ground; take off from the ground near {latitude:.6f}, {longitude:.6f}"
     )
-    return Flight(mission.to_plan(rules.speed), duration, description)
+    return mission.to_plan(), description
 
 
 def plan_detour(a: Float[Array, "3"], b: Float[Array, "3"], clearance: float) -> list[Float[Array, "3"]]:
@@ -205,13 +177,13 @@ class _Mission:
         self.add_command(SHUTTER, 0, 0, 1, 0, None, None, None)  # one photo, no interval
         self.add_command(DELAY, WRITE, -1, -1, -1)
 
-    def to_plan(self, speed: float) -> dict:
+    def to_plan(self) -> dict:
         latitude, longitude, altitude = (float(v) for v in self.home)
         mission = {
-            "cruiseSpeed": speed,
+            "cruiseSpeed": CRUISE,
             "firmwareType": PX4,
             "globalPlanAltitudeMode": ABOVE_HOME,
-            "hoverSpeed": speed,
+            "hoverSpeed": CRUISE,
             "items": self.items,
             "plannedHomePosition": [round(latitude, 9), round(longitude, 9), round(altitude, 3)],
             "vehicleType": QUADROTOR,

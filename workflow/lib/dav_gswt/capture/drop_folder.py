@@ -37,9 +37,9 @@ def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str
     found = [(p, camera) for p, camera in zip(paths, localize_photos(site.photos, paths), strict=True) if camera]
     for path in sorted(set(paths) - {p for p, _ in found}):
         _log.warning("%s: it could not be localised; it must overlap photos of the scene", path.name)
-    open_poses = [(pose, camera) for pose, camera in requested if site.lacks_photo(camera)]
+    open_poses = [(pose, camera) for pose, camera in requested if not site.store.photos_of(camera)]
     pairs = [
-        (view_distance(camera, got, site.unit), pose.name, path.name, path)
+        (view_distance(camera, got, site.frame), pose.name, path.name, path)
         for path, got in found
         for pose, camera in open_poses
     ]
@@ -49,7 +49,8 @@ def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str
             assigned[name] = path
     for pose, camera in open_poses:
         if path := assigned.get(pose.name):
-            site.store.add(path, agent, (pose, camera), places[path], _read_time(path))
+            modified = datetime.fromtimestamp(path.stat().st_mtime, UTC).isoformat(timespec="seconds")
+            site.store.add(path, agent, (pose, camera), places[path], read_capture_time(path) or modified)
     for path in sorted(set(places) - set(assigned.values())):
         _log.warning("%s: it is near no requested pose; it is not used", path.name)
     return [(pose, camera) for pose, camera in open_poses if pose.name not in assigned]
@@ -76,7 +77,3 @@ def describe_missing(site: Site, missing: list[RequestedPose]) -> str:
         f"photos of {len(missing)} pose{'' if len(missing) == 1 else 's'} are missing ({names}). Put the photos into "
         f"{make_drop_folder(site)} and run the same command again: photos that are already there are kept"
     )
-
-
-def _read_time(path: Path) -> str:
-    return read_capture_time(path) or datetime.fromtimestamp(path.stat().st_mtime, UTC).isoformat(timespec="seconds")

@@ -4,21 +4,22 @@ The shot list is a web page without scripts or network access, to be opened from
 places in a short walking order with the picture expected at each.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.capture import directions, drop_folder, route
+from dav_gswt.capture import drop_folder, route
 from dav_gswt.capture.capturing import RequestedPose, Site
-from dav_gswt.capture.directions import Ruler
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, read_field
 from dav_gswt.files import atomic_folder
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 from dav_gswt.raster import render
@@ -30,19 +31,47 @@ MARGIN = 0.14  # around everything on the map, as a share of the longer side
 LOW = 0.5  # flying heights: anything higher would hide the ground on the map
 BLANK = 0.8  # grey where nothing is known
 CLOSE, TURNED = 0.2, 15  # flying heights, degrees: a photo nearer than this to its pose is always assigned to it
+COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
+ON_MAP = ("top", "upper right", "right", "lower right", "bottom", "lower left", "left", "upper left")
+HERE = 0.05  # flying heights: shorter walks are not mentioned
+STEEP = 80.0  # degrees below the horizon from which a camera counts as looking straight down
+FACING = 15.0  # degrees: largest angle past the middle that still counts as facing it
 
 
-def take_photos(site: Site, requested: list[RequestedPose], field: Path | str | None = None) -> None:
+@dataclass(frozen=True)
+class Ruler:
+    """Formats lengths and directions of a scene. unit: the flying height in world units. metres: per world unit."""
+
+    unit: float
+    metres: float | None
+    place: Georeference | None
+
+    def format_length(self, length: float) -> str:
+        """A length in world units as metres, or as flying heights if metres are not known."""
+        if self.metres is None:
+            count = f"{length / self.unit:.1f}"
+            return f"{count} flying height{'' if count == '1.0' else 's'}"
+        metres = length * self.metres
+        return f"{metres:.0f} m" if metres >= 20 else f"{metres:.1f} m"
+
+    def format_direction(self, direction: Float[Array, "d"]) -> str:
+        """A compass direction, or a direction on the map if north is not known."""
+        if self.place:
+            return COMPASS[round(self.place.azimuth(direction) / 45) % 8]
+        return f"the {ON_MAP[round(np.degrees(np.arctan2(direction[0], direction[1])) / 45) % 8]} of the map"
+
+
+def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     """Import dropped photos; for those still missing write a shot list.
 
-    field: the current field, for the map and the expected pictures; by default the site's, if it has one.
+    The map and the expected pictures are of the site's field, if it has one.
+
     Raises: InputError: photos are missing (the message says which, and names the page to follow).
     """
     missing = drop_folder.import_dropped_photos(site, requested, "handheld")
     if not missing:
         return
-    path = field or site.field
-    page = write_shot_list(site, missing, read_field(path) if path else None)
+    page = write_shot_list(site, missing, read_field(site.field) if site.field else None)
     raise InputError(
         f"{page}: take this page with you, printed or its folder copied to a phone: "
         + drop_folder.describe_missing(site, missing)
@@ -54,9 +83,7 @@ def write_shot_list(site: Site, missing: list[RequestedPose], field: GaussianFie
 
     Returns: the page.
     """
-    if site.shot_list_template is None:
-        raise ValueError("the agent handheld needs the template of its page")
-    by, ground = directions.make_ruler(site.frame), np.array([camera.centre[:2] for _, camera in missing])
+    by, ground = make_ruler(site.frame), np.array([camera.centre[:2] for _, camera in missing])
     ordered = route.order_stops(ground)
     places = [missing[i] for i in ordered]
     view = place_map_camera([camera for _, camera in places], site.frame)
@@ -130,13 +157,69 @@ def _describe_place(
     camera: Camera, before: Camera | None, i: int, view: Camera, frame: SceneFrame, by: Ruler
 ) -> dict[str, Any]:
     """A place as the page shows it; turn: of its arrow on the map, degrees; None: the camera looks straight down."""
-    steep = abs(directions.tilt(camera)) >= directions.STEEP
+    steep = abs(tilt(camera)) >= STEEP
     return {
         "number": i + 1,
         "at": view.project(camera.centre[None])[0][0].tolist(),
         "turn": None if steep else float(np.degrees(np.arctan2(-camera.forward[1], camera.forward[0]))),
-        "walk": "Start here." if before is None else f"From place {i}: {directions.describe_walk(before, camera, by)}.",
-        "pose": directions.describe_pose(camera, frame, by),
+        "walk": "Start here." if before is None else f"From place {i}: {describe_walk(before, camera, by)}.",
+        "pose": describe_pose(camera, frame, by),
         "width": camera.width,
         "height": camera.height,
     }
+
+
+def make_ruler(frame: SceneFrame) -> Ruler:
+    """Build the ruler of a scene."""
+    place = frame.georeference
+    metres = place.metres_per_unit if place else 1.0 if frame.unit == "metre" else None
+    return Ruler(frame.flying_height, metres, place)
+
+
+def tilt(camera: Camera) -> float:
+    """Angle of the viewing direction below the horizon, degrees."""
+    return float(-np.degrees(np.arcsin(np.clip(camera.forward[2], -1, 1))))
+
+
+def describe_tilt(camera: Camera) -> str:
+    """Say how far down or up a camera looks."""
+    down = round(tilt(camera))
+    if down >= STEEP:
+        return "straight down" if down >= 89 else f"down {down} degrees, nearly straight down"
+    return "level" if down == 0 else f"{'down' if down > 0 else 'up'} {abs(down)} degrees"
+
+
+def describe_facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
+    """Say which way to face, or where the picture's top is if the camera looks down."""
+    if abs(tilt(camera)) >= STEEP:
+        return f"turn the top of the picture to {by.format_direction(-camera.rotation[1][:2])}"
+    ahead, inwards = camera.forward[:2], (frame.exemplar.centre - camera.centre)[:2]
+    towards = by.format_direction(ahead)
+    across = ahead[0] * inwards[1] - ahead[1] * inwards[0]
+    off = np.degrees(np.arctan2(abs(across), ahead @ inwards))
+    if off > FACING or np.linalg.norm(inwards) < HERE * by.unit:
+        return f"face {towards}"
+    return f"face the middle, which is to {'the ' if by.place else ''}{towards}"
+
+
+def describe_pose(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
+    """Say where to stand, how high to hold the camera, and where it looks."""
+    out = (camera.centre - frame.exemplar.centre)[:2]
+    away, direction = float(np.linalg.norm(out)), by.format_direction(out)
+    if away < HERE * by.unit:
+        position = "Stand in the middle"
+    elif by.place:
+        position = f"Stand {by.format_length(away)} {direction} of the middle"
+    else:
+        position = f"Stand {by.format_length(away)} from the middle, towards {direction}"
+    up = f"camera {by.format_length(float(camera.centre[2]))} above the ground"
+    return f"{position}, {up}; {describe_facing(camera, frame, by)}; look {describe_tilt(camera)}."
+
+
+def describe_walk(a: Camera, b: Camera, by: Ruler) -> str:
+    """Say how to walk from one pose to the next."""
+    way = (b.centre - a.centre)[:2]
+    far = float(np.linalg.norm(way))
+    if far < HERE * by.unit:
+        return "stay where you are"
+    return f"go {by.format_length(far)} towards {by.format_direction(way)}"

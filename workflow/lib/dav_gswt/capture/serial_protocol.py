@@ -32,8 +32,9 @@ _log = logging.getLogger(__name__)
 VERSION = "1"
 LONGEST = 160  # bytes of a line with its end; anything longer is noise
 FIRST, LAST = 10000, 99999  # sequence numbers; a run starts at a random one, so answers to an earlier run are ignored
+BAUD, ANSWER_TIMEOUT, RETRIES = 115_200, 2.0, 3  # seconds for an answer; how often a question is repeated
 SLICE = 0.05  # seconds that one read waits
-WRITE_TIMEOUT = 5.0  # seconds, at least, after which a line that takes no byte is broken: a busy machine may stall
+WRITE_TIMEOUT = 5.0  # seconds after which a line that takes no byte is broken: a busy machine may stall
 TIMEOUT_FACTOR = {"SHOOT": 5.0}  # of a verb's answer: cameras block while they expose
 STOPPED = "the rig's stop button is pressed; release it when the way is clear, then run the same again"
 RESTARTED = "the rig restarted and lost its position; run the same again: photos taken until now are kept"
@@ -55,7 +56,7 @@ def unframe_line(line: bytes) -> str | None:
 
 
 @contextmanager
-def open_line(name: str, baud: int, timeout: float, retries: int) -> Iterator["SerialLine"]:
+def open_line(name: str) -> Iterator["SerialLine"]:
     """Open the line to the rig at a port. If the block fails, the rig is stopped, then the port closes.
 
     The rig is also stopped if the program is ended from outside: by Ctrl-C, a scheduler, or a closed terminal.
@@ -63,13 +64,12 @@ def open_line(name: str, baud: int, timeout: float, retries: int) -> Iterator["S
     Raises: InputError: the port does not open.
     """
     try:
-        patience = max(timeout, WRITE_TIMEOUT)
-        port = serial.serial_for_url(name, baud, timeout=SLICE, write_timeout=patience, exclusive=True)
+        port = serial.serial_for_url(name, BAUD, timeout=SLICE, write_timeout=WRITE_TIMEOUT, exclusive=True)
     except (OSError, ValueError) as error:
         raise InputError(
             f"{name}: the rig's port does not open ({error}); check rig.port, and who may use it"
         ) from error
-    line = SerialLine(port, name, timeout, retries)
+    line = SerialLine(port, name)
     with _signals_as_interrupt():
         try:
             yield line
@@ -93,10 +93,10 @@ def _signals_as_interrupt():
 
 
 class SerialLine:
-    """Sends one request at a time. port: of pyserial. name: for messages. timeout: seconds until an answer."""
+    """Sends one request at a time. port: of pyserial. name: for messages."""
 
-    def __init__(self, port, name: str, timeout: float, retries: int):
-        self._port, self._name, self._timeout, self._retries = port, name, timeout, retries
+    def __init__(self, port, name: str):
+        self._port, self._name = port, name
         self._seq = FIRST + secrets.randbelow(LAST - FIRST)
         self._rest = b""
 
@@ -149,12 +149,8 @@ class SerialLine:
         """
         self._seq = self._seq + 1 if self._seq < LAST else FIRST
         text = " ".join([str(self._seq), verb, *words])
-        wait = self._timeout * TIMEOUT_FACTOR.get(verb, 1.0)
-        with self._whole():
-            waiting = bool(self._port.in_waiting)
-        if waiting:
-            self._read_answer(verb, SLICE)  # unsolicited lines, before a new request
-        for _ in range(1 + self._retries):
+        wait = ANSWER_TIMEOUT * TIMEOUT_FACTOR.get(verb, 1.0)
+        for _ in range(1 + RETRIES):
             with self._whole():
                 self._port.write(b"\n" + frame_line(text))  # an empty line first ends the remains of a damaged one
             if (answer := self._read_answer(verb, wait)) is None:
@@ -164,7 +160,7 @@ class SerialLine:
             why = RESTARTED if answer[1:2] == ["LOST"] else " ".join(answer[1:]) or "no reason given"
             raise InputError(f"{self._name}: the rig refused {verb}: {why}")
         raise InputError(
-            f"{self._name}: the rig did not answer {verb}, asked {1 + self._retries} times with {wait:g} s each; "
+            f"{self._name}: the rig did not answer {verb}, asked {1 + RETRIES} times with {wait:g} s each; "
             f"check that it is on, its cable, rig.port and its speed ({self._port.baudrate} bit/s)"
         )
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter, map_coordinates
 
@@ -17,7 +17,6 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior import conditions
-from dav_gswt.prior.conditions import ReferencePhotos
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import discs
@@ -61,17 +60,6 @@ class InpaintingResult:
         return counts | {"exemplar": inside, "changed": bool(self.field.imagined.any())}
 
 
-@dataclass(frozen=True)
-class _Scene:
-    """Input of all steps. ground_colour: mean colour of the discs that photos saw."""
-
-    grid: Ground
-    frame: SceneFrame
-    photos: ReferencePhotos
-    config: PriorConfig
-    ground_colour: Float[Array, "3"]
-
-
 def inpaint_field(
     field: GaussianField, grid: Ground, frame: SceneFrame, photos: list[TrainingView], config: PriorConfig
 ) -> InpaintingResult:
@@ -90,10 +78,20 @@ def inpaint_field(
     _log.info("%d of %d cells of the ground were seen by no photo", cells.sum(), cells.size)
     if not cells.any():
         return InpaintingResult(field, cells, cells)
-    targets = find_targets(grid, cells, frame.flying_height)
-    references = conditions.prepare_photos(photos, frame, config.model.size)
-    scene = _Scene(grid, frame, references, config, _mean_ground_colour(field, grid))
-    coloured, left = _colour_cells(scene, field, cells, targets)
+    size, height = config.model.size, frame.flying_height
+    references = conditions.prepare_photos(photos, frame, size)
+    seen = grid.seen.ravel() if grid.seen.any() else np.ones(cells.size, bool)
+    ground_colour = np.clip(field.base_colours[: cells.size][seen], 0, 1).mean(0, dtype=float)
+    coloured, left = field, cells  # the cells that no picture showed
+    for target in progress(find_targets(grid, cells, height), "inpaint unseen ground"):
+        for pose, camera in place_camera(target, coloured, grid, frame, size):
+            condition = conditions.build_condition(coloured, [(pose, camera)], references, height, size)
+            shows, shows_left = (
+                render_share(coloured, select_gaussians(field, grid, some), camera) for some in (cells, left)
+            )
+            picture, alpha = inpaint_view(config, condition, shows_left > TOUCHED, ground_colour)
+            good = (shows > LOOKS) & (alpha > LEAST_ALPHA)
+            coloured, left = _colour_discs(coloured, left, camera, picture, good)
     done = cells & ~left
     if not done.any():
         _log.info("none of them is visible: known objects cover them all")
@@ -106,31 +104,6 @@ def inpaint_field(
     return InpaintingResult(result, cells, done)
 
 
-def _mean_ground_colour(field: GaussianField, grid: Ground) -> Float[Array, "3"]:
-    """Mean colour of the discs that a photo saw, or of all if none did."""
-    seen = grid.seen.ravel() if grid.seen.any() else np.ones(grid.heights.size, bool)
-    return np.clip(field.base_colours[: seen.size][seen], 0, 1).mean(0, dtype=float)
-
-
-def _colour_cells(
-    scene: _Scene, field: GaussianField, cells: Bool[Array, "rows columns"], targets: list[Float[Array, "3"]]
-) -> tuple[GaussianField, Bool[Array, "rows columns"]]:
-    """The field with generated colours, and the unseen cells that no picture showed."""
-    coloured, left, size = field, cells, scene.config.model.size
-    for target in progress(targets, "inpaint unseen ground"):
-        for pose, camera in place_camera(target, coloured, scene.grid, scene.frame, size):
-            view = [(pose, camera)]
-            condition = conditions.build_condition(coloured, view, scene.photos, scene.frame.flying_height, size)
-            shows, shows_left = (
-                render_share(coloured, select_gaussians(field, scene.grid, some), camera) for some in (cells, left)
-            )
-            touched = shows_left > TOUCHED
-            picture, alpha = inpaint_view(scene.config, condition, touched, scene.ground_colour)
-            good = (shows > LOOKS) & (alpha > LEAST_ALPHA)
-            coloured, left = _colour_discs(coloured, left, camera, picture, good)
-    return coloured, left
-
-
 def _colour_discs(
     field: GaussianField,
     left: Bool[Array, "rows columns"],
@@ -139,30 +112,17 @@ def _colour_discs(
     good: Bool[Array, "s s"],
 ) -> tuple[GaussianField, Bool[Array, "rows columns"]]:
     """The field with the colours of a picture's good pixels on the discs of cells that are left, and what is left."""
-    rows, pixels = _find_visible(field, left, camera, good)
-    sh = field.sh.copy()
-    sh[rows], sh[rows, :1] = 0, rgb_to_sh(_sample_picture(picture, pixels))
-    still = left.ravel().copy()
-    still[rows] = False
-    return replace(field, sh=sh), still.reshape(left.shape)
-
-
-def _find_visible(
-    field: GaussianField, cells: Bool[Array, "rows columns"], camera: Camera, good: Bool[Array, "s s"]
-) -> tuple[Int[Array, "n"], Float[Array, "n 2"]]:
-    """The discs of cells that a good pixel shows, and their pixels."""
-    rows = np.flatnonzero(cells)
+    rows = np.flatnonzero(left)
     pixels, depth = camera.project(field.means[rows].astype(float))
     inside = (depth > 0) & (pixels > INSET).all(1) & (pixels < len(good) - INSET).all(1)
     rows, pixels = rows[inside], pixels[inside]
     visible = good[tuple(pixels.astype(int).T[::-1])]
-    return rows[visible], pixels[visible]
-
-
-def _sample_picture(picture: Float32[Array, "s s 3"], pixels: Float[Array, "n 2"]) -> Float[Array, "n 3"]:
-    """Colours of a picture, bilinear."""
-    at = pixels.T[::-1] - 0.5
-    return np.stack([map_coordinates(picture[..., c], at, order=1, mode="nearest") for c in range(3)], 1).astype(float)
+    rows, at = rows[visible], pixels[visible].T[::-1] - 0.5
+    colours = [map_coordinates(picture[..., c], at, order=1, mode="nearest") for c in range(3)]  # bilinear
+    sh, still = field.sh.copy(), left.ravel().copy()
+    sh[rows], sh[rows, :1] = 0, rgb_to_sh(np.stack(colours, 1).astype(float))
+    still[rows] = False
+    return replace(field, sh=sh), still.reshape(left.shape)
 
 
 def _colour_underlay(field: GaussianField, grid: Ground, marked: Bool[Array, "n"]) -> GaussianField:
@@ -182,8 +142,6 @@ def find_targets(grid: Ground, cells: Bool[Array, "rows columns"], flying_height
     Blocks with few marked cells come first: they have most known ground around them.
     """
     centres = grid.centres[cells.ravel()]
-    if not len(centres):
-        return []
     at = np.floor((centres[:, :2] - [grid.west, grid.south]) / (BLOCK * flying_height)).astype(int)
     _, block, count = np.unique(at, axis=0, return_inverse=True, return_counts=True)
     return [centres[block.ravel() == i].mean(0) for i in np.argsort(count, kind="stable")]
@@ -251,7 +209,7 @@ def inpaint_view(
     with one_thread():
         known = np.logical_not(touched)[None]
         latents = model.sample(condition, config.samples, 0.0, config.steps, config.seed, known=known, common=False)
-        rgba = model.decode(latents).rgba[0].mean(0, dtype=np.float32)
+        rgba = model.decode(latents)[0].mean(0, dtype=np.float32)
     if not np.isfinite(rgba).all():
         raise ValueError("the prior's picture of a view is not finite")
     alpha, render = rgba[..., 3], condition.colour[0]

@@ -39,30 +39,16 @@ class Condition:
                 raise ValueError(f"{f.name} of view {int(np.argmin(good))} is not finite")
 
 
-@dataclass(frozen=True)
-class DecodedViews:
-    """Pictures decoded from latents. rgba: colours over black, and opacity. inverse_depth: as in Condition; None if the
-    prior has no depth."""
-
-    rgba: Float32[Array, "*n s s 4"]
-    inverse_depth: Float32[Array, "*n s s"] | None
-
-
-@runtime_checkable
-class CopyablePrior(Protocol):
-    """A `Prior` small enough that every thread can have one of its own."""
-
-    def copy(self) -> "Prior":
-        """A copy that shares no state with this one."""
-        ...
-
-
 @runtime_checkable
 class Prior(Protocol):
-    """A generative model of views. name: as in the config. size: pixels per side of its pictures."""
+    """A generative model of views. name: as in the config. size: pixels per side of its pictures.
+
+    small: so small that every thread can have a copy of its own.
+    """
 
     name: str
     size: int
+    small: bool
 
     def sample(
         self, condition: Condition, m: int, p_drop: float, steps: int, seed: int, common: bool = True
@@ -78,6 +64,6 @@ class Prior(Protocol):
         """
         ...
 
-    def decode(self, latents: Float32[Array, "*n c hz wz"]) -> DecodedViews:
-        """The pictures of latents."""
+    def decode(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n s s 4"]:
+        """The pictures of latents: colours over black, and opacity."""
         ...

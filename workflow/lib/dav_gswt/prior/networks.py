@@ -8,7 +8,6 @@ valid. The nearest photo and the relative pose enter through cross-attention.
 from typing import Any
 
 import torch
-from diffusers.models.autoencoders.vae import DiagonalGaussianDistribution
 from diffusers.models.unets.unet_2d_condition import UNet2DConditionModel
 from diffusers.schedulers.scheduling_ddim import DDIMScheduler
 from jaxtyping import Float
@@ -19,7 +18,6 @@ LATENT = (8, 16, 16)
 CELL = SIZE // LATENT[1]  # pixels per side of a cell of a latent
 PLANES = 5  # of a picture: red, green, blue, opacity, inverse depth
 HIDDEN, BLOCKS = 96, 3  # channels and residual blocks of the encoder, and of the decoder
-INITIAL_LOG_VARIANCE = -5.0  # of latents before training
 PATCH = 2  # cells per side of the photo's latent that make one token
 WIDTH = 64  # of a token
 TIMES = 1000  # steps of the diffusion in training
@@ -49,13 +47,10 @@ class Network(nn.Module):
         self.condition_encoder = ConditionEncoder()
         self.register_buffer("scale", torch.ones(()))  # latents times it have unit variance
 
-    def posterior(self, planes: Float[Tensor, "n 5 s s"]) -> DiagonalGaussianDistribution:
-        """The encoder's normal distribution of unscaled latents of pictures."""
-        return DiagonalGaussianDistribution(self.autoencoder.encode(2 * planes - 1))
-
     def encode(self, planes: Float[Tensor, "n 5 s s"]) -> Float[Tensor, "n 8 h w"]:
         """Latents of pictures: the mode of the posterior, scaled."""
-        return self.posterior(planes).mode() * self.scale
+        means, _ = self.autoencoder.encode(2 * planes - 1).chunk(2, 1)
+        return means * self.scale
 
     def decode(self, latents: Float[Tensor, "n 8 h w"]) -> Float[Tensor, "n 5 s s"]:
         """Pictures of latents, in [0, 1]."""
@@ -94,11 +89,6 @@ class Autoencoder(nn.Module):
             nn.Conv2d(HIDDEN, folded, 3, padding=1),
             nn.PixelShuffle(CELL),
         )
-        last = self.encoder[-1]
-        assert isinstance(last, nn.Conv2d) and last.bias is not None
-        with torch.no_grad():  # small variances at first
-            last.weight[LATENT[0] :] = 0
-            last.bias[LATENT[0] :] = INITIAL_LOG_VARIANCE
 
     def encode(self, pictures: Float[Tensor, "n 5 s s"]) -> Float[Tensor, "n 16 h w"]:
         """Means and log-variances of latents, of pictures in [-1, 1]."""

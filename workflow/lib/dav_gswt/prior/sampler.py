@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 from numpy import ndarray as Array
 from torch import Tensor
 
@@ -61,24 +61,11 @@ def sample_latents(
             rows = slice(first, min(first + each, views))
             count = rows.stop - rows.start
             schedule.set_timesteps(s.steps)
-            start = starts.expand(distinct, -1, -1, -1).repeat(count, 1, 1, 1)
-            latents = denoise_steps(denoise, schedule, start, schedule.timesteps, rows)
+            latents = starts.expand(distinct, -1, -1, -1).repeat(count, 1, 1, 1)
+            for time in schedule.timesteps:
+                latents = schedule.step(denoise(latents, time, rows), time, latents, eta=0.0).prev_sample
             out[rows] = latents.view(count, distinct, *shape).float().numpy()
-    require_finite(out)
-    return np.repeat(out, s.m // distinct, axis=1)
-
-
-def denoise_steps(
-    denoise: Denoiser, schedule: Schedule, latents: Float[Tensor, "n c h w"], times: Tensor, rows: slice
-) -> Float[Tensor, "n c h w"]:
-    """Denoise latents at some times of a schedule, one after the other."""
-    for time in times:
-        latents = schedule.step(denoise(latents, time, rows), time, latents, eta=0.0).prev_sample
-    return latents
-
-
-def require_finite(latents: Float32[Array, "b *rest"]) -> None:
-    """Raises: ValueError: a latent is not finite, naming the view."""
-    bad = ~np.isfinite(latents).reshape(len(latents), -1).all(1)
+    bad = ~np.isfinite(out).reshape(views, -1).all(1)
     if bad.any():
         raise ValueError(f"the prior's latents of view {int(np.argmax(bad))} are not finite")
+    return np.repeat(out, s.m // distinct, axis=1)

@@ -1,6 +1,5 @@
 """The terrain prior, trained by this project: a small latent diffusion model of terrain seen from any side."""
 
-import copy
 from pathlib import Path
 
 import numpy as np
@@ -10,64 +9,62 @@ from numpy import ndarray as Array
 from torch import Tensor
 
 from dav_gswt.prior import dropout, sampler, weights
-from dav_gswt.prior.interface import Condition, DecodedViews
+from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import CELL, LATENT, SIZE, Network, make_schedule
-from dav_gswt.prior.sampler import Denoiser, Sampling
+from dav_gswt.prior.sampler import Sampling
 
 DEPTH_SCALE = 0.5  # of inverse depth: the plane is 1 at half a flying height, where it is clipped
 BATCH = 256  # pictures that are encoded or decoded at a time
 
 
 class TerrainPrior:
-    """The `Prior` of the model in a weights file. facts: metadata of the file about its training."""
+    """The `Prior` of the model in a weights file."""
 
-    name, size = "terrain", SIZE
+    name, size, small = "terrain", SIZE, True
 
-    def __init__(self, network: Network, facts: dict[str, str] | None = None):
+    def __init__(self, network: Network):
         # a fifth faster on CPUs, equal but for rounding
         network.denoiser.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]: torch lacks it
-        self.network, self.facts = network.eval().requires_grad_(False), facts or {}
+        self.network = network.eval().requires_grad_(False)
         self.layers, self.schedule = dropout.replace_dropout(network.denoiser), make_schedule()
-        self._encoded: tuple[Condition, Float32[Tensor, "b c hz wz"]] | None = None
 
     @classmethod
     def open(cls, path: Path | str) -> "TerrainPrior":
         """Raises: InputError: see weights.load_weights."""
         network = Network()
-        return cls(network, weights.load_weights(network, path))
-
-    def copy(self) -> "TerrainPrior":
-        """See `CopyablePrior`."""
-        return copy.deepcopy(self)
+        weights.load_weights(network, path)
+        return cls(network)
 
     def encode(self, planes: Float32[Tensor, "n 5 s s"]) -> Float32[Tensor, "n c hz wz"]:
         """Latents of pictures; see `pack_render`."""
         with torch.inference_mode():
             return torch.cat([self.network.encode(part) for part in planes.split(BATCH)])
 
-    def decode(self, latents: Float32[Array, "*n c hz wz"]) -> DecodedViews:
+    def decode(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n s s 4"]:
         """See `Prior`."""
         flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT)))
         with torch.inference_mode():
             planes = torch.cat([self.network.decode(part) for part in flat.split(BATCH)])
         images = planes.numpy().transpose(0, 2, 3, 1).reshape(*latents.shape[:-3], SIZE, SIZE, -1)
-        return DecodedViews(np.ascontiguousarray(images[..., :4]), images[..., 4] / np.float32(DEPTH_SCALE))
+        return np.ascontiguousarray(images[..., :4])
 
-    def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
-        """See `Prior`. The latents of the last condition are kept, because scoring needs them twice."""
-        if self._encoded is None or self._encoded[0] is not condition:
-            self._encoded = condition, self.encode(pack_render(condition))
-        return self._encoded[1].numpy()
-
-    def make_denoiser(self, condition: Condition, known: Bool[Array, "b h w"] | None = None) -> Denoiser:
-        """The denoiser with the condition of the views bound.
+    def sample(
+        self,
+        condition: Condition,
+        m: int,
+        p_drop: float,
+        steps: int,
+        seed: int,
+        common: bool = True,
+        known: Bool[Array, "b h w"] | None = None,
+    ) -> Float32[Array, "b m c hz wz"]:
+        """See `Prior`.
 
         Args:    known: cells of the latent (16 x 16) where the render is valid; None: all.
         Raises:  ValueError: the condition is not finite, see `Condition.check`.
         """
         condition.check()
-        render = torch.from_numpy(self.encode_render(condition))
-        photo = self.encode(pack_photo(condition.photo))
+        render, photo = self.encode(pack_render(condition)), self.encode(pack_photo(condition.photo))
         opacity = average_opacity(torch.from_numpy(condition.alpha))
         valid = torch.ones_like(opacity) if known is None else torch.from_numpy(known).float()[:, None]
         with torch.inference_mode():
@@ -80,21 +77,7 @@ class TerrainPrior:
                 latents, time, *(part[rows].repeat_interleave(each, 0) for part in inputs)
             )
 
-        return denoise
-
-    def sample(
-        self,
-        condition: Condition,
-        m: int,
-        p_drop: float,
-        steps: int,
-        seed: int,
-        common: bool = True,
-        known: Bool[Array, "b h w"] | None = None,
-    ) -> Float32[Array, "b m c hz wz"]:
-        """See `Prior`. known: see `make_denoiser`."""
         sampling = Sampling(m, p_drop, steps, seed, common=common)
-        denoise = self.make_denoiser(condition, known)
         return sampler.sample_latents(denoise, self.layers, self.schedule, len(condition), LATENT, sampling)
 
 

@@ -5,28 +5,15 @@ from pathlib import Path
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import nn
 
 from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.files import UNREADABLE, atomic_file
+from dav_gswt.files import UNREADABLE
 
 TERRAIN_WEIGHTS = Path(__file__).with_name("terrain.safetensors")  # they come with the library
 MOST_BYTES = 256 * 2**20  # of the terrain prior
 FLOAT_TYPES = {"F64", "F32", "F16", "BF16"}  # as safetensors names them
-STORED_PREFIXES = {"autoencoder.": "coder.", "condition_encoder.": "told."}  # names in files, ours -> the file's
-
-
-def save_weights(
-    network: nn.Module, path: Path | str, facts: dict[str, str], dtype: torch.dtype = torch.float16
-) -> None:
-    """Write the terrain prior's weights, by default in half precision. facts: metadata for the header."""
-    values = {
-        _replace_prefix(name, STORED_PREFIXES): value.detach().to("cpu", dtype).contiguous()
-        for name, value in network.state_dict().items()
-    }
-    with atomic_file(path) as part:
-        save_file(values, str(part), metadata=facts)
+STORED_PARTS = {"coder": "autoencoder", "told": "condition_encoder"}  # of a network, in names of the file -> ours
 
 
 def load_weights(network: nn.Module, path: Path | str) -> dict[str, str]:
@@ -77,9 +64,6 @@ def fill_weights(network: nn.Module, path: Path, rename: Callable[[str], str], r
     return facts
 
 
-def _replace_prefix(name: str, prefixes: dict[str, str]) -> str:
-    return next((new + name.removeprefix(old) for old, new in prefixes.items() if name.startswith(old)), name)
-
-
 def _own_name(name: str) -> str:
-    return _replace_prefix(name, {stored: own for own, stored in STORED_PREFIXES.items()})
+    part, dot, rest = name.partition(".")
+    return STORED_PARTS.get(part, part) + dot + rest

@@ -36,7 +36,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
 from dav_gswt.prior import dropout, sampler, weights
 from dav_gswt.prior.dropout import HeldDropout
-from dav_gswt.prior.interface import Condition, DecodedViews
+from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.sampler import Sampling
 
 Network = Any  # of diffusers or transformers, whose annotations are wrong: a config is no dict, an output no tuple
@@ -85,7 +85,7 @@ class Zero123:
     guidance: of classifier-free guidance; 1 is none and saves a pass. device: of PyTorch.
     """
 
-    name, size = "zero123", SIZE
+    name, size, small = "zero123", SIZE, False
 
     def __init__(self, networks: Zero123Networks, guidance: float = GUIDANCE, device: str = "cpu"):
         self.networks, self.guidance, self.device = networks, guidance, device
@@ -113,18 +113,18 @@ class Zero123:
         layers, schedule = self.networks.layers, self.networks.schedule
         return sampler.sample_latents(denoise, layers, schedule, len(condition), LATENT, sampling)
 
-    def decode(self, latents: Float32[Array, "*n c hz wz"]) -> DecodedViews:
-        """See `Prior`. There is no depth; opacity follows from the white background."""
+    def decode(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n s s 4"]:
+        """See `Prior`. Opacity follows from the white background."""
         vae = self.networks.vae
         flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT))).to(self.device)
         with torch.inference_mode():
             parts = [vae.decode(part / vae.config.scaling_factor).sample.cpu() for part in flat.split(VAE_BATCH)]
         pictures = ((torch.cat(parts) + 1) / 2).clamp(0, 1).numpy().transpose(0, 2, 3, 1)
-        return DecodedViews(remove_white(pictures).reshape(*latents.shape[:-3], SIZE, SIZE, 4), None)
+        return remove_white(pictures).reshape(*latents.shape[:-3], SIZE, SIZE, 4)
 
     def _encode_condition(self, condition: Condition) -> tuple[Tensor, Tensor]:
         """The latents of the photos, and one token each."""
-        photo = _to_tensor(condition.photo).to(self.device)
+        photo = torch.from_numpy(np.ascontiguousarray(condition.photo.transpose(0, 3, 1, 2))).to(self.device)
         pose = (torch.from_numpy(condition.relative) * torch.tensor(POSE_FACTORS)).to(self.device)
         vae, clip = self.networks.vae, self.networks.image_encoder
         with torch.inference_mode():
@@ -145,10 +145,6 @@ class Zero123:
         both = unet(torch.cat(twice, 1), time, torch.cat([torch.zeros_like(tokens), tokens])).sample
         without, conditional = both.chunk(2)
         return without + self.guidance * (conditional - without)
-
-
-def _to_tensor(pictures: Float32[Array, "b s s 3"]) -> Float[Tensor, "b 3 s s"]:
-    return torch.from_numpy(np.ascontiguousarray(pictures.transpose(0, 3, 1, 2)))
 
 
 def preprocess_for_clip(photo: Float[Tensor, "b 3 h w"], side: int) -> Float[Tensor, "b 3 side side"]:
@@ -181,7 +177,13 @@ def load_networks(folder: Path | str) -> Zero123Networks:
         raise InputError(f"{folder}: {size / 2**30:.1f} GiB of weights are not those of Zero-1-to-3; {HELP}")
     unet = _build_network(folder / "unet", UNet2DConditionModel.from_config)
     vae = _build_network(folder / "vae", AutoencoderKL.from_config)
-    clip = _build_network(folder / "image_encoder", _clip_factory())
+    try:  # here: only this prior needs it
+        from transformers import CLIPVisionConfig, CLIPVisionModelWithProjection
+    except ImportError as error:
+        raise InputError(f"the prior zero123 needs transformers: pip install '{EXTRA}' ({error})") from error
+    clip = _build_network(
+        folder / "image_encoder", lambda config: CLIPVisionModelWithProjection(CLIPVisionConfig.from_dict(config))
+    )
     with torch.device("meta"):
         projection = nn.Linear(clip.config.projection_dim + POSE, unet.config.cross_attention_dim)
     prefix = PROJECTIONS[projection_folder]
@@ -201,10 +203,8 @@ def _find_projection(folder: Path) -> str:
     for name in PROJECTIONS:
         if (folder / name).is_dir():
             return name
-    index = folder / "model_index.json"
-    found = _read_config(index).get("_class_name", "something else") if index.is_file() else "no model of diffusers"
     either = " or ".join(f"{name}/" for name in PROJECTIONS)
-    raise InputError(f"{folder}: holds {found}, not Zero-1-to-3 (it has no {either}); {HELP}")
+    raise InputError(f"{folder}: is not Zero-1-to-3 (it has no {either}); {HELP}")
 
 
 def _find_weights(folder: Path) -> Path:
@@ -216,27 +216,13 @@ def _find_weights(folder: Path) -> Path:
     raise InputError(f"{folder}: there is no {names[0]} or {names[1]} in it; {HELP}")
 
 
-def _read_config(path: Path) -> dict[str, Any]:
-    values = read_json(path)
-    if not isinstance(values, dict):
-        raise InputError(f"{path}: describes nothing; copy it again")
-    return values
-
-
-def _clip_factory() -> Callable[[dict[str, Any]], Network]:
-    """The function that builds CLIP's image encoder. transformers is imported here: only this prior needs it."""
-    try:
-        from transformers import CLIPVisionConfig, CLIPVisionModelWithProjection
-    except ImportError as error:
-        raise InputError(f"the prior zero123 needs transformers: pip install '{EXTRA}' ({error})") from error
-    return lambda config: CLIPVisionModelWithProjection(CLIPVisionConfig.from_dict(config))
-
-
 def _build_network(folder: Path, make: Callable[[dict[str, Any]], Network]) -> Network:
     """Build the network of a config without allocating its weights."""
     path = folder / "config.json"
-    config = _read_config(path)
+    config = read_json(path)
     try:
+        if not isinstance(config, dict):  # diffusers would take a text for the name of a model to fetch
+            raise TypeError("it is no object")
         with torch.device("meta"):
             return make(config)
     except (TypeError, ValueError, KeyError, AttributeError, RuntimeError, ArithmeticError) as error:

@@ -8,8 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
-from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts
@@ -114,17 +112,6 @@ def read_captured_cameras(model_folder: Path | str, split: ViewSplit, captures: 
     at = dict(zip(known.names, known.cameras, strict=True))
     start = [at[name] for name in split.start]
     return start + [photo.camera for folder in captures for photo in read_capture_record(folder)]
-
-
-def camera_positions(taken: list[Camera], frame: SceneFrame) -> Float[Array, "m 3"]:
-    """Positions of cameras relative to the exemplar's centre."""
-    return np.array([camera.centre - frame.exemplar.centre for camera in taken]).reshape(-1, 3)
-
-
-def select_by_name(candidates: Candidates, chosen: list[Pose]) -> Candidates:
-    """Return the candidates of chosen poses, by their names."""
-    by_name = {pose.name: (pose, camera) for pose, camera in candidates}
-    return [by_name[pose.name] for pose in chosen]
 
 
 def _used_names(folder: Path | str) -> list[str]:

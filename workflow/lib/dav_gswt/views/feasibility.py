@@ -40,11 +40,8 @@ class _GroundMesh:
     points, normals: the test points; each is a vertex, so none lies below a triangle.
     """
 
-    grid: Ground
     middle: Float[Array, "3"]
     side: float
-    x: Float[Array, "columns"]
-    y: Float[Array, "rows"]
     mesh: trimesh.Trimesh
     points: Float[Array, "m 3"]
     normals: Float[Array, "m 3"]
@@ -61,8 +58,7 @@ def filter_feasible(candidates: Candidates, field: GaussianField, grid: Ground, 
     reasons = find_infeasible(candidates, field, grid, CLEARANCE * flying_height)
     if not reasons:
         return candidates
-    kinds = Counter(reason.split(":")[0] for reason in reasons.values())
-    summary = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+    summary = ", ".join(f"{count} {reason}" for reason, count in Counter(reasons.values()).most_common())
     if len(reasons) == len(candidates):
         raise InputError(
             f"no photo can be taken from any of the {len(candidates)} candidate poses ({summary}): set `poses` of the "
@@ -73,7 +69,7 @@ def filter_feasible(candidates: Candidates, field: GaussianField, grid: Ground, 
 
 
 def find_infeasible(candidates: Candidates, field: GaussianField, grid: Ground, clearance: float) -> dict[str, str]:
-    """Find infeasible poses. Returns the reason by pose name; the text before its colon is the kind of reason.
+    """Find infeasible poses. Returns the reason by pose name.
 
     clearance: least height above the ground, in world units. A pose is hidden if fewer than SHARE of the test points in
     its picture are visible, or if it shows none, and inside an object if it is within one standard deviation of a solid
@@ -84,15 +80,20 @@ def find_infeasible(candidates: Candidates, field: GaussianField, grid: Ground, 
     site = _build_mesh(grid)
     cameras = [camera for _, camera in candidates]
     centres = np.stack([camera.centre for camera in cameras])
-    reasons = _find_hidden(site, cameras, centres)
+    in_picture, visible = _count_visible(site, cameras, centres)
+    ahead = _cast_rays(site, site.local(centres), np.stack([camera.forward for camera in cameras]))
     above = centres[:, 2] - grid.height_at(centres)
-    reasons |= {
-        i: f"too near the ground: {above[i]:.3g} above it, {clearance:.3g} is the least"
-        for i in _indices(above < clearance)
-    }
-    reasons |= {i: f"buried: {-above[i]:.3g} below the ground" for i in _indices(above <= 0)}
-    reasons |= dict.fromkeys(_indices(find_inside_objects(centres, field)), "inside an object")
-    return {candidates[i][0].name: reasons[i] for i in sorted(reasons)}
+    reasons = [""] * len(candidates)
+    for reason, holds in (  # the last that holds is given
+        ("past the ground", ~np.isfinite(ahead)),
+        ("hidden", visible < SHARE * in_picture),
+        ("off the exemplar", in_picture == 0),
+        ("too near the ground", above < clearance),
+        ("buried", above <= 0),
+        ("inside an object", find_inside_objects(centres, field)),
+    ):
+        reasons = [reason if bad else before for bad, before in zip(holds, reasons, strict=True)]
+    return {pose.name: reason for (pose, _), reason in zip(candidates, reasons, strict=True) if reason}
 
 
 def _build_mesh(grid: Ground) -> _GroundMesh:
@@ -104,37 +105,17 @@ def _build_mesh(grid: Ground) -> _GroundMesh:
     y = (rows + 0.5 - n - cells / 2) / cells
     z = (grid.heights[np.ix_(rows, columns)] - middle[2]) / side
     vertices = np.stack([*np.meshgrid(x, y), z], -1).reshape(-1, 3)
-    mesh = trimesh.Trimesh(vertices, _make_faces(len(rows), len(columns)), process=False)
+    a = (np.arange(len(y) - 1)[:, None] * len(x) + np.arange(len(x) - 1)).ravel()
+    b, c, d = a + 1, a + len(x), a + len(x) + 1
+    faces = np.stack([a, b, d, a, d, c], 1).reshape(-1, 3)  # two a cell, upwards
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
     at = (np.arange(LATTICE) + 0.5) / LATTICE - 0.5
     i, j = (np.abs(axis[:, None] - at).argmin(0) for axis in (y, x))
     places = (i[:, None] * len(x) + j).ravel()
     east, north = (slope[np.ix_(rows[i], columns[j])].ravel() for slope in grid.slopes())
     normals = np.stack([-east, -north, np.ones(len(east))], 1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return _GroundMesh(grid, middle, side, x, y, mesh, vertices[places], normals)
-
-
-def _make_faces(rows: int, columns: int) -> Int[Array, "n 3"]:
-    """Two triangles a cell, upwards; the cells row by row."""
-    a = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    b, c, d = a + 1, a + columns, a + columns + 1
-    return np.stack([a, b, d, a, d, c], 1).reshape(-1, 3)
-
-
-def _indices(mask: Bool[Array, "n"]) -> list[int]:
-    return np.flatnonzero(mask).tolist()
-
-
-def _find_hidden(site: _GroundMesh, cameras: list[Camera], centres: Float[Array, "n 3"]) -> dict[int, str]:
-    """Find cameras that show too little of the exemplar, or no ground in the middle of the picture."""
-    in_picture, visible = _count_visible(site, cameras, centres)
-    ground = np.isfinite(_cast_rays(site, site.local(centres), np.stack([camera.forward for camera in cameras])))
-    reasons = {i: "past the ground: the middle of the picture shows none" for i in _indices(~ground)}
-    reasons |= {
-        i: f"hidden: {visible[i]} of {in_picture[i]} points of the exemplar are visible"
-        for i in _indices(visible < SHARE * in_picture)
-    }
-    return reasons | {i: "off the exemplar: none of it is in the picture" for i in _indices(in_picture == 0)}
+    return _GroundMesh(middle, side, mesh, vertices[places], normals)
 
 
 def _count_visible(
@@ -142,7 +123,8 @@ def _count_visible(
 ) -> tuple[Int[Array, "n"], Int[Array, "n"]]:
     """Count the test points in each camera's picture, and how many of these are visible."""
     world = site.middle + site.side * site.points
-    shown = np.stack([_in_picture(camera, world) for camera in cameras])
+    placed = [(camera.project(world), (camera.width, camera.height)) for camera in cameras]
+    shown = np.stack([(depth > 0) & (at > 0).all(1) & (at < size).all(1) for (at, depth), size in placed])
     which, point = np.nonzero(shown)
     start = site.points[point] + OFF * site.normals[point]
     way = site.local(centres)[which] - start
@@ -151,22 +133,12 @@ def _count_visible(
     return shown.sum(1), np.bincount(which, weights=free, minlength=len(cameras)).round().astype(int)
 
 
-def _in_picture(camera: Camera, points: Float[Array, "m 3"]) -> Bool[Array, "m"]:
-    at, depth = camera.project(points)
-    return (depth > 0) & (at > 0).all(1) & (at[:, 0] < camera.width) & (at[:, 1] < camera.height)
-
-
 def _cast_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
     """Distance to the ground along rays of unit direction; infinite for misses."""
     found = np.full(len(origins), np.inf)
-    face = site.mesh.ray.intersects_first(origins, ways)
-    hit = np.flatnonzero(face >= 0)
-    a, b, c = np.moveaxis(site.mesh.vertices[site.mesh.faces[face[hit]]], 1, 0)
-    normal = np.cross(b - a, c - a)
-    along = np.einsum("ni,ni->n", normal, ways[hit])
-    rise = np.einsum("ni,ni->n", normal, a - origins[hit])
-    found[hit] = rise / np.where(along == 0, np.nan, along)  # a ray within its triangle's plane
-    return np.nan_to_num(found, nan=0.0, posinf=np.inf)
+    places, hit, _ = site.mesh.ray.intersects_location(origins, ways, multiple_hits=False)
+    found[hit] = np.linalg.norm(places - origins[hit], axis=1)
+    return found
 
 
 def find_inside_objects(centres: Float[Array, "n 3"], field: GaussianField) -> Bool[Array, "n"]:
@@ -182,7 +154,6 @@ def find_inside_objects(centres: Float[Array, "n 3"], field: GaussianField) -> B
         apart = means - centre
         near = np.flatnonzero((apart**2).sum(1) <= scales.max(1) ** 2)
         if len(near):
-            w, x, y, z = field.quats[solid][near].T
-            own = Rotation.from_quat(np.stack([x, y, z, w], 1)).inv().apply(apart[near])
+            own = Rotation.from_quat(field.quats[solid][near], scalar_first=True).inv().apply(apart[near])
             found[i] = (((own / scales[near]) ** 2).sum(1) <= 1).any()
     return found

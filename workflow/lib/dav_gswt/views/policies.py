@@ -15,7 +15,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.poses import select_farthest_poses
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.uncertainty import combine_terms
+from dav_gswt.views.uncertainty import combine_terms, divide_by_scale
 
 if TYPE_CHECKING:
     from dav_gswt.views.coverage import DirectionalCoverage
@@ -196,8 +196,7 @@ def candidate_values(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n
     if scores.scales.by_term.get("w2_sq", 0.0) > 0:
         lpips = f" + {lam:g} LPIPS" if lam and "lpips" in scores.terms else ""
         return f"uncertainty u = W2{lpips}, in units of the scale frozen at round 1", uncertainty(scores, lam)
-    scale, values = scores.scales.by_term["coverage"], scores.term("coverage")
-    values = values / scale if scale > 0 else np.zeros(len(scores))
+    values = divide_by_scale("coverage", scores.term("coverage"), scores.scales)
     return "gain in coverage of the ground, in units of the scale frozen at round 1", values
 
 

@@ -1,4 +1,4 @@
-"""Maps of candidate poses: all in one .npz file, some as parts of an EXR for display."""
+"""Maps of candidate poses, all in one .npz file."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,10 +10,6 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.files import UNREADABLE, atomic_file
-from dav_gswt.images.image_files import enlarge_map
-from dav_gswt.views.scores import Scores
-
-Part = tuple[dict[str, Array], dict[str, str]]  # of an EXR: channels and header
 
 
 @dataclass(frozen=True)
@@ -26,28 +22,6 @@ class PoseMaps:
     opacity: Float32[Array, "n h w"]
     w2_sq: Float32[Array, "n hz wz"] | None
     cells: Float32[Array, "n cells"]
-
-    def exr_part(self, scores: Scores, name: str) -> Part:
-        """Maps of a candidate on the pixels of its picture; header: pose and terms."""
-        i, row = self.names.index(name), scores.names.index(name)
-        uncertainty = self.opacity[i]
-        known = ~np.isnan(uncertainty)
-        uncertainty = uncertainty[: int(known[:, 0].sum()), : int(known[0].sum())]
-        channels = {"uncertainty": uncertainty}
-        if self.w2_sq is not None:
-            channels["w2_sq"] = _place_square(self.w2_sq[i], uncertainty.shape)
-        header = {k: repr(getattr(scores.poses[row], k)) for k in ("elevation", "azimuth", "radius")}
-        return channels, header | {k: repr(float(v[row])) for k, v in scores.terms.items()}
-
-
-def _place_square(square: Float32[Array, "s s"], shape: tuple[int, int]) -> Float32[Array, "h w"]:
-    """Place a map of the middle square in a whole picture; NaN beside it."""
-    h, w = shape
-    side = min(h, w)
-    top, left = (h - side) // 2, (w - side) // 2
-    out = np.full(shape, np.nan, np.float32)
-    out[top : top + side, left : left + side] = enlarge_map(square, side, side)
-    return out
 
 
 def apply_uncertainty(field: GaussianField, gaussians: Float32[Array, "g"]) -> GaussianField:

@@ -1,7 +1,7 @@
 """Samples of a prior at candidate poses, and the score terms that follow from them."""
 
-import logging
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,12 +12,10 @@ from numpy import ndarray as Array
 from dav_gswt.files import locate_path
 from dav_gswt.images.lpips_weights import Weights, read
 from dav_gswt.logs import progress
-from dav_gswt.prior.interface import Condition, CopyablePrior, Prior
+from dav_gswt.prior.interface import Condition, Prior
 from dav_gswt.threads import default_threads, map_in_single_threads
 from dav_gswt.views import terms
 from dav_gswt.views.uncertainty import w2_sq
-
-_log = logging.getLogger(__name__)
 
 BATCH = 4  # poses sampled at a time: as fast as more at once, and few enough that every thread has some
 
@@ -37,27 +35,13 @@ class PriorConfig:
     weights: Weights | None = None
 
 
-def open_scoring_prior(
-    entry: dict | None, p_drop: float, seed: int, lpips_file: Path | str | None
-) -> PriorConfig | None:
-    """Open an entry of `priors` of the config for scoring; None for None.
+def open_prior(entry: dict, p_drop: float, seed: int, lpips_file: Path | str | None = None) -> PriorConfig:
+    """Open an entry of `priors` of the config. lpips_file: weights of LPIPS; None leaves its terms out.
 
-    lpips_file: weights of LPIPS; None leaves its terms out, with a warning.
     Raises: InputError: weights of the prior or of LPIPS are missing or invalid.
     """
-    if entry is None:
-        return None
-    if lpips_file is None:
-        _log.warning(
-            "LPIPS is switched off: scores have no such term; see the keys `lpips` in docs/reference/config.md"
-        )
     weights = None if lpips_file is None else read(lpips_file)
     return PriorConfig(load_prior(entry), entry["samples"], entry["steps"], p_drop, seed, weights)
-
-
-def open_inpainting_prior(entry: dict, seed: int) -> PriorConfig:
-    """Open an entry of `priors` for inpainting, without dropout."""
-    return PriorConfig(load_prior(entry), entry["samples"], entry["steps"], 0.0, seed)
 
 
 def load_prior(entry: dict) -> Prior:
@@ -89,23 +73,17 @@ def sample_terms(
     def worker(own: PriorConfig) -> Callable[[Int[Array, "b"]], SampledTerms]:
         return lambda r: _sample_batch(own, condition[r], [names[i] for i in r], masks[r])
 
-    made = map_in_single_threads([worker(own) for own in _copy_for_threads(prior, len(parts))], parts)
+    more = min(default_threads(), len(parts)) - 1 if prior.model.small else 0
+    own = [prior, *(replace(prior, model=deepcopy(prior.model)) for _ in range(more))]
+    made = map_in_single_threads([worker(each) for each in own], parts)
     found = [part for _, part in zip(progress(parts, "sample poses"), made, strict=True)]
     return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
-
-
-def _copy_for_threads(prior: PriorConfig, batches: int) -> list[PriorConfig]:
-    """The prior and copies of it, one for each thread that has a batch; alone where a copy would take much memory."""
-    model = prior.model
-    if not isinstance(model, CopyablePrior):
-        return [prior]
-    return [prior, *(replace(prior, model=model.copy()) for _ in range(min(default_threads(), batches) - 1))]
 
 
 def _sample_batch(
     prior: PriorConfig, condition: Condition, names: list[str], masks: Float32[Array, "k s s"]
 ) -> SampledTerms:
     latents = prior.model.sample(condition, prior.samples, prior.p_drop, prior.steps, prior.seed)
-    maps, pictures = w2_sq(latents, names=names)[1], prior.model.decode(latents).rgba[..., :3]
+    maps, pictures = w2_sq(latents, names=names)[1], prior.model.decode(latents)[..., :3]
     drawn = terms.Samples(condition, maps, pictures, masks, prior.weights, prior.p_drop == 0)
     return terms.compute_terms(drawn) | {"maps": maps}

@@ -114,8 +114,9 @@ def read_frozen_scales(path: Path | str) -> FrozenScales:
 
 
 def write_frozen_scales(
-    path: Path | str, frozen: FrozenScales, facts: dict, inputs: dict[str, Path | str | list], parameters: dict
+    path: Path | str, frozen: FrozenScales, scored: Scores, inputs: dict[str, Path | str | list], parameters: dict
 ) -> None:
-    """Write scores.json. facts: summary of the scoring, see `ScoringResult.describe`."""
+    """Write scores.json: also how many candidates were scored, and by which terms."""
+    facts = {"candidates": len(scored), "terms": list(scored.terms)}
     scales, pixels = frozen.scales.by_term, frozen.pixels and asdict(frozen.pixels)
     write_json(path, facts | {"scales": scales, "pixels": pixels, "provenance": record_provenance(inputs, parameters)})

@@ -3,25 +3,24 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float32, Float64
+from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import select_farthest_poses
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images.image_files import enlarge_map
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
-from dav_gswt.raster import Rasterizer, make_rasterizer, to_raster_arrays
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.top_view import render_top_view
 from dav_gswt.views import prior_sampling
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.coverage import GroundCells
-from dav_gswt.views.pose_maps import Part, PoseMaps
+from dav_gswt.views.pose_maps import PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import FrozenScales, Scores
 from dav_gswt.views.terms import Renders, compute_terms
@@ -30,7 +29,6 @@ from dav_gswt.views.uncertainty import Quantiles, Scales, normalise, require_fin
 WIDTH = 96  # pixels along the longer side of a picture for scoring
 PHOTO_WIDTH = 384  # pixels across a captured photo that conditions a prior, before cropping and shrinking
 UNSEEN = 0.99  # uncertainty of a Gaussian from which on no photo so far shows it
-SHOWN = 16  # candidates whose maps are written for display
 SIDE = 64  # pixels of the pictures from which blend weights are computed
 SEEN = 0.05  # total blend weight, in pixels, from which a Gaussian counts as seen
 
@@ -44,17 +42,10 @@ class ScoringResult:
     frozen: FrozenScales
     gaussians: Float32[Array, "gaussians"]
 
-    def describe(self) -> dict:
-        """Summary for scores.json: number of candidates, and available terms."""
-        return {"candidates": len(self.scores), "terms": list(self.scores.terms)}
 
-
-def make_exr_parts(result: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
-    """Maps for display as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
-    above = render_top_view(replace(field, uncertainty=result.gaussians), grid).uncertainty[::-1]
-    parts = {"above": ({"uncertainty": above}, {"camera": "straight above"})}
-    names = [result.scores.names[i] for i in select_farthest_poses(result.scores.poses, SHOWN)]
-    return parts | {name: result.maps.exr_part(result.scores, name) for name in names}
+def render_above(result: ScoringResult, field: GaussianField, grid: Ground) -> Float32[Array, "rows columns"]:
+    """The uncertainty of the field from straight above, rows from north to south as in EXR files."""
+    return render_top_view(replace(field, uncertainty=result.gaussians), grid).uncertainty[::-1]
 
 
 def scoring_camera(camera: Camera) -> Camera:
@@ -86,7 +77,9 @@ def score_poses(
         terms |= {name: values.astype(np.float64) for name, values in sampled.items()}
     for name, values in terms.items():
         require_finite(values, name, names)
-    frozen = frozen or _freeze_scales(terms, w2_sq)
+    if frozen is None:
+        quantiles = None if w2_sq is None else Quantiles.from_values(w2_sq.ravel())
+        frozen = FrozenScales(Scales.from_terms(terms), quantiles)
     maps = PoseMaps(names, _stack_maps(renders.uncertainty), w2_sq, renders.seen.pixels)
     gaussians = _gaussian_uncertainty(field, candidates, w2_sq, frozen)
     return ScoringResult(Scores(poses, terms, frozen.scales), maps, frozen, gaussians)
@@ -106,21 +99,19 @@ def build_conditions(
 
 
 def _render_candidates(field: GaussianField, grid: Ground, candidates: Candidates, taken: list[Camera]) -> Renders:
-    """One render a candidate: its rendered uncertainty, and the pixels that show each cell of the ground."""
+    """One render a candidate: its rendered uncertainty, and the pixels that show each cell of the ground.
+
+    The uncertainty of a pixel is blend-weighted, plus the transmittance.
+    """
     raster, cells = make_rasterizer(), GroundCells(field, grid)
     cameras = [scoring_camera(camera) for _, camera in candidates]
     maps, pixels = [], []
     for camera in progress(cameras, "score poses"):
-        maps.append(render_uncertainty(field, camera, raster))
+        seen = raster.forward(**to_raster_arrays(field, field.uncertainty[:, None]), camera=camera)
+        maps.append(np.clip(seen.colour[..., 0] + 1 - seen.alpha, 0, 1))  # nothing is known where light passes
         pixels.append(cells.count_pixels(raster))
     masks = [ground_mask(grid, camera) for camera in cameras]
     return Renders(maps, masks, cells, cells.gather_views(cameras, pixels), cells.view(taken))
-
-
-def render_uncertainty(field: GaussianField, camera: Camera, raster: Rasterizer) -> Float32[Array, "h w"]:
-    """Uncertainty of each pixel: blend-weighted, plus the transmittance, where nothing is known."""
-    seen = raster.forward(**to_raster_arrays(field, field.uncertainty[:, None]), camera=camera)
-    return np.clip(seen.colour[..., 0] + 1 - seen.alpha, 0, 1)
 
 
 def _stack_maps(maps: list[Float32[Array, "_ _"]]) -> Float32[Array, "n h w"]:
@@ -137,11 +128,6 @@ def ground_mask(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
     shape = camera.height, camera.width
     blank = TrainingView("", camera, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32))
     return mask_outside_ground(blank, *grid.judged).weight
-
-
-def _freeze_scales(terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"] | None) -> FrozenScales:
-    pixels = None if w2_sq is None or not w2_sq.size else Quantiles.from_values(w2_sq.ravel())
-    return FrozenScales(Scales.from_terms(terms), pixels)
 
 
 def _gaussian_uncertainty(

@@ -29,17 +29,17 @@ def require_finite(values: Float[Array, "n"], what: str, names: Sequence[str] | 
 
 
 def w2_sq(
-    means: Float32[Array, "n m c h w"],
-    variances: Float32[Array, "n m c h w"] | None = None,
+    means: Float[Array, "n m c h w"],
     names: Sequence[str] | None = None,
 ) -> tuple[Float64[Array, "n"], Float32[Array, "n h w"]]:
     """Mean squared 2-Wasserstein distance between the pairs of m latent samples: of each pose, and of each pixel.
 
     A latent is a diagonal Gaussian a pixel, so the distance of a pair is |mu_i - mu_j|^2 + |s_i - s_j|^2 with the
-    standard deviations s. Its mean over all pairs is 2 var(ddof=1) of mu and of s, summed over channels: O(m), and no
-    difference of large squares. Samples are taken relative to the first one, so a common shift costs no digits.
+    standard deviations s, which are equal here: samples are points. Its mean over all pairs is 2 var(ddof=1) of mu,
+    summed over channels: O(m), and no difference of large squares. Samples are taken relative to the first one, so a
+    common shift costs no digits.
 
-    Args:   variances: of each latent; None: each is a point (deviations 0). names: of the poses, for errors.
+    Args:   names: of the poses, for errors.
     Returns: the mean over pixels, and the map, both in squared latent units; exactly 0 where all samples agree.
     Raises: ValueError: m < 2 (no pair), or a value that is not finite or whose square is not, naming the poses.
     Source: DAV-GSWT, Eq. (w2_pixel), in a form that float32 holds.
@@ -47,31 +47,20 @@ def w2_sq(
     if (m := means.shape[1]) < 2:
         raise ValueError(f"disagreement needs at least 2 samples of a pose, not {m}: one has no pair")
     with np.errstate(over="ignore", invalid="ignore"):  # rejected below
-        maps = _twice_the_variance(means)
-        if variances is not None:
-            maps = maps + _twice_the_variance(np.sqrt(variances, dtype=np.float64))
+        apart = means - means[:, :1]  # exact for near values, and exactly 0 for equal ones
+        apart -= apart.mean(1, keepdims=True)
+        maps = np.einsum("bmchw,bmchw->bhw", apart, apart) * means.dtype.type(2 / (m - 1))
         scores = maps.mean((1, 2), dtype=np.float64)
     require_finite(scores, "the latents, or their squared distance,", names)
     return scores, maps.astype(np.float32)
-
-
-def _twice_the_variance(samples: Float[Array, "b m c h w"]) -> Float[Array, "b h w"]:
-    """2 var(ddof=1) over m, summed over channels: the mean of |x_i - x_j|^2 over the pairs."""
-    apart = samples - samples[:, :1]  # exact for near values, and exactly 0 for equal ones
-    apart -= apart.mean(1, keepdims=True)
-    return np.einsum("bmchw,bmchw->bhw", apart, apart) * samples.dtype.type(2 / (samples.shape[1] - 1))
 
 
 def image_gradient(pictures: Float32[Array, "n m h w 3"]) -> Float64[Array, "n"]:
     """Mean over pixels of the gradient's 2-norm, of the mean of the m pictures decoded at each pose; per pixel step.
 
     Returns: 0 for a constant picture; a times as much for pictures times a.
-    Raises: ValueError: no picture, or a side under 2 pixels.
     Source: DAV-GSWT, Eq. (uncert_img), its first term.
     """
-    _, m, h, w, _ = pictures.shape
-    if m < 1 or min(h, w) < 2:
-        raise ValueError(f"a gradient needs at least one picture of 2 x 2 pixels, not {m} of {w} x {h}")
     return gradient_map(pictures.mean(1, dtype=np.float64) @ np.array(LUMINANCE)).mean((1, 2))
 
 
@@ -118,10 +107,7 @@ class Quantiles:
 
     @staticmethod
     def from_values(u: Float[Array, "n"], low: float = 0.05, high: float = 0.95) -> "Quantiles":
-        """Quantiles of all candidates' uncertainties. Raises: ValueError: no value, or one that is not finite."""
-        if not len(u):
-            raise ValueError("quantiles need at least one value")
-        require_finite(u, "the uncertainty")
+        """Quantiles of all candidates' uncertainties."""
         return Quantiles(*(float(q) for q in np.quantile(u.astype(np.float64), [low, high])))
 
 
@@ -146,14 +132,11 @@ def combine_terms(
     lam = 0 ranks by W2, a large lam by LPIPS; the units of the latent space do not matter. Without LPIPS its term is
     left out, with a warning if lam > 0. name: `gradient` for u_img, an ablation, with the picture's gradient in place
     of W2; the appendix's aggregate of both is their sum.
-    Raises: ValueError: lam below 0 or not finite, or a term without scale.
     Source: DAV-GSWT, Eq. (uncert_latent), Eq. (uncert_img).
     """
-    if not 0 <= lam < np.inf:
-        raise ValueError(f"lam must be a number of at least 0, not {lam}")
-    total = _divide_by_scale(name, first, scales)
+    total = divide_by_scale(name, first, scales)
     if lpips is not None:
-        return total + lam * _divide_by_scale("lpips", lpips, scales)
+        return total + lam * divide_by_scale("lpips", lpips, scales)
     if lam > 0:
         _log.warning(
             "the scores lack LPIPS, its term is left out: the uncertainty is %s alone; "
@@ -163,9 +146,8 @@ def combine_terms(
     return total
 
 
-def _divide_by_scale(name: str, values: Float[Array, "n"], scales: Scales) -> Float64[Array, "n"]:
-    if name not in scales.by_term:
-        raise ValueError(f"{name} has no frozen scale")
+def divide_by_scale(name: str, values: Float[Array, "n"], scales: Scales) -> Float64[Array, "n"]:
+    """Values of a term over its scale; 0 where that is 0."""
     scale = scales.by_term[name]
     return values.astype(np.float64) / scale if scale > 0 else np.zeros(len(values))
 
