@@ -18,10 +18,10 @@ from dav_gswt.field import GaussianField
 from dav_gswt.lod.levels import Levels
 from dav_gswt.reconstruction import top_view
 from dav_gswt.terrain import endless
-from dav_gswt.terrain.choice import tiles_in
 from dav_gswt.tiles import build, compose, layout, semantics, texture
 from dav_gswt.tiles.layout import Exemplar, Layout
 from dav_gswt_study.seams.rendering import SpatialIndex
+from dav_gswt_study.seams.repetition import tiles_in
 
 WINDOW = 8  # tiles a side of the terrain that crops are taken from, around its origin
 REACH = 16  # radius of the terrain, in tile sides

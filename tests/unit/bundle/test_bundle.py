@@ -122,24 +122,6 @@ def test_the_zip_holds_what_the_public_renderer_reads(bundle, tiles):
     assert (values[:, 9:54] == 0).all() and (values[:, 3:6] == 0).all()
 
 
-def test_the_zip_reads_back_as_the_tiles_and_a_damaged_one_is_refused(bundle, tiles, tmp_path):
-    path = shutil.copy(bundle[0] / "gswt.zip", tmp_path)
-    fields = gswt.read_gswt(path, SIDE)
-    assert [len(level) for level in fields] == [16, 16]
-    for mine, source in zip(fields[1], tiles.fields[1], strict=True):
-        np.testing.assert_allclose(mine.means, source.means, atol=1e-6)
-        np.testing.assert_allclose(mine.log_scales, source.log_scales, atol=1e-6)
-        np.testing.assert_allclose(mine.sh[:, 0], source.sh[:, 0], atol=1e-6)
-        np.testing.assert_allclose(mine.opacity_logits, source.opacity_logits)
-    with zipfile.ZipFile(path, "a") as archive:
-        archive.writestr("notes.txt", b"")
-    with pytest.raises(InputError, match=r"'notes\.txt' is no tile"):
-        gswt.read_gswt(path, SIDE)
-    (tmp_path / "gswt.zip").write_bytes((bundle[0] / "gswt.zip").read_bytes()[:-50])
-    with pytest.raises(InputError, match=r"gswt\.zip: not readable"):
-        gswt.read_gswt(path, SIDE)
-
-
 def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
     fields = [list(level) for level in tiles.fields]
     fields[0][3] = fields[0][3][:0]
@@ -155,8 +137,8 @@ def test_the_archive_lacks_levels_that_its_renderer_could_not_take(tiles, tmp_pa
     sizes = [sum(len(field) for field in level) for level in tiles.fields]
     monkeypatch.setattr(gswt, "MAX_SPLATS", sum(sizes[1:]))
     gswt.write_gswt(tiles.fields, SIDE, tmp_path / "gswt.zip")
-    (level,) = gswt.read_gswt(tmp_path / "gswt.zip", SIDE)
-    assert [len(field) for field in level] == [len(field) for field in tiles.fields[1]]
+    with zipfile.ZipFile(tmp_path / "gswt.zip") as archive:
+        assert archive.namelist() == [f"lod0_tile_{t:02d}.ply" for t in range(16)]
     assert "lacks the finest 1 of" in caplog.text
 
 

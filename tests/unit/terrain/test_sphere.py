@@ -260,7 +260,7 @@ def test_the_backdrop_is_finite_and_dark_far_away(tiles, height):
 def test_a_sphere_has_one_material_no_objects_and_no_rectangles(tiles):
     ball = make_sphere(8.0, SIDE)
     with pytest.raises(InputError, match="plane"):
-        finite.list_cells(replace(tiles, heights=ball), 0, 0, 2, 2)
+        finite.list_cells(replace(tiles, heights=ball), finite.Area(0, 0, 2, 2))
     require_plain_cover(FlatSurface(), {}, [1])
     require_plain_cover(ball, None, [])
     for cover, what in (((None, [1]), "objects"), (([1], None), "several materials")):

@@ -5,9 +5,8 @@ is optional. It knows tiles only, so objects are baked into them.
 """
 
 import logging
-import re
 import zipfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,9 +15,8 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.content import BundleContent
-from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.field import GaussianField, concatenate_fields, read_field, write_field
-from dav_gswt.files import UNREADABLE
+from dav_gswt.errors import InputError
+from dav_gswt.field import GaussianField, concatenate_fields, write_field
 from dav_gswt.logs import progress
 from dav_gswt.materials.model import ObjectLevels, turn_and_scale, turn_rows
 from dav_gswt.tiles.compose import equalise_heights
@@ -28,7 +26,6 @@ _log = logging.getLogger(__name__)
 NAME = "gswt.zip"
 TILE_WIDTH = 4.0
 MAX_SPLATS = 8_388_608
-TILE_NAME = re.compile(r"lod(\d+)_tile_\d+\.ply")
 STAMP = (1980, 1, 1, 0, 0, 0)  # the earliest a zip knows: the same tiles give the same bytes
 TURN, SIZE = np.radians(15.0), 0.15  # largest turn and change of size of a baked object
 TRIES = 60  # places that are tried for each object
@@ -79,32 +76,6 @@ def write_gswt(fields: list[list[GaussianField]], side: float, path: Path) -> No
             entry = zipfile.ZipInfo(ply.name, STAMP)
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, ply.read_bytes(), compresslevel=1)
-
-
-def read_gswt(path: Path | str, side: float) -> list[list[GaussianField]]:
-    """fields[level][tile] of an archive that `write_gswt` wrote, for tiles `side` wide.
-
-    Raises: InputError: not readable, a name that no tile has, or an entry that `read_field` refuses.
-    """
-    levels: dict[int, list[GaussianField]] = {}
-    try:
-        with zipfile.ZipFile(path) as archive, TemporaryDirectory() as folder:
-            for entry in archive.infolist():
-                if not (match := TILE_NAME.fullmatch(entry.filename)):
-                    raise InputError(f"{path}: {entry.filename[:80]!r} is no tile; make the bundle again")
-                ply = Path(archive.extract(entry, folder))
-                levels.setdefault(int(match[1]), []).append(_from_renderer(read_field(ply), side))
-                ply.unlink()
-    except UNREADABLE as error:
-        raise InputError(f"{path}: not readable ({summarize_error(error)}); make the bundle again") from error
-    return list(levels.values())
-
-
-def _from_renderer(field: GaussianField, side: float) -> GaussianField:
-    """A tile TILE_WIDTH wide, scaled to `side`, without its harmonics."""
-    scale = TILE_WIDTH / side
-    means, log_scales = (field.means / scale).astype(np.float32), (field.log_scales - np.log(scale)).astype(np.float32)
-    return replace(field, means=means, log_scales=log_scales, sh=field.sh[:, :1].copy())  # a view would keep them
 
 
 @dataclass(frozen=True)

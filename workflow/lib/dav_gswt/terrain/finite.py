@@ -36,15 +36,14 @@ class Area:
         return self.columns * self.rows
 
 
-def list_cells(
-    terrain: EndlessTerrain, west: int, south: int, columns: int, rows: int
-) -> tuple[Ints, Ints, Ints, Ints]:
-    """Column, row, tile number and materials (bit m for material m) of cells, row by row from the south-western one.
+def list_cells(terrain: EndlessTerrain, area: Area) -> tuple[Ints, Ints, Ints, Ints]:
+    """Column, row, tile number and materials (bit m for material m) of an area's cells, row by row from the south.
 
     Raises: InputError: the terrain is a sphere.
     """
     require_plane(terrain)
-    i, j = (v.ravel() for v in np.meshgrid(west + np.arange(columns), south + np.arange(rows)))
+    columns, rows = area.west + np.arange(area.columns), area.south + np.arange(area.rows)
+    i, j = (v.ravel() for v in np.meshgrid(columns, rows))
     return i, j, *choose_tiles(terrain, i, j)
 
 
@@ -62,7 +61,7 @@ def keep_level(terrain: EndlessTerrain, level: int) -> EndlessTerrain:
 
 def list_grid(terrain: EndlessTerrain, area: Area) -> GridCells:
     """The cells of an area, row by row. Of one level alone, their distances from an eye do not matter."""
-    i, j, tile, materials = list_cells(terrain, area.west, area.south, area.columns, area.rows)
+    i, j, tile, materials = list_cells(terrain, area)
     return GridCells(i, j, tile, materials, np.zeros(len(i), bool), np.zeros(len(i)), np.zeros(len(i)))
 
 
