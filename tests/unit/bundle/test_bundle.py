@@ -200,7 +200,7 @@ def cut(path, end, more=b""):
         pytest.param(lambda f: cut(f / CHUNK, -4, b"else"), "lod0_tile_00.bin: its digest is not", id="altered"),
         pytest.param(twice, "lod0_tile_00.bin: an order does not hold every splat", id="no permutation"),
         pytest.param(lambda f: (f / CHUNK).unlink(), "lod0_tile_00.bin: not readable", id="missing"),
-        pytest.param(lambda f: linked(f / CHUNK), "lod0_tile_00.bin: lies outside of the bundle", id="a link outwards"),
+        pytest.param(lambda f: linked(f / CHUNK), "lod0_tile_00.bin: lies outside of the folder", id="a link outwards"),
         pytest.param(lambda f: rewritten(f, huge), "lod0_tile_00.bin: .* bytes where the manifest says", id="huge"),
         pytest.param(lambda f: rewritten(f, lambda m: m.update(version=1)), "version 3; make", id="another version"),
         pytest.param(lambda f: rewritten(f, lambda m: m.update(format="x")), "format 'davgswt'", id="another format"),

@@ -1,5 +1,7 @@
 """Pieces of finished terrains: a page folder as a terrain in Python, and a finite piece against what is drawn of it."""
 
+import hashlib
+
 import numpy as np
 import pytest
 from fixtures.finite_cells import collect_cells
@@ -19,6 +21,7 @@ SURFACES = {
     "hills": Hills(2.0, 30.0),
     "image": HeightMap(np.random.default_rng(1).uniform(0, 3, (9, 7)).astype(np.float32), 60.0),
 }
+NOT_FINITE = np.full((9, 7), np.nan, np.float32).tobytes()
 HILLS = {"kind": "hills", "height": 0.4, "wavelength": 4}
 RULE = [{"kind": "noise"}, {"kind": "height", "material": "grass", "low": 0.1, "soft": 0.2}]
 
@@ -48,19 +51,19 @@ def test_a_surface_that_was_described_reads_back(tmp_path, surface):
 @pytest.mark.parametrize(
     "changes, said",
     [
-        ({"rows": 10}, "bytes instead of"),
+        ({"rows": 10}, "bytes where the manifest says"),
         ({"rows": 0}, "a size is out of range"),
         ({"rows": "many"}, "make no sense"),
-        ({"file": "../heights.bin"}, "does not lie beside it"),
-        ({"file": "nowhere.bin"}, "missing"),
-        ({"file": "nan.bin", "sha256": None}, "not finite"),
-        ({"sha256": "0" * 64}, "damaged"),
+        ({"file": "../heights.bin"}, "lies outside"),
+        ({"file": "nowhere.bin"}, "not readable"),
+        ({"file": "nan.bin", "sha256": hashlib.sha256(NOT_FINITE).hexdigest()}, "not finite"),
+        ({"sha256": "0" * 64}, "its digest is not"),
     ],
 )
 def test_a_surface_that_is_damaged_is_named(tmp_path, changes, said):
     entry, pixels = SURFACES["image"].describe()
     (tmp_path / "heights.bin").write_bytes(pixels)
-    (tmp_path / "nan.bin").write_bytes(pixels[:-4] + np.float32(np.nan).tobytes())
+    (tmp_path / "nan.bin").write_bytes(NOT_FINITE)
     with pytest.raises(InputError, match=said):
         heights.read_surface(tmp_path, entry | changes, 4.0)
 

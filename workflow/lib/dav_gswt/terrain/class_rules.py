@@ -63,7 +63,8 @@ def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> M:
             manifest = replace(manifest, objects=objects)
     rule = [entry for entry in rule if entry["kind"] != "painted"]
     if manifest.classes is None:
-        warn_of_rule(rule)
+        if any(entry["kind"] != "noise" for entry in rule):
+            _log.warning("classes: the terrain has one material; the rule changes nothing")
         return manifest
     noise = next((term for term in manifest.classes.rule if isinstance(term, NoiseTerm)), None)
     if noise and paint:
@@ -92,12 +93,6 @@ def warn_of_missing(classes: Classes, names: Sequence[str]) -> None:
     for name in np.array(names)[shares == 0].tolist():
         left = ", ".join(f"{name} {share:.0%}" for name, share in zip(names, shares, strict=True) if share)
         _log.warning("classes: the rule leaves %s without any place (the ground is %s); change its terms", name, left)
-
-
-def warn_of_rule(rule: Sequence[dict[str, Any]]) -> None:
-    """Log a warning if a rule is given for a terrain of one material."""
-    if any(entry["kind"] != "noise" for entry in rule):
-        _log.warning("classes: the terrain has one material; the rule changes nothing")
 
 
 def _find_material(name: str, names: Sequence[str]) -> int:

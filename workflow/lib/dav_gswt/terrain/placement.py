@@ -166,5 +166,6 @@ def place_objects(terrain: EndlessTerrain, found: Instances, cell: tuple[int, in
 def active_objects(terrain: EndlessTerrain, found: Instances, distance: Floats) -> Bool[Array, "levels n"]:
     """Which levels have a weight somewhere on objects whose feet are at distances from the eye."""
     extent = np.array(terrain.extents)[found.number] * found.size
-    reach = extent * (1 + terrain.heights.steepest)
+    _, _, steepest = terrain.heights.bounds
+    reach = extent * (1 + steepest)
     return active_range(terrain, distance - reach, distance + reach)

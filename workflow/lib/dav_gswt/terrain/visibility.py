@@ -75,9 +75,10 @@ def _bound_cells(terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector) -> tupl
     side, surface = terrain.side, terrain.heights
     x, y = (i + 0.5) * side, (j + 0.5) * side
     middle, _ = surface.at(x, y)
-    most = surface.steepest * (0.5 * side + terrain.overhang) * 2**0.5
-    low = np.maximum(middle - most, surface.low) + terrain.z[0]
-    high = np.minimum(middle + most, surface.high) + terrain.z[1]
+    lowest, highest, steepest = surface.bounds
+    most = steepest * (0.5 * side + terrain.overhang) * 2**0.5
+    low = np.maximum(middle - most, lowest) + terrain.z[0]
+    high = np.minimum(middle + most, highest) + terrain.z[1]
     half = np.full(len(x), 0.5 * side)
     return np.stack([x, y, 0.5 * (low + high)], 1) - eye, np.stack([half, half, 0.5 * (high - low)], 1)
 
