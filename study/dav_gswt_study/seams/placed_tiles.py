@@ -6,13 +6,13 @@ Both halves of a strip have the same origin, so across a border nothing changes.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray as Array
 
-from dav_gswt.bundle import direction_search
-from dav_gswt.bundle.build import BundleOptions, describe_tiles
+from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.field import GaussianField
 from dav_gswt.lod.levels import Levels
@@ -106,9 +106,8 @@ def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau:
     """The tile set on level ground, placed as its bundle of this tau does. Gaussians are not quantised, since the
     patches of the exemplar that they are compared with are not either.
     """
-    options = BundleOptions(tau=tau, salt=salt)
-    rings, _ = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels)
-    manifest = describe_tiles(BundleContent.of_one_material(tiles), options, rings)
+    with TemporaryDirectory() as folder:
+        manifest = write_bundle(BundleContent.of_one_material(tiles), folder, BundleOptions(tau=tau, salt=salt), {})
     terrain = replace(endless.terrain_from_fields(tiles.fields, manifest, {"kind": "flat"}), reach=REACH)
     plan = tiles.layout
     first = -(WINDOW // 2)

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import pytest
 from fixtures.land_covers import SIDE, two_classes
+from fixtures.terrains import manifest_of
 
-from dav_gswt.bundle.land_cover import ObjectOrders, RangeTerm, ScatterEntry
-from dav_gswt.bundle.manifest import MaterialEntry, TileSetInfo
+from dav_gswt.bundle.land_cover import ObjectEntry, RangeTerm, ScatterEntry
+from dav_gswt.bundle.manifest import MaterialEntry
 from dav_gswt.errors import InputError
 from dav_gswt.terrain import class_rules
 from dav_gswt.terrain.class_rules import apply_rule, read_paint
@@ -20,10 +21,10 @@ FILE = {"format": "davgswt-paint", "version": 1, "materials": ["grass", "sand"],
 @pytest.fixture
 def manifest():
     materials = [MaterialEntry("sand", 0.6, 0, [0.5] * 3), MaterialEntry("grass", 0.4, 16, [0.5] * 3)]
-    shrub = ObjectOrders("shrub", 0.4, [0.0, 1.0], 0.0, 1, 0.1, 0.3, [])
+    shrub = ObjectEntry("shrub", 0.4, [0.0, 1.0], 0.0, 1, 0.1, 0.3, [])
     objects = [shrub, replace(shrub, name="stone", material=0), replace(shrub, name="tuft")]
     cover = {"classes": two_classes(), "objects": objects, "scatter": ScatterEntry(4, 15.0, 0.15, 7)}
-    return TileSetInfo(SIDE, 7, 1.0, [0.5] * 3, [], [], [], materials, **cover)
+    return replace(manifest_of(1.0, [0.5] * 3), materials=materials, **cover)
 
 
 @pytest.fixture

@@ -8,8 +8,7 @@ from fixtures.land_covers import GRASS, SAND, SIDE, TILES, cover_content
 from fixtures.terrains import HILLS, SKY, walking
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.bundle.build import BundleOptions, describe_tiles
-from dav_gswt.bundle.orders import DirectionRings
+from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.lod.merge import compute_covariances
 from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain import endless, placement, stills, visibility
@@ -19,9 +18,9 @@ MAGENTA = [1.0, 0.0, 1.0]
 
 
 @pytest.fixture(scope="module")
-def cover():
+def cover(tmp_path_factory):
     content = cover_content()
-    info = describe_tiles(content, BundleOptions(tau=0.5, salt=7), DirectionRings((20.0,), 8))
+    info = write_bundle(content, tmp_path_factory.mktemp("cover") / "b", BundleOptions(tau=0.5, salt=7), {})
     fields = [content.tile_fields(level) for level in range(content.levels)]
     objects = [each.fields for each in content.objects]
     return replace(endless.terrain_from_fields(fields, info, {"kind": "flat"}, objects), reach=10)

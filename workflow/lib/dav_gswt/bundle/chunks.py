@@ -28,17 +28,14 @@ Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
 @dataclass(frozen=True)
-class ChunkOrders(Entry):
-    """Which directions a tile at one level keeps orders for: indices into the manifest's `directions`."""
+class ChunkEntry(Entry):
+    """A chunk in the manifest: its path relative to the manifest, size and digest of the file, number of splats.
+
+    orders: the directions that it keeps orders for, as indices into the manifest's `directions`.
+    """
 
     level: Natural
     orders: Annotated[list[Natural], Field(min_length=1)]
-
-
-@dataclass(frozen=True)
-class ChunkEntry(ChunkOrders):
-    """A chunk in the manifest: its path relative to the manifest, size and digest of the file, number of splats."""
-
     file: Annotated[str, Field(pattern=r"^chunks/[A-Za-z0-9_]+\.bin$")]
     bytes: Natural
     sha256: Digest
@@ -51,13 +48,16 @@ def chunk_size(count: int, orders: int) -> int:
 
 
 def write_chunk(
-    rows: Array, order: Integer[Array, "d n"], folder: Path | str, file: str, kept: ChunkOrders
+    rows: Array, order: Integer[Array, "d n"], folder: Path | str, file: str, level: int, kept: list[int]
 ) -> ChunkEntry:
-    """Write records and orders to `file` in a bundle's folder; returns the chunk's entry in the manifest."""
+    """Write records and orders to `file` in a bundle's folder; returns the chunk's entry in the manifest.
+
+    kept: the directions of the orders.
+    """
     data = rows.tobytes() + order.astype(index_type(len(rows))).tobytes()
     (Path(folder) / file).write_bytes(data)
     digest = hashlib.sha256(data).hexdigest()
-    return ChunkEntry(kept.level, kept.orders, file, len(data), digest, len(rows))
+    return ChunkEntry(level, kept, file, len(data), digest, len(rows))
 
 
 def read_exactly(folder: Path | str, name: str, size: int, sha256: str) -> bytes:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.content import BundleContent
-from dav_gswt.bundle.land_cover import ClassesEntry, JitterEntry, NoiseTerm, ObjectOrders, RiseEntry, ScatterEntry
+from dav_gswt.bundle.land_cover import ClassesEntry, JitterEntry, NoiseTerm, ObjectEntry, RiseEntry, ScatterEntry
 from dav_gswt.errors import InputError
 from dav_gswt.materials.borders import measure_bend
 from dav_gswt.materials.model import MaterialInfo
@@ -218,7 +218,7 @@ def fit_scatter(content: BundleContent, classes: ClassesEntry | None, salt: int)
     probabilities, reached = _cap(densities * (side / cells) ** 2, material), densities
     for _ in range(SCATTER_PASSES):
         objects = [
-            ObjectOrders(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, float(p), [])
+            ObjectEntry(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, float(p), [])
             for each, p in zip(content.objects, probabilities, strict=True)
         ]
         found = Scatter(entry, objects, side, cover).instances_in(i, j)

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int64
 from numpy import ndarray as Array
 from scipy.spatial import cKDTree
 
-from dav_gswt.bundle.land_cover import ObjectOrders, ScatterEntry
+from dav_gswt.bundle.land_cover import ObjectEntry, ScatterEntry
 from dav_gswt.terrain.choice import Floats, Ints, hash_cell
 from dav_gswt.terrain.classes import Classes
 
@@ -70,7 +70,7 @@ class Scatter:
     """
 
     entry: ScatterEntry
-    objects: Sequence[ObjectOrders]
+    objects: Sequence[ObjectEntry]
     side: float
     classes: Classes | None = None
     _known: dict[tuple[int, int], Instances] = field(default_factory=dict, init=False, repr=False)
