@@ -177,7 +177,7 @@ def render_pieces(
     for piece in pieces:
         ordered = placement.order_gaussians(piece.parts, piece.direction)
         field, slope = placement.displace_and_fade(terrain, *ordered, piece.corner, eye)
-        part, indices = splats.project_indexed(behind.blend_far(field), slope, here, terrain.near)
+        part, indices = splats.project(behind.blend_far(field), slope, here, terrain.near)
         parts.append((part, [recolour(field, eye)[indices] for recolour in recolourings], piece.close))
     parts.sort(key=lambda each: each[2])  # close pieces come last
     ordered = splats.concatenate_splats([splats.EMPTY, *(part for part, _, _ in parts)])

@@ -7,7 +7,6 @@ import pytest
 from fixtures.land_covers import TILES, cover_content
 
 from dav_gswt.bundle import build, manifest, store
-from dav_gswt.bundle.content import BundleContent
 from dav_gswt.errors import InputError
 from dav_gswt.terrain import endless, page, stills
 
@@ -67,15 +66,6 @@ def test_a_page_of_several_materials_has_the_rule_of_the_config(bundle, tmp_path
     (term,) = made.manifest.classes.rule
     assert term.kind == "height" and made.manifest.materials[term.material].name == "grass"
     assert made.object_chunk(0, 0)[0].means.shape == bundle.object_chunk(0, 0)[0].means.shape
-
-
-def test_tiles_of_other_sizes_and_objects_with_fewer_levels_are_refused(content):
-    other = replace(content.tiles[1], side=2 * content.side)
-    with pytest.raises(InputError, match="the same tile side"):
-        BundleContent([content.tiles[0], other], content.materials)
-    flat = replace(content.objects[0], fields=content.objects[0].fields[:1])
-    with pytest.raises(InputError, match="2 levels"):
-        replace(content, objects=[flat])
 
 
 @pytest.mark.parametrize(

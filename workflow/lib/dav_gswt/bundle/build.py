@@ -62,8 +62,8 @@ def write_bundle(
     shutil.rmtree(part, ignore_errors=True)
     (part / "chunks").mkdir(parents=True)
     try:
-        gswt.write_gswt(gswt.bake_objects(content, options.salt), content.side, part / gswt.NAME)
         made = _write_content(content, options, provenance, part)
+        gswt.write_gswt(gswt.bake_objects(content, options.salt), content.side, part / gswt.NAME)
         value = made.to_dict()
         Manifest.from_dict(value)
         write_json(part / manifest.NAME, value)
@@ -79,7 +79,7 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
     tiles = list(zip(*levels, strict=True))
     heights = [_measure_heights(fields) for fields in tiles]
     uncertainties = [u for same in content.tiles for u in np.clip(same.uncertainty, 0, 1).tolist()]
-    rings, _ = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
+    rings = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
     table = level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band)
     objects = list(zip(*(content.object_fields(level) for level in range(content.levels)), strict=True))
     sources = [(f"tile_{number:02d}", *each) for number, each in enumerate(zip(uncertainties, tiles, strict=True))]
@@ -87,7 +87,8 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
         (f"object_{number:02d}", float(np.clip(fields[0].uncertainty.mean(), 0, 1)), fields)
         for number, fields in enumerate(objects)
     ]
-    encoding = Encoding.fit(list(content.iterate_fields()), content.side, content.spacing / FLOOR_PIXELS)
+    everything = [field for fields in (*tiles, *objects) for field in fields]
+    encoding = Encoding.fit(everything, content.side, content.spacing / FLOOR_PIXELS)
     along = rings.directions()
 
     def write(source: tuple[str, float, Sequence[GaussianField]]) -> list[ChunkEntry]:

@@ -32,7 +32,7 @@ Picture = Float32[Array, "h w 3"]
 
 def search_directions(
     fields: list[GaussianField], side: float, wanted: float, most: int = MAX_ORDERS
-) -> tuple[DirectionRings, dict[str, float | None]]:
+) -> DirectionRings:
     """The fewest directions with which every view reaches `wanted` decibels, or as many as `most` allow.
 
     The search starts with a ring of MIN_AZIMUTHS azimuths 20 degrees below the horizon. While the worst
@@ -43,44 +43,33 @@ def search_directions(
     Args:
         fields: the tiles of the finest level; a coarser level is used only where its discs cover a pixel.
         most: orders of a tile that keeps every second azimuth.
-    Returns: the directions, of which such a tile keeps every second azimuth; and `measure_elevations` of what it keeps.
+    Returns: the directions, of which such a tile keeps every second azimuth.
     """
     elevations, kept = (20.0,), MIN_AZIMUTHS
     while True:
-        rings, found = DirectionRings(elevations, 2 * kept), measure_elevations(fields, side, elevations, kept)
-        decibels, worst = min((_as_number(level), view) for view, level in found.items())
+        rings = DirectionRings(elevations, kept)
+        decibels, worst = min((measure_psnr(fields, side, rings, down), view) for view, down in ELEVATIONS.items())
         if decibels >= wanted:
-            return rings, found
+            break
         elevation = ELEVATIONS[worst]
         more = tuple(sorted({*elevations, elevation}))
-        along_azimuths = measure_psnr(fields, side, DirectionRings(elevations, kept), elevation, halfway=False)
-        missing = more != elevations and _as_number(along_azimuths) < decibels + 3.0  # half of the error is 3 dB
+        along_azimuths = measure_psnr(fields, side, rings, elevation, halfway=False)
+        missing = more != elevations and along_azimuths < decibels + 3.0  # half of the error is 3 dB
         elevations_next, kept_next = (more, kept) if missing else (elevations, 2 * kept)
         if len(elevations_next) * kept_next + 1 > most:
             _log.warning("orders: %.1f dB with %d directions, and no room for more", decibels, most)
-            return rings, found
+            break
         elevations, kept = elevations_next, kept_next
-
-
-def _as_number(decibels: float | None) -> float:
-    return np.inf if decibels is None else decibels
-
-
-def measure_elevations(
-    fields: list[GaussianField], side: float, elevations: tuple[float, ...], kept: int
-) -> dict[str, float | None]:
-    """`measure_psnr` at each of ELEVATIONS, for rings of `kept` azimuths at `elevations`."""
-    rings = DirectionRings(elevations, kept)
-    return {view: measure_psnr(fields, side, rings, down) for view, down in ELEVATIONS.items()}
+    return DirectionRings(elevations, 2 * kept)
 
 
 def measure_psnr(
     fields: list[GaussianField], side: float, rings: DirectionRings, elevation: float, halfway: bool = True
-) -> float | None:
+) -> float:
     """PSNR of VIEWS views of different tiles, drawn in the order of the nearest direction, against their own order.
 
     The views lie evenly around at an elevation in degrees below the horizon. halfway: half-way between two azimuths,
-    where an order is worst; otherwise along an azimuth. None: no difference.
+    where an order is worst; otherwise along an azimuth. Infinite: no difference.
     """
     pixel = side / level_distances.FOCAL  # of the reference picture a tile's side away: nearer tiles are sorted exactly
     along, pairs = rings.directions(), []
@@ -92,7 +81,8 @@ def measure_psnr(
         exact = render_in_order(field, side, direction, pixel)
         same = np.array_equal(best, direction)
         pairs.append((exact if same else render_in_order(field, side, direction, pixel, best), exact))
-    return compute_psnr(pairs)
+    decibels = compute_psnr(pairs)
+    return np.inf if decibels is None else decibels
 
 
 def render_in_order(

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, TypeAdapter, WithJsonSchema
+from pydantic import Field, TypeAdapter
 
 from dav_gswt.bundle.chunks import ChunkEntry, chunk_size
 from dav_gswt.bundle.encoding import (
@@ -36,20 +36,9 @@ FORMAT, VERSION = "davgswt", 3
 ONLY_MATERIAL = "ground"  # the name of the material of a set that has one
 MAX_BYTES = 1 << 26  # of a manifest
 FARTHEST, MAX_LOG_SCALE = 1e9, 60.0  # of lengths, whose squares single precision keeps; of logarithms of deviations
-SURFACES = ("flat", "hills", "image", "sphere")  # kinds of the surface under the tiles
 
 
 Direction = Annotated[list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=3, max_length=3)]
-
-
-def _check_surface(heights: dict[str, Any]) -> dict[str, Any]:
-    if heights.get("kind") not in SURFACES:
-        raise ValueError(f"kind must be one of {', '.join(SURFACES)}")
-    return heights
-
-
-_SURFACE_SCHEMA = {"type": "object", "required": ["kind"], "properties": {"kind": {"enum": [*SURFACES]}}}
-Surface = Annotated[dict[str, Any], AfterValidator(_check_surface), WithJsonSchema(_SURFACE_SCHEMA)]
 
 
 @dataclass(frozen=True)
@@ -116,7 +105,7 @@ class Manifest(Entry):
     sky: Sky
     encoding: Encoding
     provenance: dict[str, Any]
-    heights: Surface | None = None
+    heights: dict[str, Any] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON object."""

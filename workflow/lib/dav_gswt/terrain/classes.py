@@ -19,14 +19,12 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.land_cover import MAX_COORDINATE, ClassesEntry, NoiseTerm, RangeTerm
 from dav_gswt.terrain.choice import Floats, Ints, hash_cell
-from dav_gswt.terrain.heights import FlatSurface, HeightField, gradient_noise, smoothstep
+from dav_gswt.terrain.heights import GAIN, SHIFT, FlatSurface, HeightField, gradient_noise, smoothstep
 
 LATTICE = 8  # points of the lattice of scores along a tile's side
 MAX_OCTAVES = 8
 NOISE = 16  # axis of the hash: octave k of material m uses NOISE + MAX_OCTAVES m + k
 JITTER = 80  # octave k uses JITTER + k for the first four materials and JITTER + MAX_OCTAVES + k for the next four
-GAIN = 0.4  # height of an octave over that of the one twice as wide
-SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells
 TURN = (0.8, 0.6)  # cosine and sine by which each octave is turned against the last: gradient noise prefers its axes
 CONTRAST = 3.0  # the jitter is its noise times this, cut at -1 and 1
 FARTHEST = 4.0  # weights by which a score falls at most outside of a range

@@ -5,7 +5,7 @@ that fray and bend as the photographed ones do. The scatter gives every object i
 """
 
 import logging
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,6 @@ from dav_gswt.bundle.content import BundleContent
 from dav_gswt.bundle.land_cover import ClassesEntry, JitterEntry, NoiseTerm, ObjectEntry, RiseEntry, ScatterEntry
 from dav_gswt.errors import InputError
 from dav_gswt.materials.borders import measure_bend
-from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.materials.store import read_objects, read_report
 from dav_gswt.terrain.classes import LATTICE, Classes
 from dav_gswt.terrain.scatter import Scatter
@@ -50,17 +49,15 @@ SHORTFALL = 0.9  # share of the wanted density below which a warning is logged
 def gather_content(tiles: list[TileSet], materials: Path | str | None, salt: int) -> BundleContent:
     """What a bundle is made of. materials: the folder of rule `find_materials`; None: one material, without objects.
 
-    Raises: InputError: see `BundleContent`, `materials.store`.
+    Raises: InputError: tiles of another number of materials; see also `materials.store`.
     """
     if materials is None:
         return BundleContent.of_one_material(tiles[0])
     report = read_report(materials)
     if len(tiles) != len(report.materials):
         raise InputError("materials: this tiling is of the first one alone; choose another or `materials: one`")
-    names = [own.name for own in fields(MaterialInfo)]
-    infos = [MaterialInfo(**{name: getattr(each, name) for name in names}) for each in report.materials]
     objects = read_objects(materials, len(tiles[0].fields), tiles[0].spacing)
-    return fit_cover(BundleContent(tiles, infos, objects), salt)
+    return fit_cover(BundleContent(tiles, [*report.materials], objects), salt)
 
 
 def fit_cover(content: BundleContent, salt: int) -> BundleContent:

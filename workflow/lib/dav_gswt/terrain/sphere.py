@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
 from dav_gswt.terrain.choice import Floats, Ints, tiles_at
-from dav_gswt.terrain.heights import QUARTER, Sphere, gradient_noise
+from dav_gswt.terrain.heights import QUARTER, SHIFT, Sphere, gradient_noise
 
 FACES = np.array(  # east, north and out of each face
     [
@@ -30,7 +30,6 @@ FACES = np.array(  # east, north and out of each face
 )
 FRAY = 120  # axis of the hash of edge 0; edge k, that of the face it leads out of, uses FRAY + 2 k and the next
 FINE = (3.0, 9.0)  # cells of the two octaves of the noise, on a tile's side
-SHIFT = (0.37, 0.71)  # of the second octave
 WIDTH, CONTRAST = 0.3, 2.5  # tile sides: most that an edge is moved; the noise is this many times as strong, and cut
 TAPER = 0.5  # of the distance from a corner, in tile sides: there three faces meet, and edges are not moved
 LEVEL, LIFT, HIGHEST = 0.03, 2.0, 0.2  # what is higher than LEVEL reaches over by LIFT times that, HIGHEST at most

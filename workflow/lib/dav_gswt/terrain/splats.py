@@ -48,27 +48,19 @@ def concatenate_splats(parts: list[Splats]) -> Splats:
     return Splats(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Splats)))
 
 
-def sort_by_depth(splats: Splats) -> Splats:
-    """Back to front by depth; of equal depths the later one comes first, as in the rasterizer."""
-    return splats[depth_order(splats)]
-
-
 def depth_order(splats: Splats) -> Int[Array, "n"]:
-    """Indices of the splats from back to front."""
+    """Indices of the splats from back to front; of equal depths the later one comes first, as in the rasterizer."""
     return np.argsort(splats.depths, kind="stable")[::-1]
 
 
-def project(field: GaussianField, slope: Slope, camera: Camera, near: float) -> Splats:
-    """Project Gaussians on a surface of these slopes, in their order; those outside the picture are culled."""
-    return project_indexed(field, slope, camera, near)[0]
-
-
-def project_indexed(field: GaussianField, slope: Slope, camera: Camera, near: float) -> tuple[Splats, Int[Array, "k"]]:
-    """`project`, and the index of each splat in the field.
+def project(field: GaussianField, slope: Slope, camera: Camera, near: float) -> tuple[Splats, Int[Array, "k"]]:
+    """Project Gaussians on a surface of these slopes, in their order; those outside the picture are culled.
 
     S = (J W A)(J W A)^T with A of `displaced_axes` (EWA); its determinant by Lagrange's identity |p x q|^2. A Gaussian
     whose depth is small against its extent in depth fades out: its linearised splat would cover the picture up to the
     horizon. The viewer does the same.
+
+    Returns: the splats, and the index of each in the field.
     """
     q = np.ascontiguousarray((field.means.astype(float) @ camera.rotation.T + camera.translation).T)
     ahead = np.flatnonzero(q[2] > near)
