@@ -180,7 +180,7 @@ def render_pieces(
         part, indices = splats.project(behind.blend_far(field), slope, here, terrain.near)
         parts.append((part, [recolour(field, eye)[indices] for recolour in recolourings], piece.close))
     parts.sort(key=lambda each: each[2])  # close pieces come last
-    ordered = splats.concatenate_splats([splats.EMPTY, *(part for part, _, _ in parts)])
+    ordered = splats.Splats.concatenate([splats.EMPTY, *(part for part, _, _ in parts)])
     first = sum(len(part) for part, _, close in parts if not close)
     order = np.concatenate([np.arange(first), first + splats.depth_order(ordered[first:])])
     ordered = ordered[order]

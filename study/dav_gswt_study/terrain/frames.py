@@ -120,8 +120,8 @@ def time_frame(
             )
     with measure("sort"):
         far, close = ([part for k, part in enumerate(parts) if cells.close[k] == near] for near in (False, True))
-        last = splats.concatenate_splats([splats.EMPTY, *close])
-        ordered = splats.concatenate_splats([*far, last[splats.depth_order(last)]])
+        last = splats.Splats.concatenate([splats.EMPTY, *close])
+        ordered = splats.Splats.concatenate([*far, last[splats.depth_order(last)]])
     with measure("render"):
         seen = splats.blend(ordered, here)
         np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop.colours_along(here.rays()[1]), 0, 1)

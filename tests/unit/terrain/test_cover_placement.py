@@ -12,7 +12,7 @@ from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.lod.merge import compute_covariances
 from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain import endless, placement, stills, visibility
-from dav_gswt.terrain.scatter import concatenate_instances
+from dav_gswt.terrain.scatter import Instances
 
 MAGENTA = [1.0, 0.0, 1.0]
 
@@ -77,7 +77,7 @@ def test_an_object_is_turned_and_scaled_about_its_foot(cover):
 
 def test_every_visible_foot_is_drawn_once(cover, seen):
     _, cells, things = seen
-    drawn = concatenate_instances(list(things.values()))
+    drawn = Instances.concatenate(list(things.values()))
     every = cover.scatter.instances_in(cells.i, cells.j)
     assert len(drawn) == len(every) > 20
     assert sorted(drawn.u.tolist()) == sorted(every.u.tolist())

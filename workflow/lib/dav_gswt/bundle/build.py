@@ -33,7 +33,6 @@ class BundleOptions:
         unit: of lengths, for display.
         level_pixels: mean standard deviation of a level, in pixels, where it takes over from its finer neighbour.
         band: half the width of that cross-fade, as a share of the distance.
-        decibels: PSNR from which drawing in a neighbour's order counts as invisible.
         threads: that sort tiles; they change no byte.
     """
 
@@ -42,7 +41,6 @@ class BundleOptions:
     unit: str = "metre"
     level_pixels: float = 1.0
     band: float = 0.1
-    decibels: float = 40.0
     threads: int = 1
 
 
@@ -79,7 +77,7 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
     tiles = list(zip(*levels, strict=True))
     heights = [_measure_heights(fields) for fields in tiles]
     uncertainties = [u for same in content.tiles for u in np.clip(same.uncertainty, 0, 1).tolist()]
-    rings = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
+    rings = direction_search.search_directions(content.sample_tiles(), content.side)
     table = level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band)
     objects = list(zip(*(content.object_fields(level) for level in range(content.levels)), strict=True))
     sources = [(f"tile_{number:02d}", *each) for number, each in enumerate(zip(uncertainties, tiles, strict=True))]

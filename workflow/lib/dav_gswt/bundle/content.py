@@ -70,8 +70,6 @@ class BundleContent:
     def ground_colour(self) -> list[float]:
         """Mean colour of the ground of all materials, by their shares."""
         colours = [compute_ground_colour(tiles.fields[-1]) for tiles in self.tiles]
-        if len(colours) == 1:
-            return colours[0]
         shares = np.array([material.share for material in self.materials])
         return np.clip(shares @ np.array(colours) / shares.sum(), 0, 1).tolist()
 

@@ -23,6 +23,7 @@ _log = logging.getLogger(__name__)
 
 MAX_ORDERS = 33  # of a tile that keeps every second azimuth: with its record, 82 bytes a Gaussian
 MIN_AZIMUTHS = 4
+DECIBELS = 40.0  # PSNR from which drawing in a neighbour's order counts as invisible
 ELEVATIONS = {"walker": float(np.degrees(np.arcsin(0.1))), "oblique": 45.0}  # a walker's eye: a tenth of the distance
 WIDTH, HEIGHT = 256, 128  # pixels about the tile's middle
 VIEWS = 8  # at each elevation
@@ -30,10 +31,8 @@ VIEWS = 8  # at each elevation
 Picture = Float32[Array, "h w 3"]
 
 
-def search_directions(
-    fields: list[GaussianField], side: float, wanted: float, most: int = MAX_ORDERS
-) -> DirectionRings:
-    """The fewest directions with which every view reaches `wanted` decibels, or as many as `most` allow.
+def search_directions(fields: list[GaussianField], side: float, wanted: float = DECIBELS) -> DirectionRings:
+    """The fewest directions with which every view reaches `wanted` decibels, or as many as MAX_ORDERS allow.
 
     The search starts with a ring of MIN_AZIMUTHS azimuths 20 degrees below the horizon. While the worst
     view is below `wanted`, it is compared with views along the kept azimuths: if the elevation causes most
@@ -42,7 +41,6 @@ def search_directions(
 
     Args:
         fields: the tiles of the finest level; a coarser level is used only where its discs cover a pixel.
-        most: orders of a tile that keeps every second azimuth.
     Returns: the directions, of which such a tile keeps every second azimuth.
     """
     elevations, kept = (20.0,), MIN_AZIMUTHS
@@ -56,8 +54,8 @@ def search_directions(
         along_azimuths = measure_psnr(fields, side, rings, elevation, halfway=False)
         missing = more != elevations and along_azimuths < decibels + 3.0  # half of the error is 3 dB
         elevations_next, kept_next = (more, kept) if missing else (elevations, 2 * kept)
-        if len(elevations_next) * kept_next + 1 > most:
-            _log.warning("orders: %.1f dB with %d directions, and no room for more", decibels, most)
+        if len(elevations_next) * kept_next + 1 > MAX_ORDERS:
+            _log.warning("orders: %.1f dB with %d directions, and no room for more", decibels, MAX_ORDERS)
             break
         elevations, kept = elevations_next, kept_next
     return DirectionRings(elevations, 2 * kept)

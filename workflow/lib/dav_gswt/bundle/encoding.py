@@ -134,12 +134,9 @@ def find_smallest_rotations(quats: Float[Array, "n 4"]) -> tuple[Float64[Array, 
     |x|, |y| and |z| within sin(pi / 8): were |x| larger, a quarter turn about x would raise w to (w + |x|) / sqrt(2).
 
     Returns: quaternions, and for each new axis the index of the old one.
-    Raises: ValueError: a quaternion of length 0.
     """
     cube = Rotation.create_group("O")
     length = np.linalg.norm(quats.astype(float), axis=1, keepdims=True)
-    if not (length > 0).all():
-        raise ValueError(f"quaternion {int(np.argmin(length))} has length 0")
     q = quats.astype(float) / length
     g = cube.as_quat(scalar_first=True)
     real = q @ (g * [1, -1, -1, -1]).T  # w of every product

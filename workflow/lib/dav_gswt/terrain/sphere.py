@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
+from dav_gswt.field import Rows
 from dav_gswt.terrain.choice import Floats, Ints, tiles_at
 from dav_gswt.terrain.heights import QUARTER, SHIFT, Sphere, gradient_noise
 
@@ -36,15 +37,12 @@ LEVEL, LIFT, HIGHEST = 0.03, 2.0, 0.2  # what is higher than LEVEL reaches over 
 
 
 @dataclass(frozen=True)
-class FaceCells:
+class FaceCells(Rows):
     """Cells of faces, or squares of cells of one size by their south-western cells."""
 
     face: Ints
     i: Ints
     j: Ints
-
-    def __getitem__(self, index) -> "FaceCells":
-        return FaceCells(self.face[index], self.i[index], self.j[index])
 
 
 def directions(face: Ints, tangents: Float[Array, "n 2"]) -> Float[Array, "n 3"]:

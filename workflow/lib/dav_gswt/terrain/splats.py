@@ -4,13 +4,13 @@ The rasterizer sorts by depth. To blend in a given order, each splat becomes a f
 depth is its rank, seen by an orthographic camera. Its covariance there is the splat's, so every backend can render it.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
-from dav_gswt.field import GaussianField
+from dav_gswt.field import GaussianField, Rows
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rendering, harmonics, make_rasterizer
 from dav_gswt.terrain.heights import Slope, displaced_axes
@@ -23,7 +23,7 @@ THINNEST = 1e-9  # pixels
 
 
 @dataclass(frozen=True)
-class Splats:
+class Splats(Rows):
     """Ellipses in pixels: centres, log standard deviations of two axes, angle of the first axis from x."""
 
     centres: Float32[Array, "n 2"]
@@ -33,19 +33,8 @@ class Splats:
     colours: Float32[Array, "n 3"]
     depths: Float32[Array, "n"]
 
-    def __len__(self) -> int:
-        return len(self.centres)
-
-    def __getitem__(self, index) -> "Splats":
-        return Splats(*(getattr(self, f.name)[index] for f in fields(self)))
-
 
 EMPTY = Splats(*(np.zeros((0, *width), np.float32) for width in ((2,), (2,), (), (), (3,), ())))
-
-
-def concatenate_splats(parts: list[Splats]) -> Splats:
-    """All splats of all parts, in their order."""
-    return Splats(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Splats)))
 
 
 def depth_order(splats: Splats) -> Int[Array, "n"]:

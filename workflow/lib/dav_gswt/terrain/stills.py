@@ -121,6 +121,6 @@ def render_view(
     with ThreadPoolExecutor(default_threads()) as pool:  # NumPy works beside itself; each cell is on its own
         for k, part in enumerate(pool.map(project, range(len(cells)))):
             (close if exact or cells.close[k] else far).append(part)
-    last = splats.concatenate_splats(close)
-    seen = splats.blend(splats.concatenate_splats([*far, last[splats.depth_order(last)]]), here)
+    last = splats.Splats.concatenate(close)
+    seen = splats.blend(splats.Splats.concatenate([*far, last[splats.depth_order(last)]]), here)
     return np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop.colours_along(here.rays()[1]), 0, 1)

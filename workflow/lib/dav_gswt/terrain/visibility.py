@@ -1,11 +1,12 @@
 """Visible cells: which cells of the endless terrain a camera may see, at which levels, within a budget of Gaussians."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
+from dav_gswt.field import Rows
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import draw_order
 from dav_gswt.terrain.choice import Floats, Ints, Vector, tiles_at
@@ -17,7 +18,7 @@ Points = Float[Array, "n 3"]
 
 
 @dataclass(frozen=True)
-class GridCells:
+class GridCells(Rows):
     """Cells of the tile grid, back to front. tile: that of the first material in the cell. materials: which materials
     the cell may show, bit m for material m. close: in the 3 x 3 block about the eye. nearest, farthest: bounds of the
     distances from the eye to the centres of a cell's Gaussians.
@@ -30,12 +31,6 @@ class GridCells:
     close: Bool[Array, "n"]
     nearest: Floats
     farthest: Floats
-
-    def __len__(self) -> int:
-        return len(self.i)
-
-    def __getitem__(self, index) -> "GridCells":
-        return GridCells(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
 def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
