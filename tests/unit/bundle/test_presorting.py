@@ -30,16 +30,6 @@ def ground(seed, stones=300, colours=1.0):
     )
 
 
-def test_directions_start_in_the_east_go_north_and_end_straight_down():
-    found = DirectionRings((20.0, 45.0), 16).directions()
-    down = np.radians(20)
-    np.testing.assert_allclose(found[0], [np.cos(down), 0, -np.sin(down)], atol=1e-15)
-    np.testing.assert_allclose(found[4], [0, np.cos(down), -np.sin(down)], atol=1e-15)
-    np.testing.assert_allclose(found[16], [np.sqrt(0.5), 0, -np.sqrt(0.5)], atol=1e-15)
-    np.testing.assert_allclose(found[-1], [0, 0, -1])
-    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, rtol=1e-15)
-
-
 def test_tau_0_keeps_all_orders_of_every_tile_tau_1_of_none_and_their_number_never_rises():
     rings = DirectionRings()
     for u in (0.0, 0.3, 1.0):

@@ -121,14 +121,3 @@ def test_an_object_stands_on_the_surface(cover, seen):
     assert tall.any()
     height, _ = HILLS.at(flat.means[tall, 0].astype(float) + eye[0], flat.means[tall, 1].astype(float) + eye[1])
     assert raised.means[tall, 2] - flat.means[tall, 2] == pytest.approx(height, abs=1e-3)
-
-
-def test_a_budget_counts_objects(cover, bare, seen):
-    cells = seen[1]
-    without, counts = (visibility.count_gaussians(terrain, cells) for terrain in (bare, cover))
-    levels = visibility.active_levels(cover, cells)
-    more = np.zeros(len(cells), int)
-    for n, cell in enumerate(zip(cells.i, cells.j, strict=True)):
-        found = cover.scatter.instances_in(*(np.array([v]) for v in cell))
-        more[n] = sum(len(cover.objects[k][lv]) for k in found.number for lv in np.flatnonzero(levels[:, n]))
-    np.testing.assert_array_equal(counts - without, more)

@@ -12,7 +12,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.images.metrics import psnr
 from dav_gswt.raster import render
-from dav_gswt.terrain import endless, finite, heights, scatter, stills
+from dav_gswt.terrain import endless, heights, stills
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills, make_sphere
 from dav_gswt.terrain.page import write_page
 
@@ -89,17 +89,3 @@ def test_it_looks_as_the_terrain_does(bundle, surface, corner):
     near = cameras.pinhole(eye - origin, eye - origin + [0.3, 0.2, -1.0], 96, 96, 40.0)
     assert psnr(render(field, near).colour, expected, np.ones((96, 96))) > 35
     assert np.abs(field.means[:, :2]).max() < 10 * SIDE, "positions count from the corner"
-
-
-def test_a_wide_area_is_counted_in_slices(bundle, monkeypatch):
-    """The same counts and blocks, while no more cells are known at a time than a slice has."""
-    area = finite.Area(-7, 3, 8, 7)
-    whole = endless.terrain_from_bundle(bundle, HILLS)
-    counts = finite.count_cells(whole, area, 0)
-    monkeypatch.setattr(finite, "SLICE", 20)
-    monkeypatch.setattr(scatter, "CACHED", 40)
-    sliced = endless.terrain_from_bundle(bundle, HILLS)
-    np.testing.assert_array_equal(finite.count_cells(sliced, area, 0), counts)
-    assert len(sliced.scatter._known) <= 40
-    blocks = finite.list_blocks(sliced, area, 0)
-    assert sum(map(len, blocks)) == len(counts) and len(sliced.scatter._known) <= 40

@@ -100,7 +100,3 @@ def test_objects_may_stand_on_the_only_material():
     one = replace(content, tiles=content.tiles[:1], materials=[replace(content.materials[0], share=1.0)])
     made = fit_cover(replace(one, objects=[shrub(0.3, 0.2, 0)]), 7)
     assert made.classes is None and made.scatter is not None and 0 < made.probabilities[0] <= 1
-
-
-def test_probabilities_of_one_material_sum_to_1_at_most():
-    assert fits._cap(np.array([0.9, 0.9, 0.5]), np.array([0, 0, 1])) == pytest.approx([0.5, 0.5, 0.5])

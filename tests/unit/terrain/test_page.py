@@ -13,7 +13,7 @@ from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, write_scen
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import TakenPhoto
 from dav_gswt.terrain import page, page_story
-from dav_gswt.terrain.heights import HeightMap, make_sphere
+from dav_gswt.terrain.heights import make_sphere
 from dav_gswt.terrain.page import Front, fill_front, front_of_scene, write_page
 from dav_gswt.terrain.page_story import Story, tell_story
 
@@ -87,16 +87,6 @@ def test_the_page_of_a_planet_takes_no_objects(tmp_path, viewer, bundle):
     with pytest.raises(InputError, match="materials: one"):
         write_page(tmp_path / "cover", viewer, tmp_path / "page", make_sphere(10.0, 2.0))
     assert not (tmp_path / "page").exists()
-
-
-def test_a_height_map_comes_with_its_pixels(tmp_path, viewer, bundle):
-    pixels = np.arange(6, dtype=np.float32).reshape(2, 3)
-    write_page(bundle, viewer, tmp_path / "page", HeightMap(pixels, 7.5))
-    assert (tmp_path / "page/heights.bin").read_bytes() == pixels.astype("<f4").tobytes()
-    entry = surface_of(tmp_path / "page")
-    assert entry.pop("sha256") and entry == {
-        "kind": "image", "file": "heights.bin", "rows": 2, "columns": 3, "width": 7.5, "bytes": 24,
-    }  # fmt: skip
 
 
 def test_name_line_still_and_modules_are_in_the_page_as_text():

@@ -44,14 +44,6 @@ def test_what_the_camera_sees_is_there(request, surface, pitch, height):
     )
 
 
-def test_levels_follow_the_distance(terrain):
-    camera = walking(terrain)
-    cells = visibility.visible_cells(terrain, camera)
-    levels = visibility.active_levels(terrain, cells)
-    assert (levels[0] == (cells.nearest <= 22)).all() and (levels[1] == (cells.farthest >= 18)).all()
-    assert (levels.all(0)).any() and levels.any(0).all()
-
-
 def test_too_many_gaussians_go_farthest_first(terrain):
     cells = visibility.visible_cells(terrain, walking(terrain))
     few = visibility.drop_far_cells(terrain, cells, 20_000)

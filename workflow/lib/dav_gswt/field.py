@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Self
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
@@ -19,6 +19,9 @@ HEADER_BYTES = 1 << 16  # a header is no longer than this
 ROUNDING = 1e-5  # that an uncertainty may lie outside 0 to 1
 
 
+R = TypeVar("R", bound="Rows")
+
+
 @dataclass(frozen=True)
 class Rows:
     """A base of dataclasses whose fields are arrays with a row for each thing."""
@@ -26,12 +29,12 @@ class Rows:
     def __len__(self) -> int:
         return len(getattr(self, fields(self)[0].name))
 
-    def __getitem__(self, index: slice | Array) -> Self:
+    def __getitem__(self: R, index: slice | Array) -> R:
         """The rows that a mask, a slice or an index array selects."""
         return type(self)(*(getattr(self, f.name)[index] for f in fields(self)))
 
     @classmethod
-    def concatenate(cls, parts: Sequence[Self]) -> Self:
+    def concatenate(cls: type[R], parts: Sequence[R]) -> R:
         """The rows of all parts, in their order."""
         return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
 

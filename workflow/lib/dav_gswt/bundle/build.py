@@ -77,7 +77,8 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
     tiles = list(zip(*levels, strict=True))
     heights = [_measure_heights(fields) for fields in tiles]
     uncertainties = [u for same in content.tiles for u in np.clip(same.uncertainty, 0, 1).tolist()]
-    rings = direction_search.search_directions(content.sample_tiles(), content.side)
+    in_turn = [each for same in zip(*(own.fields[0] for own in content.tiles), strict=True) for each in same]
+    rings = direction_search.search_directions(in_turn, content.side)
     table = level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band)
     objects = list(zip(*(content.object_fields(level) for level in range(content.levels)), strict=True))
     sources = [(f"tile_{number:02d}", *each) for number, each in enumerate(zip(uncertainties, tiles, strict=True))]

@@ -63,10 +63,6 @@ class BundleContent:
         flat = np.concatenate(heights)
         return float(flat.mean()) if len(flat) else 0.0
 
-    def sample_tiles(self) -> list[GaussianField]:
-        """The finest tiles, the materials in turn: what errors are measured on."""
-        return [each for same in zip(*(tiles.fields[0] for tiles in self.tiles), strict=True) for each in same]
-
     def ground_colour(self) -> list[float]:
         """Mean colour of the ground of all materials, by their shares."""
         colours = [compute_ground_colour(tiles.fields[-1]) for tiles in self.tiles]

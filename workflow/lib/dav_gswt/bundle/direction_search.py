@@ -89,8 +89,7 @@ def render_in_order(
     """The middle of a tile seen along a direction, in the order of another one, pixels `pixel` wide; black behind."""
     middle = np.array([side / 2, side / 2, np.median(field.means[:, 2])])
     right = np.cross(along, [0.0, 0.0, 1.0])
-    length = np.linalg.norm(right)
-    right = right / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
+    right /= np.linalg.norm(right)
     turn = np.stack([right, np.cross(along, right), along])
     camera = Camera(turn, np.zeros(3), 1 / pixel, 1 / pixel, WIDTH / 2, HEIGHT / 2, WIDTH, HEIGHT, True)
     # four standard deviations about their centres overlap the picture

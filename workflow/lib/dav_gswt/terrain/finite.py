@@ -32,9 +32,6 @@ class Area:
     columns: int
     rows: int
 
-    def __len__(self) -> int:
-        return self.columns * self.rows
-
 
 def list_cells(terrain: EndlessTerrain, area: Area) -> tuple[Ints, Ints, Ints, Ints]:
     """Column, row, tile number and materials (bit m for material m) of an area's cells, row by row from the south.

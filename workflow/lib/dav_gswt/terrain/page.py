@@ -17,14 +17,14 @@ from dav_gswt.bundle.manifest import Manifest, read_manifest
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, write_json
 from dav_gswt.images.figures import encode_jpeg
-from dav_gswt.images.image_files import read_photo, shrink_image
+from dav_gswt.images.image_files import read_photo, shrink_to
 from dav_gswt.terrain.class_rules import NOISE, apply_rule
 from dav_gswt.terrain.heights import PIXELS, FlatSurface, HeightField, require_plain_cover
 from dav_gswt.terrain.page_story import SHEET, STORY, Story
 
 INDEX, STILL = "index.html", "first.jpg"
 OWN_SCRIPTS = ("early.js", "worker/", "api/", "terrain_api.js")  # that are no modules of the page itself
-STILL_WIDTH = 1280  # pixels, at most
+STILL_SIZE = 1280  # pixels of its longer side, at most
 STILL_BYTES = 90_000  # at most: it is there within a second at 1 Mbit/s
 QUALITIES = (80, 70, 60, 50, 40, 30)  # the best that fits is taken; the last one anyhow
 STORY_BUTTON = '<button id="storyButton" type="button" aria-controls="story" aria-expanded="false"'
@@ -60,15 +60,11 @@ def name_of_scene(scene: str) -> str:
 
 
 def encode_still(path: Path | str) -> bytes:
-    """A still as a JPEG of at most STILL_WIDTH pixels across and, where quality allows, STILL_BYTES.
+    """A still as a JPEG of at most STILL_SIZE pixels a side and, where quality allows, STILL_BYTES.
 
     Raises: InputError: the file is no readable image.
     """
-    image = read_photo(path)
-    height, width = image.shape[:2]
-    if width > STILL_WIDTH:
-        image = shrink_image(image, STILL_WIDTH, max(1, round(height * STILL_WIDTH / width)))
-    made = b""
+    image, made = shrink_to(read_photo(path), STILL_SIZE), b""
     for quality in QUALITIES:
         made = encode_jpeg(image, quality)
         if len(made) <= STILL_BYTES:
