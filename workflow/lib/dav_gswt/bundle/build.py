@@ -77,6 +77,7 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
     tiles = list(zip(*levels, strict=True))
     heights = [_measure_heights(fields) for fields in tiles]
     uncertainties = [u for same in content.tiles for u in np.clip(same.uncertainty, 0, 1).tolist()]
+    # the materials in turn: of what errors are measured on each has its share
     in_turn = [each for same in zip(*(own.fields[0] for own in content.tiles), strict=True) for each in same]
     rings = direction_search.search_directions(in_turn, content.side)
     table = level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band)
@@ -88,6 +89,46 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
     ]
     everything = [field for fields in (*tiles, *objects) for field in fields]
     encoding = Encoding.fit(everything, content.side, content.spacing / FLOOR_PIXELS)
+    written = _write_chunks(sources, encoding, rings, options, part)
+    count, things = len(content.tiles[0].labels), []
+    for each, probability, own in zip(content.objects, content.probabilities, written[len(tiles) :], strict=True):
+        ground, z = content.ground_height(each.material), _measure_heights(each.fields)
+        things.append(ObjectEntry(each.name, each.radius, z, ground, each.material, each.density, probability, own))
+    return Manifest(
+        tile_side=content.side,
+        salt=options.salt,
+        eye_floor=level_distances.compute_eye_floor(content.spacing, FLOOR_PIXELS),
+        ground_colour=content.ground_colour(),
+        directions=rings.directions().tolist(),
+        levels=table,
+        tiles=[
+            TileEntry(tile, *each)
+            for tile, each in enumerate(zip(uncertainties, heights, written[: len(tiles)], strict=True))
+        ],
+        materials=[
+            MaterialEntry(material.name, material.share, number * count, compute_ground_colour(same.fields[-1]))
+            for number, (material, same) in enumerate(zip(content.materials, content.tiles, strict=True))
+        ],
+        classes=content.classes,
+        objects=things or None,
+        scatter=content.scatter,
+        format=manifest.FORMAT,
+        version=manifest.VERSION,
+        unit=options.unit,
+        sky=Sky(),
+        encoding=encoding,
+        provenance=provenance,
+    )
+
+
+def _write_chunks(
+    sources: list[tuple[str, float, Sequence[GaussianField]]],
+    encoding: Encoding,
+    rings: orders.DirectionRings,
+    options: BundleOptions,
+    part: Path,
+) -> list[list[ChunkEntry]]:
+    """Write the chunks of tiles and objects, of which the name, the mean uncertainty and the levels are given."""
     along = rings.directions()
 
     def write(source: tuple[str, float, Sequence[GaussianField]]) -> list[ChunkEntry]:
@@ -99,43 +140,8 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
         return entries
 
     with ThreadPoolExecutor(options.threads) as pool:
-        written = [
-            entries for _, entries in zip(progress(sources, "sort tiles"), pool.map(write, sources), strict=True)
-        ]
-    count = len(content.tiles[0].labels)
-    return Manifest(
-        tile_side=content.side,
-        salt=options.salt,
-        eye_floor=level_distances.compute_eye_floor(content.spacing, FLOOR_PIXELS),
-        ground_colour=content.ground_colour(),
-        directions=along.tolist(),
-        levels=table,
-        tiles=[
-            TileEntry(tile, *each)
-            for tile, each in enumerate(zip(uncertainties, heights, written[: len(tiles)], strict=True))
-        ],
-        materials=[
-            MaterialEntry(material.name, material.share, number * count, compute_ground_colour(same.fields[-1]))
-            for number, (material, same) in enumerate(zip(content.materials, content.tiles, strict=True))
-        ],
-        classes=content.classes,
-        objects=_describe_objects(content, written[len(tiles) :]) or None,
-        scatter=content.scatter,
-        format=manifest.FORMAT,
-        version=manifest.VERSION,
-        unit=options.unit,
-        sky=Sky(),
-        encoding=encoding,
-        provenance=provenance,
-    )
-
-
-def _describe_objects(content: BundleContent, written: list[list[ChunkEntry]]) -> list[ObjectEntry]:
-    entries = []
-    for each, probability, own in zip(content.objects, content.probabilities, written, strict=True):
-        ground, z = content.ground_height(each.material), _measure_heights(each.fields)
-        entries.append(ObjectEntry(each.name, each.radius, z, ground, each.material, each.density, probability, own))
-    return entries
+        named = zip(progress(sources, "sort tiles"), pool.map(write, sources), strict=True)
+        return [entries for _, entries in named]
 
 
 def _measure_heights(levels: Sequence[GaussianField]) -> list[float]:

@@ -24,8 +24,6 @@ from dav_gswt.bundle.orders import index_type
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 
-Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-
 
 @dataclass(frozen=True)
 class ChunkEntry(Entry):
@@ -38,7 +36,7 @@ class ChunkEntry(Entry):
     orders: Annotated[list[Natural], Field(min_length=1)]
     file: Annotated[str, Field(pattern=r"^chunks/[A-Za-z0-9_]+\.bin$")]
     bytes: Natural
-    sha256: Digest
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     count: Annotated[int, Field(ge=1)]
 
 

@@ -20,8 +20,6 @@ from dav_gswt.terrain.visibility import GridCells, choose_tiles, count_gaussians
 BLOCK = 65_536  # Gaussians that are placed at once, about
 SLICE = 4096  # cells that are counted at once
 
-Placer = Callable[[], GaussianField]
-
 
 @dataclass(frozen=True)
 class Area:
@@ -81,7 +79,7 @@ def list_blocks(terrain: EndlessTerrain, area: Area, level: int) -> list[GridCel
     return [cells[rows] for rows in np.split(np.arange(len(cells)), np.flatnonzero(np.diff(block)) + 1)]
 
 
-def place_block(terrain: EndlessTerrain, cells: GridCells, level: int, origin: Vector) -> Placer:
+def place_block(terrain: EndlessTerrain, cells: GridCells, level: int, origin: Vector) -> Callable[[], GaussianField]:
     """A function that puts the Gaussians of some cells on the surface. It may run in any thread; this one may not.
 
     origin: world position that positions count from.

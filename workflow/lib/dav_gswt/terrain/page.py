@@ -87,12 +87,10 @@ def write_page(
     Args:   surface: of the terrain (default: level ground), stored in the page's manifest as `heights`. rule: the
             config's `classes`, stored as those of the page's manifest. front: name of the scene, line about it, first
             still and story (default: the viewer's own texts, no still, no story).
-    Raises: InputError: a chunk is missing, the viewer is incomplete; see also `manifest.read_manifest`,
+    Raises: InputError: a chunk is missing; see also `manifest.read_manifest`,
             `class_rules.apply_rule`, `heights.require_plain_cover`.
     """
     bundle, viewer, out, surface = Path(bundle_dir), Path(viewer_dir), Path(out_dir), surface or FlatSurface()
-    if not (viewer / INDEX).is_file():
-        raise InputError(f"{viewer}: no viewer here (index.html is missing)")
     manifest = apply_rule(read_manifest(bundle), rule)
     require_plain_cover(surface, manifest.classes, manifest.objects)
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]

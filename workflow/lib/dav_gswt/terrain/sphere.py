@@ -59,10 +59,10 @@ def bend(
 
     local: from the middle of the tile, z above the ground. tangents: of the tile's middle. The points are returned from
     the place of the tile's middle on the ground. With t the tangents and d their change, |t + d| - |t| and the change
-    of the direction are computed from d alone, so float32 keeps seven digits of a point's distance from the middle of
-    its tile at any radius.
+    of the direction are computed from d alone, so a shader's float32 keeps seven digits of a point's distance from
+    the middle of its tile at any radius.
     """
-    along = np.tan(local[:, :2] * local.dtype.type(rate))
+    along = np.tan(local[:, :2] * rate)
     change = (1 + tangents * tangents) * along / (1 - tangents * along)
     there = tangents + change
     first, length = np.sqrt(1 + (tangents * tangents).sum(-1)), np.sqrt(1 + (there * there).sum(-1))
@@ -70,9 +70,9 @@ def bend(
     up = np.concatenate([there, np.ones_like(there[:, :1])], 1) / length[:, None]
     flat = np.concatenate([tangents * np.ones_like(there), np.ones_like(there[:, :1])], 1)
     shift = np.concatenate([change, np.zeros_like(there[:, :1])], 1) - flat * (longer / first)[..., None]
-    points = local.dtype.type(radius) * shift / length[:, None] + local[:, 2:] * up
-    grow = (radius * rate + rate * local[:, 2:]).astype(local.dtype) * (1 + there * there) / length[:, None]
-    level = np.eye(3, dtype=local.dtype)[:, :2] - up[:, :, None] * up[:, None, :2]
+    points = radius * shift / length[:, None] + local[:, 2:] * up
+    grow = (radius * rate + rate * local[:, 2:]) * (1 + there * there) / length[:, None]
+    level = np.eye(3)[:, :2] - up[:, :, None] * up[:, None, :2]
     return points, np.concatenate([level * grow[:, None], up[:, :, None]], 2)
 
 
