@@ -122,7 +122,7 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
 
 
 def _write_chunks(
-    sources: list[tuple[str, float, Sequence[GaussianField]]],
+    sources: Sequence[tuple[str, float, Sequence[GaussianField]]],
     encoding: Encoding,
     rings: orders.DirectionRings,
     options: BundleOptions,
