@@ -35,7 +35,7 @@ def tile_set(cells: int, levels: int) -> TileSet:
 def presorting(tiles: TileSet, threads: int) -> tuple[float, float, int]:
     """Seconds of the search for directions and of sorting, and how many directions there are."""
     start = time.perf_counter()
-    rings, _ = direction_search.search_directions(tiles.fields[0], tiles.side, build.BundleOptions.decibels)
+    rings = direction_search.search_directions(tiles.fields[0], tiles.side)
     searched = time.perf_counter() - start
     along = rings.directions()
     kept = [along[rings.select_directions(u, 0.5)] for u in tiles.uncertainty]

@@ -33,7 +33,7 @@ from dav_gswt.terrain import endless, stills, visibility
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.page import write_page
 from dav_gswt.terrain.placement import group_by_cell, place_cell
-from dav_gswt_study.terrain.frames import VISIT
+from dav_gswt_study.terrain.frames import VISIT, coarsen_to_budget
 
 GPU = "--gpu" in sys.argv
 GPU_FLAGS = [  # Chromium's way to a graphics card without a screen
@@ -111,7 +111,7 @@ def compare(bundle: store.Bundle, folder: Path, budget: int, names: tuple[str, .
 
     terrain, floor = endless.terrain_from_bundle(bundle, {"kind": "flat"}), bundle.manifest.eye_floor
     camera = stills.shot_camera(SHOT, terrain, floor, WIDTH, HEIGHT)
-    field = collect_view(visibility.coarsen_to_budget(terrain, camera, budget), camera, bundle.manifest)
+    field = collect_view(coarsen_to_budget(terrain, camera, budget), camera, bundle.manifest)
     still = np.clip(render(field, replace(camera, translation=np.zeros(3))).colour, 0, 1)
     x, y = (v * terrain.side for v in SHOT.at)
     place = {"x": x, "y": y, "eye": SHOT.height * floor, "yaw": SHOT.yaw, "pitch": -SHOT.pitch}

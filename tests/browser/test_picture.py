@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from fixtures import bundles
 from fixtures.browser import served
-from fixtures.bundles import Ground, colour_of
-
-from dav_gswt.terrain.choice import tile_at
+from fixtures.bundles import Ground, colour_of, tile_at
 
 SIDE, SALT = Ground().side, Ground().salt
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
@@ -33,7 +31,7 @@ def test_east_is_right_and_north_is_up_when_one_faces_north(still, plain):
         for j in (-1, 0):
             # cell (0, 0) lies north-east of the corner in the middle; look a third of the way to the picture's corner
             y, x = height // 2 - (j * 2 + 1) * height // 4, width // 2 + (i * 2 + 1) * width // 4
-            expected = colour_of(tile_at(i, j, SALT, 1))
+            expected = colour_of(tile_at(i, j, SALT))
             assert np.abs(picture[y, x] - expected).max() <= 6, (row, j)
 
 

@@ -5,14 +5,13 @@ import json
 import numpy as np
 import pytest
 from fixtures.browser import served
-from fixtures.bundles import Ground, directions
+from fixtures.bundles import Ground, directions, tile_at
 from fixtures.land_covers import write_cover_bundle
 from fixtures.page_visit import VIEWER, Visit
 
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.files import read_json, write_json
-from dav_gswt.terrain.choice import tile_at
 from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page
 
@@ -91,7 +90,7 @@ def test_an_update_keeps_its_budget_and_says_which_tiles_levels_and_orders_are_d
         order = None if drawn["order"] == 255 else drawn["order"]
         wanted = [drawn[key] for key in ("i", "j", "tile", "level", "last")] + [order]
         assert [cell[key] for key in ("i", "j", "tile", "finest", "coarsest", "order")] == wanted
-        assert cell["tile"] == tile_at(cell["i"], cell["j"], GROUND.salt, 1)
+        assert cell["tile"] == tile_at(cell["i"], cell["j"], GROUND.salt)
     assert {cell["order"] for cell in update["cells"]} > {None}
     told = other.evaluate("terrain.update(terrain.camera(" + str(PLACE) + ", 160, 100), { budget: 3000, exact: true })")
     assert 0 < told["gaussians"] <= 3000

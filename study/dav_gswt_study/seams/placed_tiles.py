@@ -6,22 +6,22 @@ Both halves of a strip have the same origin, so across a border nothing changes.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray as Array
 
-from dav_gswt.bundle import direction_search
-from dav_gswt.bundle.build import BundleOptions, describe_tiles
+from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.field import GaussianField
 from dav_gswt.lod.levels import Levels
 from dav_gswt.reconstruction import top_view
 from dav_gswt.terrain import endless
-from dav_gswt.terrain.choice import tiles_in
 from dav_gswt.tiles import build, compose, layout, semantics, texture
 from dav_gswt.tiles.layout import Exemplar, Layout
 from dav_gswt_study.seams.rendering import SpatialIndex
+from dav_gswt_study.seams.repetition import tiles_in
 
 WINDOW = 8  # tiles a side of the terrain that crops are taken from, around its origin
 REACH = 16  # radius of the terrain, in tile sides
@@ -106,9 +106,8 @@ def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau:
     """The tile set on level ground, placed as its bundle of this tau does. Gaussians are not quantised, since the
     patches of the exemplar that they are compared with are not either.
     """
-    options = BundleOptions(tau=tau, salt=salt)
-    rings, _ = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels)
-    manifest = describe_tiles(BundleContent.of_one_material(tiles), options, rings)
+    with TemporaryDirectory() as folder:
+        manifest = write_bundle(BundleContent.of_one_material(tiles), folder, BundleOptions(tau=tau, salt=salt), {})
     terrain = replace(endless.terrain_from_fields(tiles.fields, manifest, {"kind": "flat"}), reach=REACH)
     plan = tiles.layout
     first = -(WINDOW // 2)

@@ -18,6 +18,7 @@ from dav_gswt.raster.interface import RIM
 from dav_gswt.terrain import draw_order, placement, splats, visibility
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.heights import displace_means
 
 SKY = Sky([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])  # crops see none
 
@@ -175,12 +176,14 @@ def render_pieces(
     behind = Backdrop.for_eye(terrain, eye, SKY, ground)
     parts = []  # of each piece: its splats, their colours by every recolouring, whether it is close
     for piece in pieces:
-        ordered = placement.order_gaussians(piece.parts, piece.direction)
-        field, slope = placement.displace_and_fade(terrain, *ordered, piece.corner, eye)
-        part, indices = splats.project_indexed(behind.blend_far(field), slope, here, terrain.near)
+        field, level = placement.order_gaussians(piece.parts, piece.direction)
+        field, slope = displace_means(field, terrain.heights, piece.corner, eye)
+        distance = np.linalg.norm(field.means.astype(float), axis=1)
+        field, active = placement.fade_levels(terrain, field, level, distance)
+        part, indices = splats.project(behind.blend_far(field), slope[active], here, terrain.near)
         parts.append((part, [recolour(field, eye)[indices] for recolour in recolourings], piece.close))
     parts.sort(key=lambda each: each[2])  # close pieces come last
-    ordered = splats.concatenate_splats([splats.EMPTY, *(part for part, _, _ in parts)])
+    ordered = splats.Splats.concatenate([splats.EMPTY, *(part for part, _, _ in parts)])
     first = sum(len(part) for part, _, close in parts if not close)
     order = np.concatenate([np.arange(first), first + splats.depth_order(ordered[first:])])
     ordered = ordered[order]

@@ -8,13 +8,13 @@ around it.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import render
-from dav_gswt.terrain.choice import tiles_in
+from dav_gswt.terrain.choice import tiles_at
 from dav_gswt.tiles.build import TileSet
 
 TILES, WINDOWS = 12, 4  # a side of a top view, and how many there are
@@ -45,6 +45,12 @@ def measure_repetition(tiles: TileSet, exemplar: list[GaussianField], side: floa
     return Autocorrelations(
         terrain, autocorrelate(_render_top_view(exemplar[level], side, pixel)), round(tiles.side / pixel)
     )
+
+
+def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants: int) -> Int64[Array, "h w"]:
+    """Tile numbers of a window of cells: row 0 holds cells (west, south), (west + 1, south), ..."""
+    height, width = shape
+    return tiles_at(*np.meshgrid(west + np.arange(width), south + np.arange(height)), salt, variants)
 
 
 def _place_tiles(tiles: TileSet, level: int, first: int, salt: int) -> GaussianField:

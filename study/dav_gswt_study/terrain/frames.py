@@ -6,18 +6,28 @@ the machine that the row names, and for what else it did meanwhile (`load`).
 
 import os
 import tempfile
-from dataclasses import dataclass
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from fixtures import browser
 
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import figures
 from dav_gswt.logs import progress
-from dav_gswt.terrain import endless, heights, stills, visibility
+from dav_gswt.terrain import endless, heights, splats, stills, visibility
+from dav_gswt.terrain.backdrop import Backdrop
+from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.page import write_page
-from dav_gswt.terrain.stills import FrameTiming, Shot
+from dav_gswt.terrain.placement import group_by_cell, place_cell
+from dav_gswt.terrain.stills import Shot
+from dav_gswt.threads import default_threads
 from dav_gswt_study import csv_tables
 from dav_gswt_study.machine import describe_machine
 from dav_gswt_study.tables import spread
@@ -26,6 +36,7 @@ from dav_gswt_study.terrain.walk import walk_shots
 PARTS = ("render", "sort", "update")
 LIBRARY, PAGE = "library", "page"
 MIN_MS = 0.1  # lower end of the axis
+MIN_FACTOR, BISECTIONS = 1e-5, 16  # of the search for a factor on level distances
 WARM_UP = 4  # uncounted frames at the start, in which orders are made and shaders compiled
 VISIT = """async ({ places, before, budget }) => {
   const { viewer } = await import("./main.js");
@@ -74,19 +85,69 @@ def time_library(bundle: Bundle, settings: FrameSettings) -> list[dict]:
     """
     terrain, manifest, rows = endless.terrain_from_bundle(bundle, settings.heights), bundle.manifest, []
     for budget in progress(settings.budgets, "measure frames of the library"):
-        meters = []
+        frames = []
         for shot in settings.shots():
-            meters.append(FrameTiming())
             camera = stills.shot_camera(shot, terrain, manifest.eye_floor, settings.width, settings.height)
-            with meters[-1].measure("update"):
-                coarser = visibility.coarsen_to_budget(terrain, camera, budget)
-            stills.render_view(coarser, camera, manifest.sky, manifest.ground_colour, timing=meters[-1])
-        times = {part: [meter.milliseconds[part] for meter in meters] for part in PARTS}
-        rows.append(
-            _tabulate_times(settings, budget, times, [meter.gaussians for meter in meters], len(meters))
-            | _describe_renderer(LIBRARY, "")
-        )
+            frames.append(time_frame(terrain, camera, manifest, budget))
+        times = {part: [milliseconds[part] for milliseconds, _ in frames] for part in PARTS}
+        counts = [count for _, count in frames]
+        rows.append(_tabulate_times(settings, budget, times, counts, len(frames)) | _describe_renderer(LIBRARY, ""))
     return rows
+
+
+def time_frame(
+    terrain: EndlessTerrain, camera: Camera, manifest: Manifest, budget: int
+) -> tuple[dict[str, float], int]:
+    """Milliseconds of a frame by part, and its Gaussians. What is done is what `stills.render_view` does."""
+    eye, here, milliseconds = camera.centre, replace(camera, translation=np.zeros(3)), dict.fromkeys(PARTS, 0.0)
+
+    @contextmanager
+    def measure(part: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        milliseconds[part] += 1e3 * (time.perf_counter() - start)
+
+    with ThreadPoolExecutor(default_threads()) as pool:
+        with measure("update"):
+            shown = coarsen_to_budget(terrain, camera, budget)
+            cells = visibility.visible_cells(shown, camera)
+            things, numbers = group_by_cell(shown, cells, eye), range(len(cells))
+            placed = list(pool.map(lambda k: place_cell(shown, cells[k : k + 1], eye, things.get(k)), numbers))
+        with measure("render"):
+            backdrop = Backdrop.for_eye(shown, eye, manifest.sky, manifest.ground_colour)
+            parts = list(
+                pool.map(lambda each: splats.project(backdrop.blend_far(each[0]), each[1], here, shown.near)[0], placed)
+            )
+    with measure("sort"):
+        far, close = ([part for k, part in enumerate(parts) if cells.close[k] == near] for near in (False, True))
+        last = splats.Splats.concatenate([splats.EMPTY, *close])
+        ordered = splats.Splats.concatenate([*far, last[splats.depth_order(last)]])
+    with measure("render"):
+        seen = splats.blend(ordered, here)
+        np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop.colours_along(here.rays()[1]), 0, 1)
+    return milliseconds, sum(len(field) for field, _ in placed)
+
+
+def coarsen_to_budget(terrain: EndlessTerrain, camera: Camera, budget: int) -> EndlessTerrain:
+    """Multiply all level distances by one factor, the largest with which a picture has at most `budget` Gaussians.
+
+    The viewer does the same and also moves the end of the ground nearer. Where the coarsest level alone exceeds the
+    budget, that level is used.
+    """
+    cells, low, high = visibility.visible_cells(terrain, camera), MIN_FACTOR, 1.0
+
+    def scale_distances(factor: float) -> EndlessTerrain:
+        return replace(
+            terrain, switches=[factor * s for s in terrain.switches], bands=[factor * b for b in terrain.bands]
+        )
+
+    if visibility.count_gaussians(terrain, cells).sum() <= budget:
+        return terrain
+    for _ in range(BISECTIONS):
+        middle = float(np.sqrt(low * high))
+        fits = visibility.count_gaussians(scale_distances(middle), cells).sum() <= budget
+        low, high = (middle, high) if fits else (low, middle)
+    return scale_distances(low)
 
 
 def time_page(bundle_dir: Path | str, viewer_dir: Path | str, manifest: dict, settings: FrameSettings) -> list[dict]:

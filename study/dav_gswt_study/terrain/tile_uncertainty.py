@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.images import figures
-from dav_gswt.terrain import choice
+from dav_gswt_study.seams.repetition import tiles_in
 
 MARGIN = 4  # cells shown beyond the walk, on all sides
 BEND = 3.0  # tiles between bends of the walk
@@ -26,7 +26,7 @@ def make_walk(steps: int, length: float) -> Float[Array, "steps 2"]:
 def read_cells(manifest: dict, west: int, south: int, shape: tuple[int, int]) -> tuple[Array, Array]:
     """Uncertainty of the tile in each cell of a window, rows from the south, and whether it keeps all orders."""
     tiles = manifest["tiles"]
-    numbers = choice.tiles_in(west, south, shape, manifest["salt"], len(tiles) // 16)
+    numbers = tiles_in(west, south, shape, manifest["salt"], len(tiles) // 16)
     uncertainty = np.array([tile["uncertainty"] for tile in tiles])
     deep = np.array([len(tile["chunks"][0]["orders"]) == len(manifest["directions"]) for tile in tiles])
     return uncertainty[numbers], deep[numbers]

@@ -58,7 +58,7 @@ def test_a_number_that_is_not_finite_is_found_in_a_table_in_a_field_and_in_a_chu
     path.parent.mkdir()
     code = Encoding.fit([given], 1.0, 0.01)
     rows, order = code.encode(given), np.arange(len(given))[None]
-    entry = chunks.write_chunk(rows, order, tmp_path, "chunks/lod0_tile_00.bin", chunks.ChunkOrders(0, [0]))
+    entry = chunks.write_chunk(rows, order, tmp_path, "chunks/lod0_tile_00.bin", 0, [0])
     beyond = replace(code, log_scale=[1000.0, 1.0])  # the exponential of it is no number
     for encoding, finite in ((code, True), (beyond, False)):
         manifest = {"tiles": [{"chunks": [vars(entry)]}], "encoding": vars(encoding)}

@@ -1,11 +1,22 @@
 import numpy as np
 import pytest
+from fixtures import terrains
 
 from dav_gswt_study.terrain import frames
 
 ASKED = frames.FrameSettings(
     {"kind": "hills", "height": 1, "wavelength": 10}, {"frames": 3, "length": 1, "height": 1}, 48, 32, [900, 300]
 )
+
+
+def test_a_frame_is_coarser_within_a_budget():
+    terrain = terrains.two_level_terrain()
+    camera, manifest = terrains.walking(terrain), terrains.manifest_of(1.0, terrains.MAGENTA)
+    times, whole = frames.time_frame(terrain, camera, manifest, 10**6)
+    assert set(times) == set(frames.PARTS) and min(times.values()) > 0
+    budget = 3 * whole // 4  # the coarsest level alone has half
+    assert whole // 2 < frames.time_frame(terrain, camera, manifest, budget)[1] <= budget
+    assert frames.coarsen_to_budget(terrain, camera, 10**6) is terrain
 
 
 def row_of(renderer: str, budget: int, **times) -> dict:

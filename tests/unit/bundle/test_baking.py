@@ -56,14 +56,6 @@ def test_the_public_renderers_checker_finds_no_fault_with_objects(content, gswt_
     assert done.returncode == 0 and " 0 faults" in done.stdout, done.stdout + done.stderr
 
 
-def test_every_level_has_the_same_objects_and_every_tile_others(content, baked):
-    fine, coarse = ([len(added(content, baked, tile, level)) for tile in range(TILES)] for level in (0, 1))
-    sizes = [len(field) for field in content.objects[0].fields]
-    np.testing.assert_array_equal(np.array(fine) / sizes[0], np.array(coarse) / sizes[1])
-    drawn = [str(added(content, baked, tile).means[:1].tolist()) for tile in range(TILES) if fine[tile]]
-    assert len(set(drawn)) == len(drawn) > 4
-
-
 def test_an_object_wider_than_a_tile_is_left_out(content):
     other = replace(content, objects=[shrub(0.4, 0.2)])
     assert gswt.bake_objects(other, 7) is content.tiles[0].fields  # it stands on the second material
@@ -73,5 +65,5 @@ def test_an_object_wider_than_a_tile_is_left_out(content):
 
 def test_the_archive_has_the_first_material_with_its_objects(content, baked, tmp_path):
     build.write_bundle(content, tmp_path / "b", BundleOptions(tau=0.5, salt=7), {})
-    read = gswt.read_gswt(tmp_path / "b/gswt.zip", SIDE)
-    assert [len(f) for f in read[0]] == [len(f) for f in baked[0]]
+    gswt.write_gswt(baked, SIDE, tmp_path / "baked.zip")
+    assert (tmp_path / "b/gswt.zip").read_bytes() == (tmp_path / "baked.zip").read_bytes()

@@ -122,31 +122,11 @@ def test_the_zip_holds_what_the_public_renderer_reads(bundle, tiles):
     assert (values[:, 9:54] == 0).all() and (values[:, 3:6] == 0).all()
 
 
-def test_the_zip_reads_back_as_the_tiles_and_a_damaged_one_is_refused(bundle, tiles, tmp_path):
-    path = shutil.copy(bundle[0] / "gswt.zip", tmp_path)
-    fields = gswt.read_gswt(path, SIDE)
-    assert [len(level) for level in fields] == [16, 16]
-    for mine, source in zip(fields[1], tiles.fields[1], strict=True):
-        np.testing.assert_allclose(mine.means, source.means, atol=1e-6)
-        np.testing.assert_allclose(mine.log_scales, source.log_scales, atol=1e-6)
-        np.testing.assert_allclose(mine.sh[:, 0], source.sh[:, 0], atol=1e-6)
-        np.testing.assert_allclose(mine.opacity_logits, source.opacity_logits)
-    with zipfile.ZipFile(path, "a") as archive:
-        archive.writestr("notes.txt", b"")
-    with pytest.raises(InputError, match=r"'notes\.txt' is no tile"):
-        gswt.read_gswt(path, SIDE)
-    (tmp_path / "gswt.zip").write_bytes((bundle[0] / "gswt.zip").read_bytes()[:-50])
-    with pytest.raises(InputError, match=r"gswt\.zip: not readable"):
-        gswt.read_gswt(path, SIDE)
-
-
 def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
     fields = [list(level) for level in tiles.fields]
     fields[0][3] = fields[0][3][:0]
-    with pytest.raises(InputError, match="level 0, tile 3"):
-        gswt.write_gswt(fields, SIDE, tmp_path / "gswt.zip")
     broken = TileSet(**{**vars(tiles), "fields": fields})
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match="a tile has no splat"):
         build.write_bundle(one(broken), tmp_path / "b", build.BundleOptions(tau=0.5), {})
     assert not (tmp_path / "b").exists() and not (tmp_path / ".b.part").exists()
 
@@ -155,8 +135,8 @@ def test_the_archive_lacks_levels_that_its_renderer_could_not_take(tiles, tmp_pa
     sizes = [sum(len(field) for field in level) for level in tiles.fields]
     monkeypatch.setattr(gswt, "MAX_SPLATS", sum(sizes[1:]))
     gswt.write_gswt(tiles.fields, SIDE, tmp_path / "gswt.zip")
-    (level,) = gswt.read_gswt(tmp_path / "gswt.zip", SIDE)
-    assert [len(field) for field in level] == [len(field) for field in tiles.fields[1]]
+    with zipfile.ZipFile(tmp_path / "gswt.zip") as archive:
+        assert archive.namelist() == [f"lod0_tile_{t:02d}.ply" for t in range(16)]
     assert "lacks the finest 1 of" in caplog.text
 
 
@@ -218,7 +198,7 @@ def cut(path, end, more=b""):
         pytest.param(lambda f: cut(f / CHUNK, -4, b"else"), "lod0_tile_00.bin: its digest is not", id="altered"),
         pytest.param(twice, "lod0_tile_00.bin: an order does not hold every splat", id="no permutation"),
         pytest.param(lambda f: (f / CHUNK).unlink(), "lod0_tile_00.bin: not readable", id="missing"),
-        pytest.param(lambda f: linked(f / CHUNK), "lod0_tile_00.bin: lies outside of the bundle", id="a link outwards"),
+        pytest.param(lambda f: linked(f / CHUNK), "lod0_tile_00.bin: lies outside of the folder", id="a link outwards"),
         pytest.param(lambda f: rewritten(f, huge), "lod0_tile_00.bin: .* bytes where the manifest says", id="huge"),
         pytest.param(lambda f: rewritten(f, lambda m: m.update(version=1)), "version 3; make", id="another version"),
         pytest.param(lambda f: rewritten(f, lambda m: m.update(format="x")), "format 'davgswt'", id="another format"),

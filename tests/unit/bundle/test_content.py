@@ -1,15 +1,11 @@
 """Bundles of several materials with objects: numbers of tiles, chunks of objects, and refusals."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from fixtures.land_covers import TILES, cover_content
 
 from dav_gswt.bundle import build, manifest, store
-from dav_gswt.bundle.content import BundleContent
 from dav_gswt.errors import InputError
-from dav_gswt.terrain import endless, page, stills
 
 
 @pytest.fixture(scope="module")
@@ -46,36 +42,6 @@ def test_an_object_is_stored_in_the_middle_of_a_tile_and_read_back_about_its_foo
         assert orders.shape[1] == len(source) and len(orders) == len(entry.chunks[level].orders)
     stored = store.chunks.read_chunk(bundle.folder, entry.chunks[0], bundle.manifest.encoding)[0].means
     assert stored[:, :2].mean(0) == pytest.approx([0.5 * content.side] * 2, abs=0.05)
-
-
-def test_the_terrain_of_a_bundle_has_its_classes_and_objects(bundle, content):
-    terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
-    assert terrain.classes.entry == content.classes and terrain.variants == 1
-    assert terrain.scatter.entry == content.scatter
-    assert [len(level) for level in terrain.objects[0]] == [len(f) for f in content.objects[0].fields]
-    image = stills.render_shot(replace(terrain, reach=6), stills.SHOTS[1], bundle.manifest, 64, 36)
-    assert np.isfinite(image).all()
-
-
-def test_a_page_of_several_materials_has_the_rule_of_the_config(bundle, tmp_path):
-    viewer = tmp_path / "viewer"
-    viewer.mkdir()
-    (viewer / "index.html").write_text("<html><!-- modules --><!-- first -->")
-    rule = [{"kind": "height", "material": "grass", "low": 0.5, "soft": 0.2}]
-    page.write_page(bundle.folder, viewer, tmp_path / "page", rule=rule)
-    made = store.read_bundle(tmp_path / "page")
-    (term,) = made.manifest.classes.rule
-    assert term.kind == "height" and made.manifest.materials[term.material].name == "grass"
-    assert made.object_chunk(0, 0)[0].means.shape == bundle.object_chunk(0, 0)[0].means.shape
-
-
-def test_tiles_of_other_sizes_and_objects_with_fewer_levels_are_refused(content):
-    other = replace(content.tiles[1], side=2 * content.side)
-    with pytest.raises(InputError, match="the same tile side"):
-        BundleContent([content.tiles[0], other], content.materials)
-    flat = replace(content.objects[0], fields=content.objects[0].fields[:1])
-    with pytest.raises(InputError, match="2 levels"):
-        replace(content, objects=[flat])
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """Orders: by hand, permutations, depths in steps; directions by tau; how many directions a picture needs."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -31,16 +30,6 @@ def ground(seed, stones=300, colours=1.0):
     )
 
 
-def test_directions_start_in_the_east_go_north_and_end_straight_down():
-    found = DirectionRings((20.0, 45.0), 16).directions()
-    down = np.radians(20)
-    np.testing.assert_allclose(found[0], [np.cos(down), 0, -np.sin(down)], atol=1e-15)
-    np.testing.assert_allclose(found[4], [0, np.cos(down), -np.sin(down)], atol=1e-15)
-    np.testing.assert_allclose(found[16], [np.sqrt(0.5), 0, -np.sqrt(0.5)], atol=1e-15)
-    np.testing.assert_allclose(found[-1], [0, 0, -1])
-    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, rtol=1e-15)
-
-
 def test_tau_0_keeps_all_orders_of_every_tile_tau_1_of_none_and_their_number_never_rises():
     rings = DirectionRings()
     for u in (0.0, 0.3, 1.0):
@@ -48,8 +37,6 @@ def test_tau_0_keeps_all_orders_of_every_tile_tau_1_of_none_and_their_number_nev
         counts = [len(rings.select_directions(u, tau)) for tau in (0.0, 0.2, 0.3, 0.31, 0.9, 1.0)]
         assert counts == sorted(counts, reverse=True)
     assert DirectionRings((20.0, 45.0), 8).select_directions(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
-    with pytest.raises(ValueError, match="uncertainty"):
-        rings.select_directions(float("nan"), 0.5)
 
 
 def test_order_runs_from_back_to_front_and_is_stable():
@@ -92,18 +79,19 @@ def test_a_picture_in_its_own_order_is_the_rasterizer_s():
 
 
 def test_one_colour_needs_the_fewest_directions():
-    rings, decibels = direction_search.search_directions([ground(0, colours=0.0)], SIDE, 40.0)
-    assert rings == DirectionRings((20.0,), 2 * direction_search.MIN_AZIMUTHS) and set(decibels) == {
-        "walker",
-        "oblique",
-    }
+    rings = direction_search.search_directions([ground(0, colours=0.0)], SIDE, 40.0)
+    assert rings == DirectionRings((20.0,), 2 * direction_search.MIN_AZIMUTHS)
 
 
 def test_directions_are_added_until_the_error_is_small_or_the_room_is_full(monkeypatch):
     monkeypatch.setattr(direction_search, "VIEWS", 2)
     fields = [ground(seed, stones=150) for seed in range(2)]
-    (few, good), (many, bad) = (direction_search.search_directions(fields, SIDE, wanted) for wanted in (15.0, 60.0))
+    few, many = (direction_search.search_directions(fields, SIDE, wanted) for wanted in (15.0, 60.0))
     first, last = (len(rings.select_directions(0.0, 1.0)) for rings in (few, many))
     assert first < last <= direction_search.MAX_ORDERS
-    assert min(good.values()) >= 15.0
-    assert min(bad.values()) < 60.0, "no room for what this asks for"
+    good, bad = (
+        min(direction_search.measure_psnr(fields, SIDE, kept, down) for down in direction_search.ELEVATIONS.values())
+        for kept in (DirectionRings(rings.elevations, rings.azimuths // 2) for rings in (few, many))
+    )
+    assert good >= 15.0
+    assert bad < 60.0, "no room for what this asks for"

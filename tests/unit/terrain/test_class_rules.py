@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import pytest
 from fixtures.land_covers import SIDE, two_classes
+from fixtures.terrains import manifest_of
 
-from dav_gswt.bundle.land_cover import ObjectOrders, RangeTerm, ScatterEntry
-from dav_gswt.bundle.manifest import MaterialEntry, TileSetInfo
+from dav_gswt.bundle.land_cover import ObjectEntry, RangeTerm, ScatterEntry
+from dav_gswt.bundle.manifest import MaterialEntry
 from dav_gswt.errors import InputError
-from dav_gswt.terrain import class_rules
 from dav_gswt.terrain.class_rules import apply_rule, read_paint
 
 NAMES = ["sand", "grass"]
@@ -20,10 +20,10 @@ FILE = {"format": "davgswt-paint", "version": 1, "materials": ["grass", "sand"],
 @pytest.fixture
 def manifest():
     materials = [MaterialEntry("sand", 0.6, 0, [0.5] * 3), MaterialEntry("grass", 0.4, 16, [0.5] * 3)]
-    shrub = ObjectOrders("shrub", 0.4, [0.0, 1.0], 0.0, 1, 0.1, 0.3, [])
+    shrub = ObjectEntry("shrub", 0.4, [0.0, 1.0], 0.0, 1, 0.1, 0.3, [])
     objects = [shrub, replace(shrub, name="stone", material=0), replace(shrub, name="tuft")]
     cover = {"classes": two_classes(), "objects": objects, "scatter": ScatterEntry(4, 15.0, 0.15, 7)}
-    return TileSetInfo(SIDE, 7, 1.0, [0.5] * 3, [], [], [], materials, **cover)
+    return replace(manifest_of(1.0, [0.5] * 3), materials=materials, **cover)
 
 
 @pytest.fixture
@@ -33,12 +33,6 @@ def write(tmp_path):
         return {"kind": "painted", "file": str(tmp_path / "painted.json")}
 
     return write
-
-
-def test_the_default_is_the_noise_of_the_bundle(manifest):
-    assert apply_rule(manifest, class_rules.NOISE) == manifest
-    changed = apply_rule(manifest, [{"kind": "noise", "weight": 0.5}])
-    assert changed.classes.rule[0].weight == 0.5
 
 
 def test_heights_are_given_in_tile_sides_and_slopes_as_they_are(manifest):
@@ -82,13 +76,6 @@ def test_no_more_objects_stand_than_there_is_room_for(manifest, write):
     dense = replace(manifest, scatter=replace(manifest.scatter, cells=64))
     made = apply_rule(dense, [{"kind": "noise"}, entry])
     assert 64**2 * sum(each.probability for each in made.objects) == pytest.approx(512), "what the page draws on a tile"
-
-
-def test_with_one_material_densities_count_alone(manifest, write):
-    objects = [replace(each, material=0) for each in manifest.objects]
-    alone = replace(manifest, materials=manifest.materials[:1], classes=None, objects=objects)
-    made = apply_rule(alone, [{"kind": "noise"}, write(materials=["sand"], runs=[], densities={"stone": 0})])
-    assert made.classes is None and made.objects[1].probability == 0
 
 
 @pytest.mark.parametrize(

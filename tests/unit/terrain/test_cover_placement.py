@@ -8,20 +8,19 @@ from fixtures.land_covers import GRASS, SAND, SIDE, TILES, cover_content
 from fixtures.terrains import HILLS, SKY, walking
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.bundle.build import BundleOptions, describe_tiles
-from dav_gswt.bundle.orders import DirectionRings
+from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.lod.merge import compute_covariances
 from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain import endless, placement, stills, visibility
-from dav_gswt.terrain.scatter import concatenate_instances
+from dav_gswt.terrain.scatter import Instances
 
 MAGENTA = [1.0, 0.0, 1.0]
 
 
 @pytest.fixture(scope="module")
-def cover():
+def cover(tmp_path_factory):
     content = cover_content()
-    info = describe_tiles(content, BundleOptions(tau=0.5, salt=7), DirectionRings((20.0,), 8))
+    info = write_bundle(content, tmp_path_factory.mktemp("cover") / "b", BundleOptions(tau=0.5, salt=7), {})
     fields = [content.tile_fields(level) for level in range(content.levels)]
     objects = [each.fields for each in content.objects]
     return replace(endless.terrain_from_fields(fields, info, {"kind": "flat"}, objects), reach=10)
@@ -78,7 +77,7 @@ def test_an_object_is_turned_and_scaled_about_its_foot(cover):
 
 def test_every_visible_foot_is_drawn_once(cover, seen):
     _, cells, things = seen
-    drawn = concatenate_instances(list(things.values()))
+    drawn = Instances.concatenate(list(things.values()))
     every = cover.scatter.instances_in(cells.i, cells.j)
     assert len(drawn) == len(every) > 20
     assert sorted(drawn.u.tolist()) == sorted(every.u.tolist())
@@ -122,14 +121,3 @@ def test_an_object_stands_on_the_surface(cover, seen):
     assert tall.any()
     height, _ = HILLS.at(flat.means[tall, 0].astype(float) + eye[0], flat.means[tall, 1].astype(float) + eye[1])
     assert raised.means[tall, 2] - flat.means[tall, 2] == pytest.approx(height, abs=1e-3)
-
-
-def test_a_budget_counts_objects(cover, bare, seen):
-    cells = seen[1]
-    without, counts = (visibility.count_gaussians(terrain, cells) for terrain in (bare, cover))
-    levels = visibility.active_levels(cover, cells)
-    more = np.zeros(len(cells), int)
-    for n, cell in enumerate(zip(cells.i, cells.j, strict=True)):
-        found = cover.scatter.instances_in(*(np.array([v]) for v in cell))
-        more[n] = sum(len(cover.objects[k][lv]) for k in found.number for lv in np.flatnonzero(levels[:, n]))
-    np.testing.assert_array_equal(counts - without, more)

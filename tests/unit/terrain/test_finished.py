@@ -1,5 +1,7 @@
 """Pieces of finished terrains: a page folder as a terrain in Python, and a finite piece against what is drawn of it."""
 
+import hashlib
+
 import numpy as np
 import pytest
 from fixtures.finite_cells import collect_cells
@@ -10,7 +12,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.images.metrics import psnr
 from dav_gswt.raster import render
-from dav_gswt.terrain import endless, finite, heights, scatter, stills
+from dav_gswt.terrain import endless, heights, stills
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills, make_sphere
 from dav_gswt.terrain.page import write_page
 
@@ -19,6 +21,7 @@ SURFACES = {
     "hills": Hills(2.0, 30.0),
     "image": HeightMap(np.random.default_rng(1).uniform(0, 3, (9, 7)).astype(np.float32), 60.0),
 }
+NOT_FINITE = np.full((9, 7), np.nan, np.float32).tobytes()
 HILLS = {"kind": "hills", "height": 0.4, "wavelength": 4}
 RULE = [{"kind": "noise"}, {"kind": "height", "material": "grass", "low": 0.1, "soft": 0.2}]
 
@@ -48,19 +51,19 @@ def test_a_surface_that_was_described_reads_back(tmp_path, surface):
 @pytest.mark.parametrize(
     "changes, said",
     [
-        ({"rows": 10}, "bytes instead of"),
+        ({"rows": 10}, "bytes where the manifest says"),
         ({"rows": 0}, "a size is out of range"),
         ({"rows": "many"}, "make no sense"),
-        ({"file": "../heights.bin"}, "does not lie beside it"),
-        ({"file": "nowhere.bin"}, "missing"),
-        ({"file": "nan.bin", "sha256": None}, "not finite"),
-        ({"sha256": "0" * 64}, "damaged"),
+        ({"file": "../heights.bin"}, "lies outside"),
+        ({"file": "nowhere.bin"}, "not readable"),
+        ({"file": "nan.bin", "sha256": hashlib.sha256(NOT_FINITE).hexdigest()}, "not finite"),
+        ({"sha256": "0" * 64}, "its digest is not"),
     ],
 )
 def test_a_surface_that_is_damaged_is_named(tmp_path, changes, said):
     entry, pixels = SURFACES["image"].describe()
     (tmp_path / "heights.bin").write_bytes(pixels)
-    (tmp_path / "nan.bin").write_bytes(pixels[:-4] + np.float32(np.nan).tobytes())
+    (tmp_path / "nan.bin").write_bytes(NOT_FINITE)
     with pytest.raises(InputError, match=said):
         heights.read_surface(tmp_path, entry | changes, 4.0)
 
@@ -86,17 +89,3 @@ def test_it_looks_as_the_terrain_does(bundle, surface, corner):
     near = cameras.pinhole(eye - origin, eye - origin + [0.3, 0.2, -1.0], 96, 96, 40.0)
     assert psnr(render(field, near).colour, expected, np.ones((96, 96))) > 35
     assert np.abs(field.means[:, :2]).max() < 10 * SIDE, "positions count from the corner"
-
-
-def test_a_wide_area_is_counted_in_slices(bundle, monkeypatch):
-    """The same counts and blocks, while no more cells are known at a time than a slice has."""
-    area = finite.Area(-7, 3, 8, 7)
-    whole = endless.terrain_from_bundle(bundle, HILLS)
-    counts = finite.count_cells(whole, area, 0)
-    monkeypatch.setattr(finite, "SLICE", 20)
-    monkeypatch.setattr(scatter, "CACHED", 40)
-    sliced = endless.terrain_from_bundle(bundle, HILLS)
-    np.testing.assert_array_equal(finite.count_cells(sliced, area, 0), counts)
-    assert len(sliced.scatter._known) <= 40
-    blocks = finite.list_blocks(sliced, area, 0)
-    assert sum(map(len, blocks)) == len(counts) and len(sliced.scatter._known) <= 40

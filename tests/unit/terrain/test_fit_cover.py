@@ -7,7 +7,7 @@ import pytest
 from fixtures.land_covers import SIDE, cover_content, shrub
 
 from dav_gswt.bundle.content import BundleContent
-from dav_gswt.bundle.land_cover import ObjectOrders
+from dav_gswt.bundle.land_cover import ObjectEntry
 from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.terrain import fit_cover as fits
 from dav_gswt.terrain.classes import Classes
@@ -85,7 +85,7 @@ def test_every_object_has_its_density_in_another_window():
     things = [shrub(0.4, 0.1), replace(shrub(0.25, 0.06, 0), name="stone")]
     fitted = fit_cover(replace(cover_content(), objects=things), 7)
     entries = [
-        ObjectOrders(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, p, [])
+        ObjectEntry(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, p, [])
         for each, p in zip(fitted.objects, fitted.probabilities, strict=True)
     ]
     scatter = Scatter(fitted.scatter, entries, SIDE, Classes(fitted.classes, 2, SIDE))
@@ -100,7 +100,3 @@ def test_objects_may_stand_on_the_only_material():
     one = replace(content, tiles=content.tiles[:1], materials=[replace(content.materials[0], share=1.0)])
     made = fit_cover(replace(one, objects=[shrub(0.3, 0.2, 0)]), 7)
     assert made.classes is None and made.scatter is not None and 0 < made.probabilities[0] <= 1
-
-
-def test_probabilities_of_one_material_sum_to_1_at_most():
-    assert fits._cap(np.array([0.9, 0.9, 0.5]), np.array([0, 0, 1])) == pytest.approx([0.5, 0.5, 0.5])

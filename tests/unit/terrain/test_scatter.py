@@ -9,7 +9,7 @@ import pytest
 from fixtures.land_covers import SIDE, two_classes
 from scipy.spatial import cKDTree
 
-from dav_gswt.bundle.land_cover import ClassesEntry, ObjectOrders, ScatterEntry
+from dav_gswt.bundle.land_cover import ClassesEntry, ObjectEntry, ScatterEntry
 from dav_gswt.files import parse_record
 from dav_gswt.terrain.classes import Classes
 from dav_gswt.terrain.scatter import Scatter
@@ -19,7 +19,7 @@ WINDOW = 24  # tiles
 
 
 def thing(radius, material=0, probability=0.5):
-    return ObjectOrders("thing", radius, [0.0, 1.0], 0.0, material, 0.1, probability, [])
+    return ObjectEntry("thing", radius, [0.0, 1.0], 0.0, material, 0.1, probability, [])
 
 
 def window_of(scatter, west=0, south=0, size=WINDOW):

@@ -5,8 +5,7 @@ import pytest
 from fixtures.terrains import MAGENTA, SKY, walking
 
 from dav_gswt.bundle.manifest import Sky
-from dav_gswt.terrain import placement, stills, visibility
-from dav_gswt.terrain.stills import FrameTiming
+from dav_gswt.terrain import stills
 
 
 @pytest.mark.parametrize("shot", stills.SHOTS, ids=lambda shot: shot.name)
@@ -44,25 +43,3 @@ def test_tile_by_tile_is_nearly_the_exactly_sorted_picture(stony):
     assert 0 < error < 10**-3  # above 30 dB where four tiles show, each with a hundred stones
     above = walking(stony, 89.99, 2.0, at=(1.5, 1.5))
     np.testing.assert_array_equal(*(stills.render_view(stony, above, SKY, MAGENTA, exact) for exact in (False, True)))
-
-
-def test_a_cell_takes_the_kept_order_whose_direction_on_its_slope_is_nearest(hilly):
-    eye = np.array([3.0, -2.0, 20.0])
-    for i, j in ((5, 1), (-4, 7), (2, -9)):
-        centre = np.array([[4.0 * i + 2], [4.0 * j + 2]])
-        height, slope = hilly.heights.at(*centre)
-        to = np.array([*centre[:, 0], height[0] + 0.2]) - eye
-        kept = hilly.directions[hilly.tile_orders[3]]
-        turned = kept + kept[:, 2:] * [*slope[0], 0]  # J^T d
-        nearest = kept[np.argmax(turned @ to)]
-        np.testing.assert_array_equal(placement.cell_direction(hilly, i, j, 3, eye), nearest)
-
-
-def test_a_picture_is_the_same_measured_or_not_and_coarser_within_a_budget(terrain):
-    camera, whole, least = walking(terrain), FrameTiming(), FrameTiming()
-    plain, timed = (stills.render_view(terrain, camera, SKY, MAGENTA, timing=timing) for timing in (None, whole))
-    assert (plain == timed).all() and set(whole.milliseconds) == {"update", "sort", "render"}
-    budget = 3 * whole.gaussians // 4  # the coarsest level alone has half
-    stills.render_view(visibility.coarsen_to_budget(terrain, camera, budget), camera, SKY, MAGENTA, timing=least)
-    assert whole.gaussians // 2 < least.gaussians <= budget
-    assert visibility.coarsen_to_budget(terrain, camera, 10**6) is terrain

@@ -10,7 +10,7 @@ from fixtures.terrains import SIDE, walking
 from dav_gswt.bundle import orders
 from dav_gswt.reconstruction import discs
 from dav_gswt.terrain import draw_order, placement, visibility
-from dav_gswt.terrain.draw_order import crossfade_opacity, finer_share, level_weights
+from dav_gswt.terrain.draw_order import crossfade_opacity, level_weights
 
 FOLDER = Path(__file__).parents[2] / "golden"
 GOLDEN = json.loads((FOLDER / "draw_order.json").read_text())
@@ -42,14 +42,6 @@ def test_what_the_camera_sees_is_there(request, surface, pitch, height):
     assert met_by_rays(shown.heights, camera, shown.reach * SIDE) <= set(
         zip(cells.i.tolist(), cells.j.tolist(), strict=True)
     )
-
-
-def test_levels_follow_the_distance(terrain):
-    camera = walking(terrain)
-    cells = visibility.visible_cells(terrain, camera)
-    levels = visibility.active_levels(terrain, cells)
-    assert (levels[0] == (cells.nearest <= 22)).all() and (levels[1] == (cells.farthest >= 18)).all()
-    assert (levels.all(0)).any() and levels.any(0).all()
 
 
 def test_too_many_gaussians_go_farthest_first(terrain):
@@ -117,10 +109,3 @@ def test_opacities_are_those_shared_with_the_page():
         np.array([e[key] for e in WEIGHTS["opacities"]]) for key in ("opacity", "weight", "drawn")
     )
     np.testing.assert_allclose(crossfade_opacity(opacity, weight), drawn, rtol=1e-12, atol=0)
-
-
-def test_the_band_is_worked_by_hand():
-    distance = np.array([8.0, 9.0, 9.5, 10.0, 10.5, 11.0, 12.0])
-    assert finer_share(distance, 10.0, 1.0).tolist() == [1, 1, 0.75, 0.5, 0.25, 0, 0]
-    assert finer_share(distance, 10.0, 1.0, True).tolist() == [1, 1, 0.84375, 0.5, 0.15625, 0, 0]
-    assert finer_share(distance, 10.0, 0.0).tolist() == [1, 1, 1, 0.5, 0, 0, 0]

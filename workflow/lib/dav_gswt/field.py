@@ -1,8 +1,10 @@
 """`GaussianField`, the arrays of a 3D Gaussian splat, and the standard 3DGS PLY that stores them."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
@@ -17,8 +19,28 @@ HEADER_BYTES = 1 << 16  # a header is no longer than this
 ROUNDING = 1e-5  # that an uncertainty may lie outside 0 to 1
 
 
+R = TypeVar("R", bound="Rows")
+
+
 @dataclass(frozen=True)
-class GaussianField:
+class Rows:
+    """A base of dataclasses whose fields are arrays with a row for each thing."""
+
+    def __len__(self) -> int:
+        return len(getattr(self, fields(self)[0].name))
+
+    def __getitem__(self: R, index: slice | Array) -> R:
+        """The rows that a mask, a slice or an index array selects."""
+        return type(self)(*(getattr(self, f.name)[index] for f in fields(self)))
+
+    @classmethod
+    def concatenate(cls: type[R], parts: Sequence[R]) -> R:
+        """The rows of all parts, in their order."""
+        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+
+
+@dataclass(frozen=True)
+class GaussianField(Rows):
     """n Gaussians in the world frame: z up, in the scene's unit of length.
 
     log_scales: natural logarithms of the standard deviations along the axes of `quats`.
@@ -43,13 +65,6 @@ class GaussianField:
         if self.imagined is None:
             object.__setattr__(self, "imagined", np.zeros(len(self.means), bool))
 
-    def __len__(self) -> int:
-        return len(self.means)
-
-    def __getitem__(self, index: slice | Array) -> "GaussianField":
-        """The Gaussians that a mask, a slice or an index array selects."""
-        return GaussianField(*(getattr(self, f.name)[index] for f in fields(self)))
-
     @property
     def sh_degree(self) -> int:
         """Degree of the spherical harmonics."""
@@ -63,7 +78,7 @@ class GaussianField:
 
 def concatenate_fields(parts: list[GaussianField]) -> GaussianField:
     """One field of all parts, in their order."""
-    return GaussianField(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(GaussianField)))
+    return GaussianField.concatenate(parts)
 
 
 def mean_scale(parts: list[GaussianField]) -> float:

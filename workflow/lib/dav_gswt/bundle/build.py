@@ -1,6 +1,7 @@
 """Make a bundle of tiles and objects: chunks, archive and manifest, which appear together or not at all."""
 
 import shutil
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,18 +10,11 @@ from typing import Any
 import numpy as np
 
 from dav_gswt.bundle import chunks, direction_search, gswt, level_distances, manifest, orders
-from dav_gswt.bundle.chunks import ChunkOrders
+from dav_gswt.bundle.chunks import ChunkEntry
 from dav_gswt.bundle.content import BundleContent, compute_ground_colour
 from dav_gswt.bundle.encoding import Encoding
-from dav_gswt.bundle.land_cover import ObjectEntry, ObjectOrders
-from dav_gswt.bundle.manifest import (
-    Manifest,
-    MaterialEntry,
-    Sky,
-    TileEntry,
-    TileOrders,
-    TileSetInfo,
-)
+from dav_gswt.bundle.land_cover import ObjectEntry
+from dav_gswt.bundle.manifest import Manifest, MaterialEntry, Sky, TileEntry
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, mean_scale
 from dav_gswt.files import write_json
@@ -39,8 +33,7 @@ class BundleOptions:
         unit: of lengths, for display.
         level_pixels: mean standard deviation of a level, in pixels, where it takes over from its finer neighbour.
         band: half the width of that cross-fade, as a share of the distance.
-        decibels: PSNR from which drawing in a neighbour's order counts as invisible.
-        threads: that sort tiles; they change no byte. From two on the archive is written beside them.
+        threads: that sort tiles; they change no byte.
     """
 
     tau: float
@@ -48,7 +41,6 @@ class BundleOptions:
     unit: str = "metre"
     level_pixels: float = 1.0
     band: float = 0.1
-    decibels: float = 40.0
     threads: int = 1
 
 
@@ -68,16 +60,8 @@ def write_bundle(
     shutil.rmtree(part, ignore_errors=True)
     (part / "chunks").mkdir(parents=True)
     try:
-        with ThreadPoolExecutor(1) as beside:
-            archive = beside.submit(
-                lambda: gswt.write_gswt(gswt.bake_objects(content, options.salt), content.side, part / gswt.NAME)
-            )
-            if options.threads == 1:
-                archive.result()
-            try:
-                made = _write_content(content, options, provenance, part)
-            finally:
-                archive.result()  # what it raises says more of the tiles than what else they made fail
+        made = _write_content(content, options, provenance, part)
+        gswt.write_gswt(gswt.bake_objects(content, options.salt), content.side, part / gswt.NAME)
         value = made.to_dict()
         Manifest.from_dict(value)
         write_json(part / manifest.NAME, value)
@@ -88,13 +72,46 @@ def write_bundle(
 
 
 def _write_content(content: BundleContent, options: BundleOptions, provenance: dict[str, Any], part: Path) -> Manifest:
-    """Write the chunks; returns the manifest."""
-    rings, _ = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
-    info = describe_tiles(content, options, rings)
-    encoding = Encoding.fit(list(content.iterate_fields()), content.side, content.spacing / FLOOR_PIXELS)
-    known: dict[str, Any] = vars(info) | _write_chunks(content, encoding, info, options, part)
+    """Write the chunks; returns the manifest. Raises: InputError: mean scales that do not rise, an empty tile."""
+    levels = [content.tile_fields(level) for level in range(content.levels)]
+    tiles = list(zip(*levels, strict=True))
+    heights = [_measure_heights(fields) for fields in tiles]
+    uncertainties = [u for same in content.tiles for u in np.clip(same.uncertainty, 0, 1).tolist()]
+    # the materials in turn: of what errors are measured on each has its share
+    in_turn = [each for same in zip(*(own.fields[0] for own in content.tiles), strict=True) for each in same]
+    rings = direction_search.search_directions(in_turn, content.side)
+    table = level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band)
+    objects = list(zip(*(content.object_fields(level) for level in range(content.levels)), strict=True))
+    sources = [(f"tile_{number:02d}", *each) for number, each in enumerate(zip(uncertainties, tiles, strict=True))]
+    sources += [
+        (f"object_{number:02d}", float(np.clip(fields[0].uncertainty.mean(), 0, 1)), fields)
+        for number, fields in enumerate(objects)
+    ]
+    everything = [field for fields in (*tiles, *objects) for field in fields]
+    encoding = Encoding.fit(everything, content.side, content.spacing / FLOOR_PIXELS)
+    written = _write_chunks(sources, encoding, rings, options, part)
+    count, things = len(content.tiles[0].labels), []
+    for each, probability, own in zip(content.objects, content.probabilities, written[len(tiles) :], strict=True):
+        ground, z = content.ground_height(each.material), _measure_heights(each.fields)
+        things.append(ObjectEntry(each.name, each.radius, z, ground, each.material, each.density, probability, own))
     return Manifest(
-        **known,
+        tile_side=content.side,
+        salt=options.salt,
+        eye_floor=level_distances.compute_eye_floor(content.spacing, FLOOR_PIXELS),
+        ground_colour=content.ground_colour(),
+        directions=rings.directions().tolist(),
+        levels=table,
+        tiles=[
+            TileEntry(tile, *each)
+            for tile, each in enumerate(zip(uncertainties, heights, written[: len(tiles)], strict=True))
+        ],
+        materials=[
+            MaterialEntry(material.name, material.share, number * count, compute_ground_colour(same.fields[-1]))
+            for number, (material, same) in enumerate(zip(content.materials, content.tiles, strict=True))
+        ],
+        classes=content.classes,
+        objects=things or None,
+        scatter=content.scatter,
         format=manifest.FORMAT,
         version=manifest.VERSION,
         unit=options.unit,
@@ -104,49 +121,30 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
     )
 
 
-def describe_tiles(content: BundleContent, options: BundleOptions, rings: orders.DirectionRings) -> TileSetInfo:
-    """How tiles and objects are placed and drawn.
+def _write_chunks(
+    sources: Sequence[tuple[str, float, Sequence[GaussianField]]],
+    encoding: Encoding,
+    rings: orders.DirectionRings,
+    options: BundleOptions,
+    part: Path,
+) -> list[list[ChunkEntry]]:
+    """Write the chunks of tiles and objects, of which the name, the mean uncertainty and the levels are given."""
+    along = rings.directions()
 
-    Raises: InputError: mean scales that do not rise, an empty tile.
-    """
-    levels = [content.tile_fields(level) for level in range(content.levels)]
-    uncertainties = [u for tiles in content.tiles for u in np.clip(tiles.uncertainty, 0, 1).tolist()]
-    count = len(content.tiles[0].labels)
-
-    def keep_orders(uncertainty: float) -> list[ChunkOrders]:
+    def write(source: tuple[str, float, Sequence[GaussianField]]) -> list[ChunkEntry]:
+        (name, uncertainty, fields), entries = source, []
         kept = rings.select_directions(uncertainty, options.tau)
-        return [ChunkOrders(level, kept) for level in range(content.levels)]
+        for level, field in enumerate(fields):
+            rows, order = encoding.encode(field), orders.presort(field.means, along[kept])
+            entries.append(chunks.write_chunk(rows, order, part, f"chunks/lod{level}_{name}.bin", level, kept))
+        return entries
 
-    objects = []
-    for each, probability in zip(content.objects, content.probabilities, strict=True):
-        uncertainty = float(np.clip(each.fields[0].uncertainty.mean(), 0, 1))
-        ground, z = content.ground_height(each.material), _measure_heights(each.fields)
-        place = (each.name, each.radius, z, ground, each.material, each.density, probability)
-        objects.append(ObjectOrders(*place, keep_orders(uncertainty)))
-    return TileSetInfo(
-        tile_side=content.side,
-        salt=options.salt,
-        eye_floor=level_distances.compute_eye_floor(content.spacing, FLOOR_PIXELS),
-        ground_colour=content.ground_colour(),
-        directions=rings.directions().tolist(),
-        levels=level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band),
-        tiles=[
-            TileOrders(
-                tile, uncertainty, _measure_heights([fields[tile] for fields in levels]), keep_orders(uncertainty)
-            )
-            for tile, uncertainty in enumerate(uncertainties)
-        ],
-        materials=[
-            MaterialEntry(material.name, material.share, number * count, compute_ground_colour(tiles.fields[-1]))
-            for number, (material, tiles) in enumerate(zip(content.materials, content.tiles, strict=True))
-        ],
-        classes=content.classes,
-        objects=objects or None,
-        scatter=content.scatter,
-    )
+    with ThreadPoolExecutor(options.threads) as pool:
+        named = zip(progress(sources, "sort tiles"), pool.map(write, sources), strict=True)
+        return [entries for _, entries in named]
 
 
-def _measure_heights(levels: list[GaussianField]) -> list[float]:
+def _measure_heights(levels: Sequence[GaussianField]) -> list[float]:
     """Lowest and highest z of the splats, with three of their largest standard deviations around each centre."""
     low, high = np.inf, -np.inf
     for own in levels:
@@ -155,38 +153,6 @@ def _measure_heights(levels: list[GaussianField]) -> list[float]:
         z, radius = own.means[:, 2].astype(float), 3 * np.exp(own.log_scales.astype(float).max(1))
         low, high = min(low, float((z - radius).min())), max(high, float((z + radius).max()))
     return [low, high]
-
-
-def _write_chunks(
-    content: BundleContent, encoding: Encoding, info: TileSetInfo, options: BundleOptions, part: Path
-) -> dict[str, list]:
-    """Write all chunks; returns the entries of tiles and objects in the manifest."""
-    along = np.array(info.directions)
-    tiles = [content.tile_fields(level) for level in range(content.levels)]
-    things = [content.object_fields(level) for level in range(content.levels)]
-    objects = list(info.objects or [])
-    sources = [(f"tile_{t.tile:02d}", kept, tiles[kept.level][t.tile]) for t in info.tiles for kept in t.chunks]
-    sources += [
-        (f"object_{number:02d}", kept, things[kept.level][number])
-        for number, each in enumerate(objects)
-        for kept in each.chunks
-    ]
-
-    def write(source: tuple[str, ChunkOrders, GaussianField]) -> chunks.ChunkEntry:
-        name, kept, field = source
-        rows, order = encoding.encode(field), orders.presort(field.means, along[kept.orders])
-        return chunks.write_chunk(rows, order, part, f"chunks/lod{kept.level}_{name}.bin", kept)
-
-    with ThreadPoolExecutor(options.threads) as pool:
-        written = [entry for _, entry in zip(progress(sources, "sort tiles"), pool.map(write, sources), strict=True)]
-    groups = iter([written[first : first + content.levels] for first in range(0, len(written), content.levels)])
-    entries: dict[str, list] = {
-        "tiles": [TileEntry(tile.tile, tile.uncertainty, tile.z, next(groups)) for tile in info.tiles]
-    }
-    if objects:
-        known: list[dict[str, Any]] = [vars(each) | {"chunks": next(groups)} for each in objects]
-        entries["objects"] = [ObjectEntry(**values) for values in known]
-    return entries
 
 
 def _move_in(part: Path, out: Path) -> None:

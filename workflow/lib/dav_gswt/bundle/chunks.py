@@ -24,24 +24,19 @@ from dav_gswt.bundle.orders import index_type
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 
-Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-
 
 @dataclass(frozen=True)
-class ChunkOrders(Entry):
-    """Which directions a tile at one level keeps orders for: indices into the manifest's `directions`."""
+class ChunkEntry(Entry):
+    """A chunk in the manifest: its path relative to the manifest, size and digest of the file, number of splats.
+
+    orders: the directions that it keeps orders for, as indices into the manifest's `directions`.
+    """
 
     level: Natural
     orders: Annotated[list[Natural], Field(min_length=1)]
-
-
-@dataclass(frozen=True)
-class ChunkEntry(ChunkOrders):
-    """A chunk in the manifest: its path relative to the manifest, size and digest of the file, number of splats."""
-
     file: Annotated[str, Field(pattern=r"^chunks/[A-Za-z0-9_]+\.bin$")]
     bytes: Natural
-    sha256: Digest
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     count: Annotated[int, Field(ge=1)]
 
 
@@ -51,13 +46,36 @@ def chunk_size(count: int, orders: int) -> int:
 
 
 def write_chunk(
-    rows: Array, order: Integer[Array, "d n"], folder: Path | str, file: str, kept: ChunkOrders
+    rows: Array, order: Integer[Array, "d n"], folder: Path | str, file: str, level: int, kept: list[int]
 ) -> ChunkEntry:
-    """Write records and orders to `file` in a bundle's folder; returns the chunk's entry in the manifest."""
+    """Write records and orders to `file` in a bundle's folder; returns the chunk's entry in the manifest.
+
+    kept: the directions of the orders.
+    """
     data = rows.tobytes() + order.astype(index_type(len(rows))).tobytes()
     (Path(folder) / file).write_bytes(data)
     digest = hashlib.sha256(data).hexdigest()
-    return ChunkEntry(kept.level, kept.orders, file, len(data), digest, len(rows))
+    return ChunkEntry(level, kept, file, len(data), digest, len(rows))
+
+
+def read_exactly(folder: Path | str, name: str, size: int, sha256: str) -> bytes:
+    """The bytes of a file of a bundle or a page.
+
+    Raises: InputError: the file lies outside of the folder, is missing, has another size (checked before anything is
+    read) or another digest.
+    """
+    path = Path(folder) / name
+    if not path.resolve().is_relative_to(Path(folder).resolve()):
+        raise InputError(f"{path}: lies outside of the folder; make the bundle again")
+    try:
+        if (found := path.stat().st_size) != size:
+            raise InputError(f"{path}: {found} bytes where the manifest says {size}; make the bundle again")
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: not readable ({error.strerror}); make the bundle again") from None
+    if hashlib.sha256(data).hexdigest() != sha256:
+        raise InputError(f"{path}: its digest is not the manifest's; make the bundle again")
+    return data
 
 
 def read_chunk(
@@ -65,24 +83,13 @@ def read_chunk(
 ) -> tuple[GaussianField, Integer[Array, "d n"]]:
     """Read the splats of a chunk, as they were rounded, and its orders. Ground and uncertainty are not stored.
 
-    Raises: InputError: the file lies outside of the folder, is missing, has another size (checked before anything
-    is read) or digest than the manifest says, or an order does not hold every splat once.
+    Raises: InputError: see `read_exactly`; an order does not hold every splat once.
     """
-    folder = Path(folder)
-    path, count, kept = folder / entry.file, entry.count, len(entry.orders)
-    if not path.resolve().is_relative_to(folder.resolve()):
-        raise InputError(f"{path}: lies outside of the bundle; make the bundle again")
-    try:
-        size = path.stat().st_size
-        if size != entry.bytes or size != chunk_size(count, kept):
-            raise InputError(f"{path}: {size} bytes where the manifest says {entry.bytes}; make the bundle again")
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: not readable ({error.strerror}); make the bundle again") from None
-    if len(data) != size or hashlib.sha256(data).hexdigest() != entry.sha256:
-        raise InputError(f"{path}: its digest is not the manifest's; make the bundle again")
+    count, kept = entry.count, len(entry.orders)
+    data = read_exactly(folder, entry.file, chunk_size(count, kept), entry.sha256)
     rows = np.frombuffer(data, RECORD, count)
     order = np.frombuffer(data, index_type(count), offset=count * RECORD.itemsize).reshape(kept, count)
-    if kept and (np.sort(order, axis=1, kind="stable") != np.arange(count)).any():
+    if (np.sort(order, axis=1, kind="stable") != np.arange(count)).any():
+        path = Path(folder) / entry.file
         raise InputError(f"{path}: an order does not hold every splat once; make the bundle again")
     return encoding.decode(rows), order

@@ -1,13 +1,11 @@
 """What a bundle is made of: a tile set for each material, and objects."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from dav_gswt.bundle.land_cover import ClassesEntry, ScatterEntry
 from dav_gswt.bundle.manifest import ONLY_MATERIAL
-from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.materials.model import MaterialInfo, ObjectLevels
 from dav_gswt.tiles.build import TileSet
@@ -38,16 +36,6 @@ class BundleContent:
         colour = compute_ground_colour(tiles.fields[-1])
         return cls([tiles], [MaterialInfo(ONLY_MATERIAL, 1.0, tiles.side, colour, None, None)])
 
-    def __post_init__(self) -> None:
-        sizes = {(t.side, t.spacing, len(t.fields), len(t.labels)) for t in self.tiles}
-        if len(sizes) != 1 or len(self.materials) != len(self.tiles):
-            raise InputError(
-                "materials: each needs a tile set, all with the same tile side, spacing, levels and variants; cut the "
-                "tiles again"
-            )
-        if any(len(each.fields) != self.levels for each in self.objects):
-            raise InputError(f"objects: each needs the tiles' {self.levels} levels; make the levels again")
-
     @property
     def side(self) -> float:
         return self.tiles[0].side
@@ -75,21 +63,9 @@ class BundleContent:
         flat = np.concatenate(heights)
         return float(flat.mean()) if len(flat) else 0.0
 
-    def sample_tiles(self) -> list[GaussianField]:
-        """The finest tiles, the materials in turn: what errors are measured on."""
-        return [each for same in zip(*(tiles.fields[0] for tiles in self.tiles), strict=True) for each in same]
-
-    def iterate_fields(self) -> Iterator[GaussianField]:
-        """The fields of all chunks."""
-        for level in range(self.levels):
-            yield from self.tile_fields(level)
-            yield from self.object_fields(level)
-
     def ground_colour(self) -> list[float]:
         """Mean colour of the ground of all materials, by their shares."""
         colours = [compute_ground_colour(tiles.fields[-1]) for tiles in self.tiles]
-        if len(colours) == 1:
-            return colours[0]
         shares = np.array([material.share for material in self.materials])
         return np.clip(shares @ np.array(colours) / shares.sum(), 0, 1).tolist()
 

@@ -23,6 +23,7 @@ _log = logging.getLogger(__name__)
 
 MAX_ORDERS = 33  # of a tile that keeps every second azimuth: with its record, 82 bytes a Gaussian
 MIN_AZIMUTHS = 4
+DECIBELS = 40.0  # PSNR from which drawing in a neighbour's order counts as invisible
 ELEVATIONS = {"walker": float(np.degrees(np.arcsin(0.1))), "oblique": 45.0}  # a walker's eye: a tenth of the distance
 WIDTH, HEIGHT = 256, 128  # pixels about the tile's middle
 VIEWS = 8  # at each elevation
@@ -30,10 +31,8 @@ VIEWS = 8  # at each elevation
 Picture = Float32[Array, "h w 3"]
 
 
-def search_directions(
-    fields: list[GaussianField], side: float, wanted: float, most: int = MAX_ORDERS
-) -> tuple[DirectionRings, dict[str, float | None]]:
-    """The fewest directions with which every view reaches `wanted` decibels, or as many as `most` allow.
+def search_directions(fields: list[GaussianField], side: float, wanted: float = DECIBELS) -> DirectionRings:
+    """The fewest directions with which every view reaches `wanted` decibels, or as many as MAX_ORDERS allow.
 
     The search starts with a ring of MIN_AZIMUTHS azimuths 20 degrees below the horizon. While the worst
     view is below `wanted`, it is compared with views along the kept azimuths: if the elevation causes most
@@ -42,45 +41,33 @@ def search_directions(
 
     Args:
         fields: the tiles of the finest level; a coarser level is used only where its discs cover a pixel.
-        most: orders of a tile that keeps every second azimuth.
-    Returns: the directions, of which such a tile keeps every second azimuth; and `measure_elevations` of what it keeps.
+    Returns: the directions, of which such a tile keeps every second azimuth.
     """
     elevations, kept = (20.0,), MIN_AZIMUTHS
     while True:
-        rings, found = DirectionRings(elevations, 2 * kept), measure_elevations(fields, side, elevations, kept)
-        decibels, worst = min((_as_number(level), view) for view, level in found.items())
+        rings = DirectionRings(elevations, kept)
+        decibels, worst = min((measure_psnr(fields, side, rings, down), view) for view, down in ELEVATIONS.items())
         if decibels >= wanted:
-            return rings, found
+            break
         elevation = ELEVATIONS[worst]
         more = tuple(sorted({*elevations, elevation}))
-        along_azimuths = measure_psnr(fields, side, DirectionRings(elevations, kept), elevation, halfway=False)
-        missing = more != elevations and _as_number(along_azimuths) < decibels + 3.0  # half of the error is 3 dB
+        along_azimuths = measure_psnr(fields, side, rings, elevation, halfway=False)
+        missing = more != elevations and along_azimuths < decibels + 3.0  # half of the error is 3 dB
         elevations_next, kept_next = (more, kept) if missing else (elevations, 2 * kept)
-        if len(elevations_next) * kept_next + 1 > most:
-            _log.warning("orders: %.1f dB with %d directions, and no room for more", decibels, most)
-            return rings, found
+        if len(elevations_next) * kept_next + 1 > MAX_ORDERS:
+            _log.warning("orders: %.1f dB with %d directions, and no room for more", decibels, MAX_ORDERS)
+            break
         elevations, kept = elevations_next, kept_next
-
-
-def _as_number(decibels: float | None) -> float:
-    return np.inf if decibels is None else decibels
-
-
-def measure_elevations(
-    fields: list[GaussianField], side: float, elevations: tuple[float, ...], kept: int
-) -> dict[str, float | None]:
-    """`measure_psnr` at each of ELEVATIONS, for rings of `kept` azimuths at `elevations`."""
-    rings = DirectionRings(elevations, kept)
-    return {view: measure_psnr(fields, side, rings, down) for view, down in ELEVATIONS.items()}
+    return DirectionRings(elevations, 2 * kept)
 
 
 def measure_psnr(
     fields: list[GaussianField], side: float, rings: DirectionRings, elevation: float, halfway: bool = True
-) -> float | None:
+) -> float:
     """PSNR of VIEWS views of different tiles, drawn in the order of the nearest direction, against their own order.
 
     The views lie evenly around at an elevation in degrees below the horizon. halfway: half-way between two azimuths,
-    where an order is worst; otherwise along an azimuth. None: no difference.
+    where an order is worst; otherwise along an azimuth. Infinite: no difference.
     """
     pixel = side / level_distances.FOCAL  # of the reference picture a tile's side away: nearer tiles are sorted exactly
     along, pairs = rings.directions(), []
@@ -90,9 +77,9 @@ def measure_psnr(
         field, direction = fields[5 * k % len(fields)], unit_vectors(np.radians([azimuth]), np.radians(elevation))[0]
         best = along[int(np.argmax(along @ direction))]
         exact = render_in_order(field, side, direction, pixel)
-        same = np.array_equal(best, direction)
-        pairs.append((exact if same else render_in_order(field, side, direction, pixel, best), exact))
-    return compute_psnr(pairs)
+        pairs.append((render_in_order(field, side, direction, pixel, best), exact))
+    decibels = compute_psnr(pairs)
+    return np.inf if decibels is None else decibels
 
 
 def render_in_order(
@@ -101,8 +88,7 @@ def render_in_order(
     """The middle of a tile seen along a direction, in the order of another one, pixels `pixel` wide; black behind."""
     middle = np.array([side / 2, side / 2, np.median(field.means[:, 2])])
     right = np.cross(along, [0.0, 0.0, 1.0])
-    length = np.linalg.norm(right)
-    right = right / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
+    right /= np.linalg.norm(right)
     turn = np.stack([right, np.cross(along, right), along])
     camera = Camera(turn, np.zeros(3), 1 / pixel, 1 / pixel, WIDTH / 2, HEIGHT / 2, WIDTH, HEIGHT, True)
     # four standard deviations about their centres overlap the picture

@@ -134,22 +134,10 @@ def find_smallest_rotations(quats: Float[Array, "n 4"]) -> tuple[Float64[Array, 
     |x|, |y| and |z| within sin(pi / 8): were |x| larger, a quarter turn about x would raise w to (w + |x|) / sqrt(2).
 
     Returns: quaternions, and for each new axis the index of the old one.
-    Raises: ValueError: a quaternion of length 0.
     """
-    cube = Rotation.create_group("O")
-    length = np.linalg.norm(quats.astype(float), axis=1, keepdims=True)
-    if not (length > 0).all():
-        raise ValueError(f"quaternion {int(np.argmin(length))} has length 0")
-    q = quats.astype(float) / length
-    g = cube.as_quat(scalar_first=True)
-    real = q @ (g * [1, -1, -1, -1]).T  # w of every product
+    cube, source = Rotation.create_group("O"), Rotation.from_quat(quats.astype(float), scalar_first=True)
+    # w of every product
+    real = source.as_quat(scalar_first=True) @ (cube.as_quat(scalar_first=True) * [1, -1, -1, -1]).T
     best = np.argmax(np.round(np.abs(real), 12), axis=1)  # of equals the first, whatever the last bits
-    turned = _multiply_quaternions(q, g[best])
-    turned *= np.where(turned[:, :1] < 0, -1, 1)
     axes = np.abs(cube.as_matrix()).argmax(1)  # of each column, the row that is not 0
-    return turned, axes[best]
-
-
-def _multiply_quaternions(p: Float[Array, "n 4"], q: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
-    a, u, b, v = p[:, :1], p[:, 1:], q[:, :1], q[:, 1:]
-    return np.concatenate([a * b - (u * v).sum(1, keepdims=True), a * v + b * u + np.cross(u, v)], 1)
+    return (source * cube[best]).as_quat(canonical=True, scalar_first=True), axes[best]

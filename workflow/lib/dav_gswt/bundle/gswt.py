@@ -5,9 +5,7 @@ is optional. It knows tiles only, so objects are baked into them.
 """
 
 import logging
-import re
 import zipfile
-from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,9 +14,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.content import BundleContent
-from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.field import GaussianField, concatenate_fields, read_field, write_field
-from dav_gswt.files import UNREADABLE
+from dav_gswt.field import GaussianField, concatenate_fields, write_field
 from dav_gswt.logs import progress
 from dav_gswt.materials.model import ObjectLevels, turn_and_scale, turn_rows
 from dav_gswt.tiles.compose import equalise_heights
@@ -28,7 +24,6 @@ _log = logging.getLogger(__name__)
 NAME = "gswt.zip"
 TILE_WIDTH = 4.0
 MAX_SPLATS = 8_388_608
-TILE_NAME = re.compile(r"lod(\d+)_tile_\d+\.ply")
 STAMP = (1980, 1, 1, 0, 0, 0)  # the earliest a zip knows: the same tiles give the same bytes
 TURN, SIZE = np.radians(15.0), 0.15  # largest turn and change of size of a baked object
 TRIES = 60  # places that are tried for each object
@@ -58,7 +53,6 @@ def write_gswt(fields: list[list[GaussianField]], side: float, path: Path) -> No
     """Write fields[level][tile] as lod{L}_tile_{T}.ply entries, in a fixed order with a fixed time.
 
     The finest levels are left out, with a warning, as far as the renderer could not take them all.
-    Raises: InputError: a tile has no splat, or a value is not finite.
     """
     levels = list(fields)
     while len(levels) > 1 and sum(len(field) for level in levels for field in level) > MAX_SPLATS:
@@ -69,53 +63,11 @@ def write_gswt(fields: list[list[GaussianField]], side: float, path: Path) -> No
     flat = [(level, tile, field) for level, tiles in enumerate(levels) for tile, field in enumerate(tiles)]
     with zipfile.ZipFile(path, "w") as archive, TemporaryDirectory(dir=path.parent) as folder:
         for level, tile, field in progress(flat, "write gswt.zip"):
-            if not len(field):
-                raise InputError(f"level {level}, tile {tile}: no splat in it; the field has a hole as wide as a tile")
-            scaled = to_renderer(field, side)
-            if not all(np.isfinite(values).all() for values in vars(scaled).values()):
-                raise InputError(f"level {level}, tile {tile}: a value is not finite")
             ply = Path(folder, f"lod{level}_tile_{tile:02d}.ply")
-            write_field(scaled, ply, plain=True)
+            write_field(to_renderer(field, side), ply, plain=True)
             entry = zipfile.ZipInfo(ply.name, STAMP)
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, ply.read_bytes(), compresslevel=1)
-
-
-def read_gswt(path: Path | str, side: float) -> list[list[GaussianField]]:
-    """fields[level][tile] of an archive that `write_gswt` wrote, for tiles `side` wide.
-
-    Raises: InputError: not readable, a name that no tile has, or an entry that `read_field` refuses.
-    """
-    levels: dict[int, list[GaussianField]] = {}
-    try:
-        with zipfile.ZipFile(path) as archive, TemporaryDirectory() as folder:
-            for entry in archive.infolist():
-                if not (match := TILE_NAME.fullmatch(entry.filename)):
-                    raise InputError(f"{path}: {entry.filename[:80]!r} is no tile; make the bundle again")
-                ply = Path(archive.extract(entry, folder))
-                levels.setdefault(int(match[1]), []).append(_from_renderer(read_field(ply), side))
-                ply.unlink()
-    except UNREADABLE as error:
-        raise InputError(f"{path}: not readable ({summarize_error(error)}); make the bundle again") from error
-    return list(levels.values())
-
-
-def _from_renderer(field: GaussianField, side: float) -> GaussianField:
-    """A tile TILE_WIDTH wide, scaled to `side`, without its harmonics."""
-    scale = TILE_WIDTH / side
-    means, log_scales = (field.means / scale).astype(np.float32), (field.log_scales - np.log(scale)).astype(np.float32)
-    return replace(field, means=means, log_scales=log_scales, sh=field.sh[:, :1].copy())  # a view would keep them
-
-
-@dataclass(frozen=True)
-class _BakedObject:
-    """An object in a tile: its place, turn, size, and the radius of its footprint at that size."""
-
-    source: ObjectLevels
-    foot: Float[Array, "3"]
-    turn: float
-    size: float
-    radius: float
 
 
 def bake_objects(content: BundleContent, salt: int) -> list[list[GaussianField]]:
@@ -130,38 +82,38 @@ def bake_objects(content: BundleContent, salt: int) -> list[list[GaussianField]]
     if not mine:
         return tiles.fields
     fields, ground = [list(level) for level in tiles.fields], content.ground_height(0)
-    wanted = placed = 0
     for tile in range(len(tiles.labels)):
         rng = np.random.default_rng([salt, 0, tile])
         counts = [int(each.density * content.side**2 + rng.random()) for each in mine]
         drawn = _draw_objects(mine, counts, content.side, ground, rng)
-        wanted, placed = wanted + sum(counts), placed + len(drawn)
-        for level in range(content.levels):
-            fields[level][tile] = concatenate_fields([fields[level][tile], *(_place(each, level) for each in drawn)])
-    if placed < wanted:
-        _log.info("gswt: %d of %d objects find room in the middle of tiles", placed, wanted)
+        for level, own in enumerate(fields):
+            own[tile] = concatenate_fields([own[tile], *(each[level] for each in drawn)])
     tiles_first = [list(levels) for levels in zip(*fields, strict=True)]
     return [list(level) for level in zip(*equalise_heights(tiles_first, content.side), strict=True)]
 
 
 def _draw_objects(
     objects: list[ObjectLevels], counts: list[int], side: float, ground: float, rng: np.random.Generator
-) -> list[_BakedObject]:
-    """The largest objects first, each at the first of TRIES places where it overlaps no other."""
-    drawn: list[_BakedObject] = []
+) -> list[list[GaussianField]]:
+    """The Gaussians of the objects in a tile, of each by level.
+
+    The largest objects come first, each at the first of TRIES places where it overlaps no other.
+    """
+    drawn, taken = [], []
     for each, count in sorted(zip(objects, counts, strict=True), key=lambda pair: -pair[0].radius):
         reach = max(float(np.abs(f.means[:, :2]).max(initial=0.0)) for f in each.fields)
         for _ in range(count):
             turn, size = rng.uniform(-TURN, TURN), 1 + rng.uniform(-SIZE, SIZE)
             margin, radius = 2**0.5 * reach * size + EDGE * side, each.radius * size
             places = rng.uniform(margin, side - margin, (TRIES, 2)) if 2 * margin < side else np.zeros((0, 2))
-            free = [p for p in places if all(np.hypot(*(p - o.foot[:2])) >= radius + o.radius for o in drawn)]
+            free = [p for p in places if all(np.hypot(*(p - foot)) >= radius + other for foot, other in taken)]
             if free:
-                drawn.append(_BakedObject(each, np.array([*free[0], ground]), turn, size, radius))
+                taken.append((free[0], radius))
+                foot = np.array([*free[0], ground])
+                drawn.append([_place(field, turn, size, foot) for field in each.fields])
     return drawn
 
 
-def _place(each: _BakedObject, level: int) -> GaussianField:
-    source = each.source.fields[level]
-    n = len(source)
-    return turn_and_scale(source, turn_rows(np.full(n, each.turn)), np.full(n, each.size), np.tile(each.foot, (n, 1)))
+def _place(field: GaussianField, turn: float, size: float, foot: Float[Array, "3"]) -> GaussianField:
+    n = len(field)
+    return turn_and_scale(field, turn_rows(np.full(n, turn)), np.full(n, size), np.tile(foot, (n, 1)))

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders
+from dav_gswt.bundle.chunks import ChunkEntry
 from dav_gswt.bundle.encoding import Entry, Length, Natural, Pair, Share, Size
 
 MAX_PAINTED = 2**18  # points
@@ -108,7 +108,7 @@ def find_run_fault(runs: Sequence[Sequence[int]], materials: int) -> str | None:
 
 
 @dataclass(frozen=True)
-class ObjectOrders(Entry):
+class ObjectEntry(Entry):
     """An object on the terrain."""
 
     name: Name
@@ -118,13 +118,6 @@ class ObjectOrders(Entry):
     material: Natural
     density: Size
     probability: Share
-    chunks: Sequence[ChunkOrders]
-
-
-@dataclass(frozen=True)
-class ObjectEntry(ObjectOrders):
-    """An object whose chunks are files."""
-
     chunks: Annotated[Sequence[ChunkEntry], Field(min_length=1)]
 
 

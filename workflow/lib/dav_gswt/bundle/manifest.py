@@ -8,13 +8,13 @@ the bundle's unit, z is up, and x, y of a tile count from its south-western corn
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import KW_ONLY, asdict, dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, TypeAdapter, WithJsonSchema
+from pydantic import Field, TypeAdapter
 
-from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders, chunk_size
+from dav_gswt.bundle.chunks import ChunkEntry, chunk_size
 from dav_gswt.bundle.encoding import (
     POSITION_STEPS,
     SCALE_STEPS,
@@ -27,7 +27,7 @@ from dav_gswt.bundle.encoding import (
     Share,
     Size,
 )
-from dav_gswt.bundle.land_cover import ClassesEntry, Name, ObjectEntry, ObjectOrders, Salt, ScatterEntry
+from dav_gswt.bundle.land_cover import ClassesEntry, Name, ObjectEntry, Salt, ScatterEntry
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import parse_record, read_json
 
@@ -36,20 +36,9 @@ FORMAT, VERSION = "davgswt", 3
 ONLY_MATERIAL = "ground"  # the name of the material of a set that has one
 MAX_BYTES = 1 << 26  # of a manifest
 FARTHEST, MAX_LOG_SCALE = 1e9, 60.0  # of lengths, whose squares single precision keeps; of logarithms of deviations
-SURFACES = ("flat", "hills", "image", "sphere")  # kinds of the surface under the tiles
 
 
 Direction = Annotated[list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=3, max_length=3)]
-
-
-def _check_surface(heights: dict[str, Any]) -> dict[str, Any]:
-    if heights.get("kind") not in SURFACES:
-        raise ValueError(f"kind must be one of {', '.join(SURFACES)}")
-    return heights
-
-
-_SURFACE_SCHEMA = {"type": "object", "required": ["kind"], "properties": {"kind": {"enum": [*SURFACES]}}}
-Surface = Annotated[dict[str, Any], AfterValidator(_check_surface), WithJsonSchema(_SURFACE_SCHEMA)]
 
 
 @dataclass(frozen=True)
@@ -71,21 +60,14 @@ class LevelEntry(Entry):
 
 
 @dataclass(frozen=True)
-class TileOrders(Entry):
+class TileEntry(Entry):
     """One tile: its number 16 c + 8 W + 4 N + 2 E + S of variant c and the colours of its edges, its mean uncertainty
-    in [0, 1], the lowest and highest z of its Gaussians, and the orders of its chunks, one a level.
+    in [0, 1], the lowest and highest z of its Gaussians, and its chunks, one a level.
     """
 
     tile: Natural
     uncertainty: Share
     z: Pair
-    chunks: Sequence[ChunkOrders]
-
-
-@dataclass(frozen=True)
-class TileEntry(TileOrders):
-    """A tile whose chunks are files."""
-
     chunks: Annotated[Sequence[ChunkEntry], Field(min_length=1)]
 
 
@@ -102,9 +84,9 @@ class MaterialEntry(Entry):
     ground_colour: Colour
 
 
-@dataclass(frozen=True)
-class TileSetInfo(Entry):
-    """How a tile set is placed and drawn: all that a terrain needs beside the Gaussians."""
+@dataclass(frozen=True, kw_only=True)
+class Manifest(Entry):
+    """davgswt.json."""
 
     tile_side: Length
     salt: Salt
@@ -112,29 +94,18 @@ class TileSetInfo(Entry):
     ground_colour: Colour
     directions: Annotated[list[Direction], Field(min_length=1)]
     levels: Annotated[list[LevelEntry], Field(min_length=1, max_length=16)]
-    tiles: Sequence[TileOrders]
-    materials: Annotated[list[MaterialEntry], Field(min_length=1, max_length=8)]
-    _: KW_ONLY
-    classes: ClassesEntry | None = None
-    objects: Sequence[ObjectOrders] | None = None
-    scatter: ScatterEntry | None = None
-
-
-@dataclass(frozen=True)
-class Manifest(TileSetInfo):
-    """davgswt.json."""
-
     tiles: Annotated[Sequence[TileEntry], Field(min_length=16)]
-    objects: Annotated[Sequence[ObjectEntry], Field(min_length=1, max_length=256)] | None = field(
-        default=None, kw_only=True
-    )
+    materials: Annotated[list[MaterialEntry], Field(min_length=1, max_length=8)]
+    classes: ClassesEntry | None = None
+    objects: Annotated[Sequence[ObjectEntry], Field(min_length=1, max_length=256)] | None = None
+    scatter: ScatterEntry | None = None
     format: Literal["davgswt"]
     version: Literal[3]
     unit: Annotated[str, Field(min_length=1)]
     sky: Sky
     encoding: Encoding
     provenance: dict[str, Any]
-    heights: Surface | None = None
+    heights: dict[str, Any] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON object."""

@@ -36,10 +36,7 @@ class DirectionRings:
 
         Straight down is always kept: of n azimuths on r rings r n + 1 directions or r n / 2 + 1. A tile is uncertain if
         u >= tau and tau < 1: at tau = 0 every tile is, at tau = 1 none, and a larger tau never adds one.
-        Raises: ValueError: u or tau is not in [0, 1].
         """
-        if not (0 <= uncertainty <= 1 and 0 <= tau <= 1):
-            raise ValueError(f"uncertainty {uncertainty} and tau {tau} must lie in [0, 1]")
         step = 1 if uncertainty >= tau and tau < 1 else 2
         last = self.azimuths * len(self.elevations)
         return [*(r + k for r in range(0, last, self.azimuths) for k in range(0, self.azimuths, step)), last]

@@ -52,8 +52,8 @@ class Backdrop:
                 return SphereBackdrop(zenith, horizon, ground, NO_END, LOWEST, eye, dip, radius)
             low = max((square + reach * reach) / (2 * far * reach) - dip, LOWEST)
             return SphereBackdrop(zenith, horizon, ground, reach, low, eye, dip, radius)
-        end = terrain.reach * terrain.side
-        return Backdrop(zenith, horizon, ground, end, (eye[2] - terrain.heights.low) / end)
+        end, (lowest, _, _) = terrain.reach * terrain.side, terrain.heights.bounds
+        return Backdrop(zenith, horizon, ground, end, (eye[2] - lowest) / end)
 
     def colours_along(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
         """Colours in directions of any length."""

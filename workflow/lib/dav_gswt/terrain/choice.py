@@ -38,18 +38,6 @@ def _low_word(h):
     return h & 0xFFFFFFFF
 
 
-def tile_at(i: int, j: int, salt: int, variants: int) -> int:
-    """Number of the tile in one cell; see `tiles_at`."""
-    return int(tiles_at(np.array([i]), np.array([j]), salt, variants)[0])
-
-
-def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants: int) -> Int64[Array, "h w"]:
-    """Tile numbers of a window of cells: row 0 holds cells (west, south), (west + 1, south), ..."""
-    height, width = shape
-    i, j = np.meshgrid(west + np.arange(width, dtype=np.int64), south + np.arange(height, dtype=np.int64))
-    return tiles_at(i, j, salt, variants)
-
-
 def tiles_at(
     i: Int64[Array, "*cells"], j: Int64[Array, "*cells"], salt: int, variants: int, period: int = 0
 ) -> Int64[Array, "*cells"]:

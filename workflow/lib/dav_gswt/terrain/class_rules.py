@@ -4,19 +4,18 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 
-from dav_gswt.bundle.land_cover import NoiseTerm, ObjectOrders, RangeTerm, find_run_fault
-from dav_gswt.bundle.manifest import TileSetInfo
+from dav_gswt.bundle.land_cover import NoiseTerm, ObjectEntry, RangeTerm, find_run_fault
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.errors import InputError
 from dav_gswt.files import locate_path, read_record
 from dav_gswt.terrain.classes import LATTICE, Classes
 
 _log = logging.getLogger(__name__)
 
-M = TypeVar("M", bound=TileSetInfo)
 NOISE = ({"kind": "noise", "weight": 1.0},)  # the config's default: the noise of the bundle alone
 WINDOW, SAMPLES = 64, 20_000  # tiles from the origin, and places there, in which a material is looked for
 MAX_BYTES = 2**24  # of a painted file
@@ -45,7 +44,7 @@ class PaintFile:
     offsets: dict[str, float] = field(default_factory=dict)
 
 
-def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> M:
+def apply_rule(manifest: Manifest, rule: Sequence[dict[str, Any]]) -> Manifest:
     """The manifest with the config's rule in the place of its own noise.
 
     A bundle of one material has no classes: the rule changes nothing, which a warning says; densities of objects that
@@ -63,7 +62,8 @@ def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> M:
             manifest = replace(manifest, objects=objects)
     rule = [entry for entry in rule if entry["kind"] != "painted"]
     if manifest.classes is None:
-        warn_of_rule(rule)
+        if any(entry["kind"] != "noise" for entry in rule):
+            _log.warning("classes: the terrain has one material; the rule changes nothing")
         return manifest
     noise = next((term for term in manifest.classes.rule if isinstance(term, NoiseTerm)), None)
     if noise and paint:
@@ -94,12 +94,6 @@ def warn_of_missing(classes: Classes, names: Sequence[str]) -> None:
         _log.warning("classes: the rule leaves %s without any place (the ground is %s); change its terms", name, left)
 
 
-def warn_of_rule(rule: Sequence[dict[str, Any]]) -> None:
-    """Log a warning if a rule is given for a terrain of one material."""
-    if any(entry["kind"] != "noise" for entry in rule):
-        _log.warning("classes: the terrain has one material; the rule changes nothing")
-
-
 def _find_material(name: str, names: Sequence[str]) -> int:
     if name not in names:
         raise InputError(f"classes: there is no material {name!r}; the terrain has {', '.join(names)}")
@@ -127,7 +121,7 @@ def read_paint(path: Path | str, names: Sequence[str]) -> PaintFile:
     return replace(paint, materials=list(names), runs=runs)
 
 
-def scale_objects(objects: Sequence[ObjectOrders], cells: int, paint: PaintFile) -> list[ObjectOrders]:
+def scale_objects(objects: Sequence[ObjectEntry], cells: int, paint: PaintFile) -> list[ObjectEntry]:
     """Objects with the probabilities of a paint's densities: those of one material sum to 1 at most, and no more stand
     on a tile than the page draws. A density of an object that is not there is told in a warning.
 

@@ -19,14 +19,12 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.land_cover import MAX_COORDINATE, ClassesEntry, NoiseTerm, RangeTerm
 from dav_gswt.terrain.choice import Floats, Ints, hash_cell
-from dav_gswt.terrain.heights import FlatSurface, HeightField, gradient_noise, smoothstep
+from dav_gswt.terrain.heights import GAIN, SHIFT, FlatSurface, HeightField, gradient_noise, smoothstep
 
 LATTICE = 8  # points of the lattice of scores along a tile's side
 MAX_OCTAVES = 8
 NOISE = 16  # axis of the hash: octave k of material m uses NOISE + MAX_OCTAVES m + k
 JITTER = 80  # octave k uses JITTER + k for the first four materials and JITTER + MAX_OCTAVES + k for the next four
-GAIN = 0.4  # height of an octave over that of the one twice as wide
-SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells
 TURN = (0.8, 0.6)  # cosine and sine by which each octave is turned against the last: gradient noise prefers its axes
 CONTRAST = 3.0  # the jitter is its noise times this, cut at -1 and 1
 FARTHEST = 4.0  # weights by which a score falls at most outside of a range
@@ -159,7 +157,7 @@ class Classes:
             some = new[first : first + SLICE]
             lattices, masks = self.cell_lattices(*np.array(some, np.int64).T), np.zeros(len(some), np.int64)
             for material in range(self.materials):
-                most = _over_corners(np.maximum, lattices[..., material, None] - lattices)
+                most = _most_over_corners(lattices[..., material, None] - lattices)
                 masks |= (most >= -slack).all(-1).any(-1).any(-1).astype(np.int64) << material
             self._known.update(zip(some, masks.tolist(), strict=True))
         return np.array([self._known[cell] for cell in cells], np.int64)
@@ -169,33 +167,16 @@ class Classes:
 
         Args:   means: from the cell's corner. material: of each Gaussian's tile.
         """
-        lattice = self.cell_lattices(np.array([i]), np.array([j]))[0]
+        lattice, rise = self.cell_lattices(np.array([i]), np.array([j]))[0], self.entry.rise
         u, v = means[:, 0].astype(float) / self.side, means[:, 1].astype(float) / self.side
         a, b, s, t = _find_square(u, v)
-        stays, undecided = self._decide_squares(lattice)
-        kept, test = stays[b, a, material], np.flatnonzero(undecided[b, a, material])
-        if len(test):
-            a, b, s, t, rise = a[test], b[test], s[test, None], t[test, None], self.entry.rise
-            corners = [lattice[b + k // 2, a + k % 2] for k in range(4)]
-            scores, own = _interpolate(corners, s, t) + self.jitter_at(i, j, u[test], v[test]), material[test]
-            away = np.abs(means[test, 2].astype(float) - np.array(rise.ground)[own]) - np.array(rise.clearance)[own]
-            bonus = np.minimum(rise.slope * np.maximum(away, 0), rise.most)
-            mine = scores[np.arange(len(test)), own] + bonus
-            scores[np.arange(len(test)), own] = -np.inf
-            kept[test] = mine >= scores.max(1)
-        return kept
-
-    def _decide_squares(self, lattice: Float[Array, "y x m"]) -> tuple[Bool[Array, "b a m"], Bool[Array, "b a m"]]:
-        """Squares of a cell's lattice where all Gaussians of a material stay, and those where each has to be tested."""
-        wave, most = 2 * self.entry.jitter.amplitude, self.entry.rise.most
-        stays = np.empty((LATTICE, LATTICE, self.materials), bool)
-        undecided = np.empty_like(stays)
-        for material in range(self.materials):
-            others = np.delete(lattice[..., material, None] - lattice, material, axis=-1)[None]
-            stays[..., material] = (_over_corners(np.minimum, others)[0] >= wave).all(-1)
-            goes = (_over_corners(np.maximum, others)[0] < -wave - most).any(-1)
-            undecided[..., material] = ~stays[..., material] & ~goes
-        return stays, undecided
+        corners = [lattice[b + k // 2, a + k % 2] for k in range(4)]
+        scores = _interpolate(corners, s[:, None], t[:, None]) + self.jitter_at(i, j, u, v)
+        away = np.abs(means[:, 2].astype(float) - np.array(rise.ground)[material]) - np.array(rise.clearance)[material]
+        bonus, rows = np.minimum(rise.slope * np.maximum(away, 0), rise.most), np.arange(len(means))
+        mine = scores[rows, material] + bonus
+        scores[rows, material] = -np.inf
+        return mine >= scores.max(1)
 
     def _evaluate_term(self, term: NoiseTerm | RangeTerm, i: Ints, j: Ints) -> Float[Array, "n m"]:
         if isinstance(term, NoiseTerm):
@@ -235,7 +216,7 @@ def _interpolate(corners: Sequence[Float[Array, "n m"]], s: Float[Array, "n 1"],
     return south + t * (north - south)
 
 
-def _over_corners(best, values: Float[Array, "n y x m"]) -> Float[Array, "n b a m"]:
-    """Minimum or maximum over the four corners of every square."""
-    rows = best(values[:, 1:], values[:, :-1])
-    return best(rows[:, :, 1:], rows[:, :, :-1])
+def _most_over_corners(values: Float[Array, "n y x m"]) -> Float[Array, "n b a m"]:
+    """Maximum over the four corners of every square."""
+    rows = np.maximum(values[:, 1:], values[:, :-1])
+    return np.maximum(rows[:, :, 1:], rows[:, :, :-1])

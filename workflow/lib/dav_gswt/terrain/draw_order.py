@@ -50,8 +50,6 @@ def finer_share(distance: Floats, switch: float, band: float, smooth: bool = Fal
     is never reached. smooth: s^2 (3 - 2 s) of it, which has a continuous slope.
     Source: DAV-GSWT, Eq. (lod_blend); its "0 otherwise" would make near splats vanish.
     """
-    if switch == np.inf:
-        return np.ones_like(distance)
     if band > 0:
         with np.errstate(over="ignore"):
             share = np.clip(0.5 - (distance - switch) / (2 * band), 0.0, 1.0)

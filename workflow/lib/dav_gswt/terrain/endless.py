@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.land_cover import ObjectOrders
-from dav_gswt.bundle.manifest import TileSetInfo
+from dav_gswt.bundle.land_cover import ObjectEntry
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField
 from dav_gswt.raster.interface import RIM
@@ -56,7 +56,7 @@ class EndlessTerrain:
     scatter: Scatter | None = None
 
     @property
-    def object_entries(self) -> Sequence[ObjectOrders]:
+    def object_entries(self) -> Sequence[ObjectEntry]:
         return self.scatter.objects if self.scatter is not None else []
 
     @property
@@ -97,7 +97,7 @@ def _read_objects(bundle: Bundle) -> list[list[GaussianField]]:
 
 def terrain_from_fields(
     tiles: list[list[GaussianField]],
-    manifest: TileSetInfo,
+    manifest: Manifest,
     surface: dict[str, Any] | HeightField,
     objects: Sequence[list[GaussianField]] = (),
 ) -> EndlessTerrain:

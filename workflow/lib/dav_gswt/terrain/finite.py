@@ -20,8 +20,6 @@ from dav_gswt.terrain.visibility import GridCells, choose_tiles, count_gaussians
 BLOCK = 65_536  # Gaussians that are placed at once, about
 SLICE = 4096  # cells that are counted at once
 
-Placer = Callable[[], GaussianField]
-
 
 @dataclass(frozen=True)
 class Area:
@@ -32,19 +30,15 @@ class Area:
     columns: int
     rows: int
 
-    def __len__(self) -> int:
-        return self.columns * self.rows
 
-
-def list_cells(
-    terrain: EndlessTerrain, west: int, south: int, columns: int, rows: int
-) -> tuple[Ints, Ints, Ints, Ints]:
-    """Column, row, tile number and materials (bit m for material m) of cells, row by row from the south-western one.
+def list_cells(terrain: EndlessTerrain, area: Area) -> tuple[Ints, Ints, Ints, Ints]:
+    """Column, row, tile number and materials (bit m for material m) of an area's cells, row by row from the south.
 
     Raises: InputError: the terrain is a sphere.
     """
     require_plane(terrain)
-    i, j = (v.ravel() for v in np.meshgrid(west + np.arange(columns), south + np.arange(rows)))
+    columns, rows = area.west + np.arange(area.columns), area.south + np.arange(area.rows)
+    i, j = (v.ravel() for v in np.meshgrid(columns, rows))
     return i, j, *choose_tiles(terrain, i, j)
 
 
@@ -62,7 +56,7 @@ def keep_level(terrain: EndlessTerrain, level: int) -> EndlessTerrain:
 
 def list_grid(terrain: EndlessTerrain, area: Area) -> GridCells:
     """The cells of an area, row by row. Of one level alone, their distances from an eye do not matter."""
-    i, j, tile, materials = list_cells(terrain, area.west, area.south, area.columns, area.rows)
+    i, j, tile, materials = list_cells(terrain, area)
     return GridCells(i, j, tile, materials, np.zeros(len(i), bool), np.zeros(len(i)), np.zeros(len(i)))
 
 
@@ -85,7 +79,7 @@ def list_blocks(terrain: EndlessTerrain, area: Area, level: int) -> list[GridCel
     return [cells[rows] for rows in np.split(np.arange(len(cells)), np.flatnonzero(np.diff(block)) + 1)]
 
 
-def place_block(terrain: EndlessTerrain, cells: GridCells, level: int, origin: Vector) -> Placer:
+def place_block(terrain: EndlessTerrain, cells: GridCells, level: int, origin: Vector) -> Callable[[], GaussianField]:
     """A function that puts the Gaussians of some cells on the surface. It may run in any thread; this one may not.
 
     origin: world position that positions count from.

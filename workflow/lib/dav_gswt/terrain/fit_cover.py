@@ -4,8 +4,7 @@ The rule gives every material its measured share of the ground and, as far as po
 that fray and bend as the photographed ones do. The scatter gives every object its measured density.
 """
 
-import logging
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +12,13 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.content import BundleContent
-from dav_gswt.bundle.land_cover import ClassesEntry, JitterEntry, NoiseTerm, ObjectOrders, RiseEntry, ScatterEntry
+from dav_gswt.bundle.land_cover import ClassesEntry, JitterEntry, NoiseTerm, ObjectEntry, RiseEntry, ScatterEntry
 from dav_gswt.errors import InputError
 from dav_gswt.materials.borders import measure_bend
-from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.materials.store import read_objects, read_report
 from dav_gswt.terrain.classes import LATTICE, Classes
 from dav_gswt.terrain.scatter import Scatter
 from dav_gswt.tiles.build import TileSet
-
-_log = logging.getLogger(__name__)
 
 SHORTEST, WIDEST = 4.0, 4096.0  # lattice steps: wavelengths of noise that the lattice shows
 MAX_OCTAVES = 5
@@ -44,23 +40,20 @@ CANDIDATES = 3.0  # a wanted object
 MAX_CELLS = 64  # of the scatter along a tile's side
 WANTED, MAX_WINDOW = 600.0, 96  # objects that a probability is measured with; tiles along a side of the window
 SCATTER_PASSES = 5
-SHORTFALL = 0.9  # share of the wanted density below which a warning is logged
 
 
 def gather_content(tiles: list[TileSet], materials: Path | str | None, salt: int) -> BundleContent:
     """What a bundle is made of. materials: the folder of rule `find_materials`; None: one material, without objects.
 
-    Raises: InputError: see `BundleContent`, `materials.store`.
+    Raises: InputError: tiles of another number of materials; see also `materials.store`.
     """
     if materials is None:
         return BundleContent.of_one_material(tiles[0])
     report = read_report(materials)
     if len(tiles) != len(report.materials):
         raise InputError("materials: this tiling is of the first one alone; choose another or `materials: one`")
-    names = [own.name for own in fields(MaterialInfo)]
-    infos = [MaterialInfo(**{name: getattr(each, name) for name in names}) for each in report.materials]
     objects = read_objects(materials, len(tiles[0].fields), tiles[0].spacing)
-    return fit_cover(BundleContent(tiles, infos, objects), salt)
+    return fit_cover(BundleContent(tiles, [*report.materials], objects), salt)
 
 
 def fit_cover(content: BundleContent, salt: int) -> BundleContent:
@@ -204,7 +197,7 @@ def fit_scatter(content: BundleContent, classes: ClassesEntry | None, salt: int)
     """The scatter grid, and the probability of each object with which it has its density, losses included.
 
     Candidates are lost to others that overlap them and to borders of materials. They are counted in a window of the
-    terrain, and the probabilities are corrected by what is missing. A density that does not fit is reported.
+    terrain, and the probabilities are corrected by what is missing.
     """
     side, number = content.side, len(content.objects)
     densities, material = (np.array([getattr(each, k) for each in content.objects]) for k in ("density", "material"))
@@ -215,19 +208,15 @@ def fit_scatter(content: BundleContent, classes: ClassesEntry | None, salt: int)
     window = int(np.clip(np.ceil(np.sqrt(WANTED / rarest)), 8, MAX_WINDOW))
     i, j = (v.ravel() for v in np.mgrid[:window, :window].astype(np.int64) - window // 2)
     entry, cover = ScatterEntry(cells, TURN, SIZE, salt), classes and Classes(classes, len(content.materials), side)
-    probabilities, reached = _cap(densities * (side / cells) ** 2, material), densities
+    probabilities = _cap(densities * (side / cells) ** 2, material)
     for _ in range(SCATTER_PASSES):
         objects = [
-            ObjectOrders(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, float(p), [])
+            ObjectEntry(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, float(p), [])
             for each, p in zip(content.objects, probabilities, strict=True)
         ]
         found = Scatter(entry, objects, side, cover).instances_in(i, j)
         reached = np.bincount(found.number, minlength=number) / (window**2 * side**2 * shares)
         probabilities = _cap(probabilities * np.clip(densities / np.maximum(reached, 1e-300), 0.5, 2), material)
-    for each, density in zip(content.objects, reached.tolist(), strict=True):
-        if density < SHORTFALL * each.density:
-            said = "objects: %s stands %.3g times per unit of area where %.3g were found; there is no room for more"
-            _log.warning(said, each.name, density, each.density)
     return entry, probabilities.tolist()
 
 

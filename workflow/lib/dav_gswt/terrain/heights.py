@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Float32, Int64
 from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
+from dav_gswt.bundle.chunks import read_exactly
 from dav_gswt.bundle.manifest import NAME
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.field import GaussianField
@@ -49,19 +50,9 @@ class HeightField:
         SURFACES[kind] = cls
 
     @property
-    def low(self) -> float:
-        """Lower bound of h."""
-        return 0.0
-
-    @property
-    def high(self) -> float:
-        """Upper bound of h."""
-        return 0.0
-
-    @property
-    def steepest(self) -> float:
-        """Upper bound of the length of h's gradient."""
-        return 0.0
+    def bounds(self) -> tuple[float, float, float]:
+        """Lower and upper bound of h, and upper bound of the length of its gradient."""
+        return 0.0, 0.0, 0.0
 
     def at(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
         """h and its derivatives by x and y at points of the world."""
@@ -120,17 +111,9 @@ class Hills(HeightField, kind="hills"):
     salt: int = 0
 
     @property
-    def low(self) -> float:
-        return -self.height
-
-    @property
-    def high(self) -> float:
-        return self.height
-
-    @property
-    def steepest(self) -> float:
+    def bounds(self) -> tuple[float, float, float]:
         rise = sum(a * 2.0**k for k, a in enumerate(self._amplitudes()))
-        return STEEPEST * rise / self.wavelength
+        return -self.height, self.height, STEEPEST * rise / self.wavelength
 
     def at(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
         octaves = np.arange(self.octaves)[:, None]
@@ -167,18 +150,11 @@ class HeightMap(HeightField, kind="image"):
     width: float
 
     @property
-    def low(self) -> float:
-        return float(self.pixels.min())
-
-    @property
-    def high(self) -> float:
-        return float(self.pixels.max())
-
-    @property
-    def steepest(self) -> float:
+    def bounds(self) -> tuple[float, float, float]:
         """The slope of a B-spline is a mean of differences of neighbouring pixels."""
         most = [np.abs(np.diff(self.pixels, axis=axis)).max(initial=0) for axis in (0, 1)]
-        return float(np.hypot(*most)) * self.pixels.shape[1] / self.width
+        steepest = float(np.hypot(*most)) * self.pixels.shape[1] / self.width
+        return float(self.pixels.min()), float(self.pixels.max()), steepest
 
     def at(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
         rows, columns = self.pixels.shape
@@ -215,7 +191,7 @@ class HeightMap(HeightField, kind="image"):
         rows, columns, width = int(entry["rows"]), int(entry["columns"]), float(entry["width"])
         if not (0 < rows <= MAX_SIDE and 0 < columns <= MAX_SIDE and 0 < width < np.inf):
             raise ValueError("a size is out of range")
-        data = read_exactly(folder, entry["file"], 4 * rows * columns, entry.get("sha256"))
+        data = read_exactly(folder, entry["file"], 4 * rows * columns, entry["sha256"])
         pixels = np.frombuffer(data, "<f4").reshape(rows, columns).astype(np.float32)
         if not np.isfinite(pixels).all():
             raise InputError(f"{folder / entry['file']}: a height is not finite; make the page again")
@@ -285,7 +261,9 @@ def read_height_map(path: Path | str) -> Float32[Array, "rows columns"]:
     Raises: InputError: not readable, more than MAX_SIDE pixels along a side (checked before allocation), integers with
     a sign, or a pixel is not finite or without data.
     """
-    check_height_map(path)
+    width, height = image_files.read_size(path)
+    if max(width, height) > MAX_SIDE:
+        raise InputError(f"{path}: {width} x {height} pixels; at most {MAX_SIDE} a side are read: shrink the image")
     pixels = image_files.read_channel(path)
     _refuse_pixels(path, ~np.isfinite(pixels), "is not finite", "fill it")
     missing = image_files.read_no_data(path)
@@ -298,28 +276,6 @@ def _refuse_pixels(path: Path | str, bad: Bool[Array, "rows columns"], fault: st
     if len(places := np.argwhere(bad)):
         row, column = places[0]
         raise InputError(f"{path}: the height in row {row}, column {column} {fault} ({len(places)} such); {remedy}")
-
-
-def check_height_map(path: Path | str) -> None:
-    """Raises: InputError: not readable as an image, or more than MAX_SIDE pixels along a side."""
-    width, height = image_files.read_size(path)
-    if max(width, height) > MAX_SIDE:
-        raise InputError(f"{path}: {width} x {height} pixels; at most {MAX_SIDE} a side are read: shrink the image")
-
-
-def read_exactly(folder: Path, name: str, size: int, digest: str | None) -> bytes:
-    """The bytes of a page's file of this size. Raises: InputError: it is missing, of another size or damaged."""
-    path = folder / name
-    if Path(name).name != name:
-        raise InputError(f"{folder / NAME}: {name!r} does not lie beside it; make the page again")
-    if not path.is_file():
-        raise InputError(f"{path}: missing; make the page again")
-    if path.stat().st_size != size:
-        raise InputError(f"{path}: {path.stat().st_size} bytes instead of {size}; make the page again")
-    data = path.read_bytes()
-    if digest is not None and hashlib.sha256(data).hexdigest() != digest:
-        raise InputError(f"{path}: damaged (its SHA-256 is not the manifest's); make the page again")
-    return data
 
 
 def _spline_weights(u: Floats):

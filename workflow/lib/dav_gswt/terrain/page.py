@@ -8,23 +8,23 @@ import html
 import re
 import shutil
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
-from dav_gswt.bundle.manifest import FORMAT, VERSION, Manifest
 from dav_gswt.bundle.manifest import NAME as MANIFEST
+from dav_gswt.bundle.manifest import Manifest, read_manifest
 from dav_gswt.errors import InputError
-from dav_gswt.files import atomic_folder, read_json, write_json
+from dav_gswt.files import atomic_folder, write_json
 from dav_gswt.images.figures import encode_jpeg
-from dav_gswt.images.image_files import read_photo, shrink_image
-from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_rule
+from dav_gswt.images.image_files import read_photo, shrink_to
+from dav_gswt.terrain.class_rules import NOISE, apply_rule
 from dav_gswt.terrain.heights import PIXELS, FlatSurface, HeightField, require_plain_cover
 from dav_gswt.terrain.page_story import SHEET, STORY, Story
 
 INDEX, STILL = "index.html", "first.jpg"
 OWN_SCRIPTS = ("early.js", "worker/", "api/", "terrain_api.js")  # that are no modules of the page itself
-STILL_WIDTH = 1280  # pixels, at most
+STILL_SIZE = 1280  # pixels of its longer side, at most
 STILL_BYTES = 90_000  # at most: it is there within a second at 1 Mbit/s
 QUALITIES = (80, 70, 60, 50, 40, 30)  # the best that fits is taken; the last one anyhow
 STORY_BUTTON = '<button id="storyButton" type="button" aria-controls="story" aria-expanded="false"'
@@ -60,15 +60,11 @@ def name_of_scene(scene: str) -> str:
 
 
 def encode_still(path: Path | str) -> bytes:
-    """A still as a JPEG of at most STILL_WIDTH pixels across and, where quality allows, STILL_BYTES.
+    """A still as a JPEG of at most STILL_SIZE pixels a side and, where quality allows, STILL_BYTES.
 
     Raises: InputError: the file is no readable image.
     """
-    image = read_photo(path)
-    height, width = image.shape[:2]
-    if width > STILL_WIDTH:
-        image = shrink_image(image, STILL_WIDTH, max(1, round(height * STILL_WIDTH / width)))
-    made = b""
+    image, made = shrink_to(read_photo(path), STILL_SIZE), b""
     for quality in QUALITIES:
         made = encode_jpeg(image, quality)
         if len(made) <= STILL_BYTES:
@@ -91,24 +87,15 @@ def write_page(
     Args:   surface: of the terrain (default: level ground), stored in the page's manifest as `heights`. rule: the
             config's `classes`, stored as those of the page's manifest. front: name of the scene, line about it, first
             still and story (default: the viewer's own texts, no still, no story).
-    Raises: InputError: the manifest is missing or of another version, a chunk is missing or lies outside of the bundle;
-            the viewer is incomplete; see also `class_rules.apply_rule`, `heights.require_plain_cover`.
+    Raises: InputError: a chunk is missing; see also `manifest.read_manifest`,
+            `class_rules.apply_rule`, `heights.require_plain_cover`.
     """
-    bundle, viewer, out = Path(bundle_dir), Path(viewer_dir), Path(out_dir)
-    if not (viewer / INDEX).is_file():
-        raise InputError(f"{viewer}: no viewer here (index.html is missing)")
-    value = read_json(bundle / MANIFEST)
-    if not isinstance(value, dict) or value.get("format") != FORMAT or value.get("version") != VERSION:
-        raise InputError(f"{bundle / MANIFEST}: not a bundle of format {FORMAT!r}, version {VERSION}; make it again")
+    bundle, viewer, out, surface = Path(bundle_dir), Path(viewer_dir), Path(out_dir), surface or FlatSurface()
+    manifest = apply_rule(read_manifest(bundle), rule)
+    require_plain_cover(surface, manifest.classes, manifest.objects)
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
-    copies += [(bundle / name, name) for name in _list_chunks(bundle, value)]
-    heights, pixels = (surface or FlatSurface()).describe()
-    if "classes" in value or any(entry["kind"] == "painted" for entry in rule):
-        changed = apply_rule(Manifest.from_dict(value), rule).to_dict()
-        value |= {key: changed[key] for key in ("classes", "objects") if key in changed}
-    else:
-        warn_of_rule(rule)
-    require_plain_cover(surface or FlatSurface(), value.get("classes"), value.get("objects"))
+    copies += [(bundle / name, name) for name in _list_chunks(bundle, manifest)]
+    heights, pixels = surface.describe()
     with atomic_folder(out) as part:
         for source, name in copies:
             (part / name).parent.mkdir(parents=True, exist_ok=True)
@@ -123,16 +110,14 @@ def write_page(
         if front and front.story:
             write_json(part / STORY, front.story.value)
             (part / SHEET).write_bytes(front.story.sheet)
-        write_json(part / MANIFEST, value | {"heights": heights})
+        write_json(part / MANIFEST, replace(manifest, heights=heights).to_dict())
 
 
-def _list_chunks(bundle: Path, manifest: dict[str, Any]) -> list[str]:
-    """The chunk files that a bundle's manifest names. Raises: InputError, as write_page."""
-    holders = [*manifest["tiles"], *manifest.get("objects", [])]
-    names = list(dict.fromkeys(chunk["file"] for holder in holders for chunk in holder["chunks"]))
+def _list_chunks(bundle: Path, manifest: Manifest) -> list[str]:
+    """The chunk files that a bundle's manifest names. Raises: InputError: one is missing."""
+    holders = [*manifest.tiles, *(manifest.objects or [])]
+    names = list(dict.fromkeys(chunk.file for holder in holders for chunk in holder.chunks))
     for name in names:
-        if "\\" in name or {"..", "/", ""} & set(PurePosixPath(name).parts or ("",)):
-            raise InputError(f"{bundle / MANIFEST}: chunk {name!r} lies outside of the bundle")
         if not (bundle / name).is_file():
             raise InputError(f"{bundle / name}: this chunk is missing; make the bundle again")
     return names

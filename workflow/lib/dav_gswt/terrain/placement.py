@@ -36,7 +36,10 @@ def place_cell(
     if things is not None:
         parts.append(place_objects(terrain, things, (i, j), eye))
     corner = np.array([i * terrain.side, j * terrain.side, 0.0])
-    return displace_and_fade(terrain, *concatenate_parts(parts), corner, eye)
+    field, level = concatenate_parts(parts)
+    field, slope = displace_means(field, terrain.heights, corner, eye)
+    faded, active = fade_levels(terrain, field, level, np.linalg.norm(field.means.astype(float), axis=1))
+    return faded, slope[active]
 
 
 def concatenate_parts(parts: list[Part]) -> Part:
@@ -66,15 +69,6 @@ def order_gaussians(parts: dict[int, GaussianField], direction: Vector) -> Part:
     flat = concatenate_fields(list(parts.values()))
     sequence = sort_back_to_front(flat.means, direction)
     return flat[sequence], level[sequence]
-
-
-def displace_and_fade(
-    terrain: EndlessTerrain, field: GaussianField, level: Int[Array, "n"], corner: Vector, eye: Vector
-) -> tuple[GaussianField, Float[Array, "k 2"]]:
-    """Gaussians on the surface relative to the eye, in their order, faded by the weights of their levels."""
-    field, slope = displace_means(field, terrain.heights, corner, eye)
-    faded, active = fade_levels(terrain, field, level, np.linalg.norm(field.means.astype(float), axis=1))
-    return faded, slope[active]
 
 
 def fade_levels(
@@ -166,5 +160,6 @@ def place_objects(terrain: EndlessTerrain, found: Instances, cell: tuple[int, in
 def active_objects(terrain: EndlessTerrain, found: Instances, distance: Floats) -> Bool[Array, "levels n"]:
     """Which levels have a weight somewhere on objects whose feet are at distances from the eye."""
     extent = np.array(terrain.extents)[found.number] * found.size
-    reach = extent * (1 + terrain.heights.steepest)
+    _, _, steepest = terrain.heights.bounds
+    reach = extent * (1 + steepest)
     return active_range(terrain, distance - reach, distance + reach)

@@ -27,9 +27,7 @@ def visible_on_sphere(terrain: EndlessTerrain, sphere: Sphere, camera: Camera) -
     Each face is halved again and again, and a square is culled with all of its cells where its bounding ball lies
     outside one plane of the frustum, out of reach, or below the horizon.
     """
-    size = 1
-    while size < sphere.cells + 2:
-        size *= 2
+    size = 1 << (sphere.cells + 1).bit_length()  # the next power of two
     squares = FaceCells(np.arange(6), np.full(6, -1), np.full(6, -1))
     while True:
         seen, nearest, farthest = _find_seen(terrain, sphere, camera, squares, size)

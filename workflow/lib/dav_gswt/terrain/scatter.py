@@ -9,14 +9,15 @@ Only sums, products, quotients and floor of float64 are used.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float, Int64
 from numpy import ndarray as Array
 from scipy.spatial import cKDTree
 
-from dav_gswt.bundle.land_cover import ObjectOrders, ScatterEntry
+from dav_gswt.bundle.land_cover import ObjectEntry, ScatterEntry
+from dav_gswt.field import Rows
 from dav_gswt.terrain.choice import Floats, Ints, hash_cell
 from dav_gswt.terrain.classes import Classes
 
@@ -26,7 +27,7 @@ RIM = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))  # where a footprint is
 
 
 @dataclass(frozen=True)
-class Instances:
+class Instances(Rows):
     """Objects on the terrain.
 
     Attributes:
@@ -45,17 +46,8 @@ class Instances:
     turn: Floats
     size: Floats
 
-    def __len__(self) -> int:
-        return len(self.i)
 
-    def __getitem__(self, index) -> "Instances":
-        return Instances(*(getattr(self, f.name)[index] for f in fields(self)))
-
-
-def concatenate_instances(parts: Sequence[Instances]) -> Instances:
-    """All instances of all parts, in their order."""
-    none = Instances(*(np.zeros(0, kind) for kind in (int, int, float, float, int, float, float)))
-    return Instances(*(np.concatenate([getattr(part, f.name) for part in (none, *parts)]) for f in fields(Instances)))
+NONE = Instances(*(np.zeros(0, kind) for kind in (int, int, float, float, int, float, float)))
 
 
 @dataclass(frozen=True)
@@ -70,7 +62,7 @@ class Scatter:
     """
 
     entry: ScatterEntry
-    objects: Sequence[ObjectOrders]
+    objects: Sequence[ObjectEntry]
     side: float
     classes: Classes | None = None
     _known: dict[tuple[int, int], Instances] = field(default_factory=dict, init=False, repr=False)
@@ -88,7 +80,7 @@ class Scatter:
             ends = np.cumsum(np.bincount(owner, minlength=len(new)))
             for cell, rows in zip(new, np.split(order, ends[:-1]), strict=True):
                 self._known[cell] = found[rows]
-        return concatenate_instances([self._known[cell] for cell in cells])
+        return Instances.concatenate([NONE, *(self._known[cell] for cell in cells)])
 
     def _find_instances(self, cells: Int64[Array, "n 2"]) -> Instances:
         """All instances in distinct cells, by candidates in them and in the cells around."""

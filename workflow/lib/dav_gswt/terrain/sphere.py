@@ -15,8 +15,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
+from dav_gswt.field import Rows
 from dav_gswt.terrain.choice import Floats, Ints, tiles_at
-from dav_gswt.terrain.heights import QUARTER, Sphere, gradient_noise
+from dav_gswt.terrain.heights import QUARTER, SHIFT, Sphere, gradient_noise
 
 FACES = np.array(  # east, north and out of each face
     [
@@ -30,22 +31,18 @@ FACES = np.array(  # east, north and out of each face
 )
 FRAY = 120  # axis of the hash of edge 0; edge k, that of the face it leads out of, uses FRAY + 2 k and the next
 FINE = (3.0, 9.0)  # cells of the two octaves of the noise, on a tile's side
-SHIFT = (0.37, 0.71)  # of the second octave
 WIDTH, CONTRAST = 0.3, 2.5  # tile sides: most that an edge is moved; the noise is this many times as strong, and cut
 TAPER = 0.5  # of the distance from a corner, in tile sides: there three faces meet, and edges are not moved
 LEVEL, LIFT, HIGHEST = 0.03, 2.0, 0.2  # what is higher than LEVEL reaches over by LIFT times that, HIGHEST at most
 
 
 @dataclass(frozen=True)
-class FaceCells:
+class FaceCells(Rows):
     """Cells of faces, or squares of cells of one size by their south-western cells."""
 
     face: Ints
     i: Ints
     j: Ints
-
-    def __getitem__(self, index) -> "FaceCells":
-        return FaceCells(self.face[index], self.i[index], self.j[index])
 
 
 def directions(face: Ints, tangents: Float[Array, "n 2"]) -> Float[Array, "n 3"]:
@@ -62,10 +59,10 @@ def bend(
 
     local: from the middle of the tile, z above the ground. tangents: of the tile's middle. The points are returned from
     the place of the tile's middle on the ground. With t the tangents and d their change, |t + d| - |t| and the change
-    of the direction are computed from d alone, so float32 keeps seven digits of a point's distance from the middle of
-    its tile at any radius.
+    of the direction are computed from d alone, so a shader's float32 keeps seven digits of a point's distance from
+    the middle of its tile at any radius.
     """
-    along = np.tan(local[:, :2] * local.dtype.type(rate))
+    along = np.tan(local[:, :2] * rate)
     change = (1 + tangents * tangents) * along / (1 - tangents * along)
     there = tangents + change
     first, length = np.sqrt(1 + (tangents * tangents).sum(-1)), np.sqrt(1 + (there * there).sum(-1))
@@ -73,9 +70,9 @@ def bend(
     up = np.concatenate([there, np.ones_like(there[:, :1])], 1) / length[:, None]
     flat = np.concatenate([tangents * np.ones_like(there), np.ones_like(there[:, :1])], 1)
     shift = np.concatenate([change, np.zeros_like(there[:, :1])], 1) - flat * (longer / first)[..., None]
-    points = local.dtype.type(radius) * shift / length[:, None] + local[:, 2:] * up
-    grow = (radius * rate + rate * local[:, 2:]).astype(local.dtype) * (1 + there * there) / length[:, None]
-    level = np.eye(3, dtype=local.dtype)[:, :2] - up[:, :, None] * up[:, None, :2]
+    points = radius * shift / length[:, None] + local[:, 2:] * up
+    grow = (radius * rate + rate * local[:, 2:]) * (1 + there * there) / length[:, None]
+    level = np.eye(3)[:, :2] - up[:, :, None] * up[:, None, :2]
     return points, np.concatenate([level * grow[:, None], up[:, :, None]], 2)
 
 

@@ -4,13 +4,13 @@ The rasterizer sorts by depth. To blend in a given order, each splat becomes a f
 depth is its rank, seen by an orthographic camera. Its covariance there is the splat's, so every backend can render it.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
-from dav_gswt.field import GaussianField
+from dav_gswt.field import GaussianField, Rows
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rendering, harmonics, make_rasterizer
 from dav_gswt.terrain.heights import Slope, displaced_axes
@@ -23,7 +23,7 @@ THINNEST = 1e-9  # pixels
 
 
 @dataclass(frozen=True)
-class Splats:
+class Splats(Rows):
     """Ellipses in pixels: centres, log standard deviations of two axes, angle of the first axis from x."""
 
     centres: Float32[Array, "n 2"]
@@ -33,42 +33,23 @@ class Splats:
     colours: Float32[Array, "n 3"]
     depths: Float32[Array, "n"]
 
-    def __len__(self) -> int:
-        return len(self.centres)
-
-    def __getitem__(self, index) -> "Splats":
-        return Splats(*(getattr(self, f.name)[index] for f in fields(self)))
-
 
 EMPTY = Splats(*(np.zeros((0, *width), np.float32) for width in ((2,), (2,), (), (), (3,), ())))
 
 
-def concatenate_splats(parts: list[Splats]) -> Splats:
-    """All splats of all parts, in their order."""
-    return Splats(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Splats)))
-
-
-def sort_by_depth(splats: Splats) -> Splats:
-    """Back to front by depth; of equal depths the later one comes first, as in the rasterizer."""
-    return splats[depth_order(splats)]
-
-
 def depth_order(splats: Splats) -> Int[Array, "n"]:
-    """Indices of the splats from back to front."""
+    """Indices of the splats from back to front; of equal depths the later one comes first, as in the rasterizer."""
     return np.argsort(splats.depths, kind="stable")[::-1]
 
 
-def project(field: GaussianField, slope: Slope, camera: Camera, near: float) -> Splats:
-    """Project Gaussians on a surface of these slopes, in their order; those outside the picture are culled."""
-    return project_indexed(field, slope, camera, near)[0]
-
-
-def project_indexed(field: GaussianField, slope: Slope, camera: Camera, near: float) -> tuple[Splats, Int[Array, "k"]]:
-    """`project`, and the index of each splat in the field.
+def project(field: GaussianField, slope: Slope, camera: Camera, near: float) -> tuple[Splats, Int[Array, "k"]]:
+    """Project Gaussians on a surface of these slopes, in their order; those outside the picture are culled.
 
     S = (J W A)(J W A)^T with A of `displaced_axes` (EWA); its determinant by Lagrange's identity |p x q|^2. A Gaussian
     whose depth is small against its extent in depth fades out: its linearised splat would cover the picture up to the
     horizon. The viewer does the same.
+
+    Returns: the splats, and the index of each in the field.
     """
     q = np.ascontiguousarray((field.means.astype(float) @ camera.rotation.T + camera.translation).T)
     ahead = np.flatnonzero(q[2] > near)

@@ -1,31 +1,27 @@
 """Stills of the endless terrain: rendered tile by tile as the viewer does, over a sky and a far ground."""
 
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.manifest import Manifest, Sky
-from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import splats, visibility
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.choice import Vector
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.heights import Slope, Sphere
+from dav_gswt.terrain.heights import Sphere
 from dav_gswt.terrain.placement import group_by_cell, place_cell
 from dav_gswt.terrain.planet import place_on_sphere, visible_on_sphere
 from dav_gswt.terrain.sphere import frame_at, walk_from
 from dav_gswt.threads import default_threads
 
 MAX_GAUSSIANS = 10_000_000  # in one picture
-TOGETHER = 64  # cells that are placed, then projected: what lies between the two is held
 ORBIT = 2.5  # height of `above` over a planet, in its radii: all of it is in view
 START = (20.0, 30.0)  # longitude and latitude that places on a sphere count from, in degrees
 
@@ -46,21 +42,6 @@ SHOTS = (
     Shot("oblique", (3.3, 2.2), 3.0, 35.0, 20.0),
     Shot("above", (-4.0, 5.0), 12.0, 90.0, 90.0),
 )
-
-
-@dataclass
-class FrameTiming:
-    """Accumulates while a picture is rendered. milliseconds: by stage; gaussians: placed for the picture."""
-
-    milliseconds: dict[str, float] = field(default_factory=dict)
-    gaussians: int = 0
-
-    @contextmanager
-    def measure(self, stage: str) -> Iterator[None]:
-        """Add the time of this block to a stage."""
-        start = time.perf_counter()
-        yield
-        self.milliseconds[stage] = self.milliseconds.get(stage, 0.0) + 1e3 * (time.perf_counter() - start)
 
 
 def list_shots(terrain: EndlessTerrain, floor: float) -> list[Shot]:
@@ -111,51 +92,35 @@ def render_view(
     sky: Sky,
     ground_colour: Sequence[float] | Array,
     exact: bool = False,
-    timing: FrameTiming | None = None,
 ) -> Float32[Array, "h w 3"]:
     """Render the terrain; pixels that no tile covers show the sky above the horizon and the far ground below it.
 
     Tiles are drawn back to front, each in a pre-sorted order; the 3 x 3 block about the eye is drawn last and sorted by
-    depth.
+    depth. Of cells with more than MAX_GAUSSIANS the farthest are left out.
 
-    Args:   exact: sort all Gaussians together by depth, as a reference. timing: filled with the milliseconds of
-            `update` (visible cells, and their Gaussians placed in order), `sort` and `render`.
+    Args:   exact: sort all Gaussians together by depth, as a reference.
     Raises: ValueError: an orthographic camera, whose rays have no common origin.
     """
     if camera.orthographic:
         raise ValueError("the terrain is drawn for a pinhole camera")
-    timing = timing or FrameTiming()
     eye, here, surface = camera.centre, replace(camera, translation=np.zeros(3)), terrain.heights
     sphere = surface if isinstance(surface, Sphere) else None
-    with timing.measure("update"):
-        cells = visible_on_sphere(terrain, sphere, camera) if sphere else visibility.visible_cells(terrain, camera)
-        if visibility.count_gaussians(terrain, cells).sum() > MAX_GAUSSIANS:  # coarser levels first, then fewer cells
-            terrain = visibility.coarsen_to_budget(terrain, camera, MAX_GAUSSIANS, cells)
-            cells = visibility.drop_far_cells(terrain, cells, MAX_GAUSSIANS)
-        things = group_by_cell(terrain, cells, eye)
+    cells = visible_on_sphere(terrain, sphere, camera) if sphere else visibility.visible_cells(terrain, camera)
+    cells = visibility.drop_far_cells(terrain, cells, MAX_GAUSSIANS)
+    things = group_by_cell(terrain, cells, eye)
     backdrop = Backdrop.for_eye(terrain, eye, sky, ground_colour)
-    far, close = [splats.EMPTY], [splats.EMPTY]
 
-    def place(k: int) -> tuple[GaussianField, Slope]:
+    def project(k: int) -> splats.Splats:
         if sphere:
-            return place_on_sphere(terrain, sphere, cells[k : k + 1], eye)
-        return place_cell(terrain, cells[k : k + 1], eye, things.get(k))
+            field, slope = place_on_sphere(terrain, sphere, cells[k : k + 1], eye)
+        else:
+            field, slope = place_cell(terrain, cells[k : k + 1], eye, things.get(k))
+        return splats.project(backdrop.blend_far(field), slope, here, terrain.near)[0]
 
-    def project(placed: tuple[GaussianField, Slope]) -> splats.Splats:
-        return splats.project(backdrop.blend_far(placed[0]), placed[1], here, terrain.near)
-
+    far, close = [splats.EMPTY], [splats.EMPTY]
     with ThreadPoolExecutor(default_threads()) as pool:  # NumPy works beside itself; each cell is on its own
-        for first in range(0, len(cells), TOGETHER):
-            numbers = range(first, min(first + TOGETHER, len(cells)))
-            with timing.measure("update"):
-                placed = list(pool.map(place, numbers))
-            with timing.measure("render"):
-                parts = list(pool.map(project, placed))
-            for k, part in zip(numbers, parts, strict=True):
-                (close if exact or cells.close[k] else far).append(part)
-            timing.gaussians += sum(len(field) for field, _ in placed)
-    with timing.measure("sort"):
-        ordered = splats.concatenate_splats([*far, splats.sort_by_depth(splats.concatenate_splats(close))])
-    with timing.measure("render"):
-        seen = splats.blend(ordered, here)
-        return np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop.colours_along(here.rays()[1]), 0, 1)
+        for k, part in enumerate(pool.map(project, range(len(cells)))):
+            (close if exact or cells.close[k] else far).append(part)
+    last = splats.Splats.concatenate(close)
+    seen = splats.blend(splats.Splats.concatenate([*far, last[splats.depth_order(last)]]), here)
+    return np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop.colours_along(here.rays()[1]), 0, 1)

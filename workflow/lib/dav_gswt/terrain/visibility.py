@@ -1,24 +1,24 @@
 """Visible cells: which cells of the endless terrain a camera may see, at which levels, within a budget of Gaussians."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
+from dav_gswt.field import Rows
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import draw_order
 from dav_gswt.terrain.choice import Floats, Ints, Vector, tiles_at
 from dav_gswt.terrain.endless import EndlessTerrain
 
 PAD = 2.0  # pixels, rounded up, by which the rasterizer's dilation of splats reaches into the picture
-MIN_FACTOR, BISECTIONS = 1e-5, 16  # of the search for a factor on level distances
 
 Points = Float[Array, "n 3"]
 
 
 @dataclass(frozen=True)
-class GridCells:
+class GridCells(Rows):
     """Cells of the tile grid, back to front. tile: that of the first material in the cell. materials: which materials
     the cell may show, bit m for material m. close: in the 3 x 3 block about the eye. nearest, farthest: bounds of the
     distances from the eye to the centres of a cell's Gaussians.
@@ -31,12 +31,6 @@ class GridCells:
     close: Bool[Array, "n"]
     nearest: Floats
     farthest: Floats
-
-    def __len__(self) -> int:
-        return len(self.i)
-
-    def __getitem__(self, index) -> "GridCells":
-        return GridCells(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
 def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
@@ -75,9 +69,10 @@ def _bound_cells(terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector) -> tupl
     side, surface = terrain.side, terrain.heights
     x, y = (i + 0.5) * side, (j + 0.5) * side
     middle, _ = surface.at(x, y)
-    most = surface.steepest * (0.5 * side + terrain.overhang) * 2**0.5
-    low = np.maximum(middle - most, surface.low) + terrain.z[0]
-    high = np.minimum(middle + most, surface.high) + terrain.z[1]
+    lowest, highest, steepest = surface.bounds
+    most = steepest * (0.5 * side + terrain.overhang) * 2**0.5
+    low = np.maximum(middle - most, lowest) + terrain.z[0]
+    high = np.minimum(middle + most, highest) + terrain.z[1]
     half = np.full(len(x), 0.5 * side)
     return np.stack([x, y, 0.5 * (low + high)], 1) - eye, np.stack([half, half, 0.5 * (high - low)], 1)
 
@@ -140,27 +135,3 @@ def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int) -> Gr
     nearest_first = np.argsort(cells.nearest, kind="stable")
     count = np.cumsum(count_gaussians(terrain, cells)[nearest_first])
     return cells[np.sort(nearest_first[count <= budget])]
-
-
-def coarsen_to_budget(
-    terrain: EndlessTerrain, camera: Camera, budget: int, cells: GridCells | None = None
-) -> EndlessTerrain:
-    """Multiply all level distances by one factor, the largest with which a picture has at most `budget` Gaussians.
-
-    The viewer does the same and also moves the end of the ground nearer. Where the coarsest level alone exceeds the
-    budget, that level is used. cells: those that the camera sees, if they are known.
-    """
-    cells, low, high = visible_cells(terrain, camera) if cells is None else cells, MIN_FACTOR, 1.0
-
-    def scale_distances(factor: float) -> EndlessTerrain:
-        return replace(
-            terrain, switches=[factor * s for s in terrain.switches], bands=[factor * b for b in terrain.bands]
-        )
-
-    if count_gaussians(terrain, cells).sum() <= budget:
-        return terrain
-    for _ in range(BISECTIONS):
-        middle = float(np.sqrt(low * high))
-        fits = count_gaussians(scale_distances(middle), cells).sum() <= budget
-        low, high = (middle, high) if fits else (low, middle)
-    return scale_distances(low)
