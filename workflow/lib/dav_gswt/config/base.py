@@ -131,6 +131,11 @@ def find_table(field: FieldInfo) -> type[BaseModel] | None:
     return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
 
 
+def lower_first(message: str) -> str:
+    """A message of pydantic as part of a sentence."""
+    return message[:1].lower() + message[1:]
+
+
 ANY = "*"  # in a place: any name of an entry, or any position in a list
 Place = tuple[str, ...]
 Schema = dict[str, Any]

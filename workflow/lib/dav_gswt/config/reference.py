@@ -33,8 +33,13 @@ after "not" have no effect. k is the config's `k`.
 
 
 def describe_tables(model: type[BaseModel], place: Place = ()) -> str:
-    """Every table of a model, with its keys. place: where the model lies in the config."""
-    return "\n\n".join(_describe_table((*place, *where), table) for where, table in iterate_tables(model))
+    """Every table of a model once, with its places and its keys. place: where the model lies in the config."""
+    places: dict[int, list[Place]] = {}
+    tables = {}
+    for where, table in iterate_tables(model):
+        places.setdefault(id(table), []).append((*place, *where))
+        tables[id(table)] = table
+    return "\n\n".join(_describe_table(places[number], table) for number, table in tables.items())
 
 
 def describe_policies() -> str:
@@ -68,11 +73,11 @@ def write_files(texts: dict[str, str]) -> None:
         Path(name).write_text(text, encoding="utf-8")
 
 
-def _describe_table(place: Place, table: Schema) -> str:
-    name = ".".join("<name>" if part == ANY else part for part in place) or "Top level"
+def _describe_table(places: list[Place], table: Schema) -> str:
+    names = [".".join("<name>" if part == ANY else part for part in place) or "Top level" for place in places]
     rows = [_describe_key(key, value, key in table.get("required", ())) for key, value in table["properties"].items()]
     head = ["| key | meaning | values | default |", "|---|---|---|---|"]
-    return "\n".join([f"### {name}", "", table.get("description", ""), "", *head, *rows])
+    return "\n".join([f"### {', '.join(names)}", "", table.get("description", ""), "", *head, *rows])
 
 
 def _describe_key(key: str, value: Schema, required: bool) -> str:
