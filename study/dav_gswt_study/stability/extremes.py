@@ -101,7 +101,9 @@ ALL = (
         write_two_photos,
         error_pattern="at least 3 overlapping photos are needed",
     ),
-    Extreme("all-start", "start views ask for all photos: no pool", override_desert(agent="replay", photo_count=5, start=6)),
+    Extreme(
+        "all-start", "start views ask for all photos: no pool", override_desert(agent="replay", photo_count=5, start=6)
+    ),
     Extreme("k-pool", "k = pool", {"k": 6} | override_desert(candidates=6)),
     Extreme("k-over-pool", "k far above the pool", {"k": 1000} | override_desert(candidates=6)),
     Extreme("lam-0", "lambda 0", override_views(lam=0)),

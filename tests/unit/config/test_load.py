@@ -65,7 +65,9 @@ RIG = {"port": "p", "inbox": "in", "millimetres": 250, "limits": {"pan": [0, 1],
         pytest.param(["presets", "draft", "choose_with"], "best", "there is no 'best'", id="an unknown chooser"),
         pytest.param(["presets", "draft", "choose_with"], "draft", "chooses no photos itself", id="its own chooser"),
         pytest.param(["presets", "reference", "choose_with"], "standard", "one that does .draft", id="no chooser"),
-        pytest.param(["presets", "draft", "fit_size"], "own", "draft.fit_size: .*or input should be 'native'", id="a word"),
+        pytest.param(
+            ["presets", "draft", "fit_size"], "own", "draft.fit_size: .*or input should be 'native'", id="a word"
+        ),
         pytest.param(["presets", "draft", "size"], 384, "no key 'size'; is 'fit_size' meant", id="size of a fit"),
         pytest.param(["scenes", "desert", "photos"], 8, "no key 'photos'; is 'photo_count' meant", id="photos"),
         pytest.param(["stills"], {"width": 8}, "config: stills: there is no key 'width'; .*valid list", id="a table"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.capture import serial_rig
-from dav_gswt.config.base import EntryKeys, is_read, select_keys
+from dav_gswt.config.base import EntryKeys, select_keys
 from dav_gswt.config.load import check_model
 from dav_gswt.config.scenes import SCENES, PhotoScene, SyntheticScene
 from dav_gswt.config.settings import Preset
@@ -45,8 +45,6 @@ def test_keys_follow_from_the_rule_and_the_agent():
     assert read == {"replay": {"agent"}, "plan": {"agent", "candidates", "poses", "drone"}}
     assert select_keys(PhotoScene, "score_coarse", photo_scene("plan"))["drone"] == {"min_altitude": 2.0}
     assert "clearance" in select_keys(PhotoScene, "request_views", photo_scene("plan"))["drone"]
-    assert is_read(PhotoScene, "score_coarse", "rig.limits", "serial")
-    assert not is_read(PhotoScene, "score_coarse", "rig.port", "serial")
     assert set(select_keys(PhotoScene, "register_photos", photo_scene("replay"))) == {"folder", "size"}
 
 

@@ -44,9 +44,7 @@ def add_scene_files(config: dict, folder: Path) -> dict:
     Raises: InputError: a file is no YAML, two have one name, or the config has a scene of that name of another kind.
     """
     scenes, own = {}, config.get("scenes") or {}
-    for path in sorted([*folder.glob("*.yaml"), *folder.glob("*.yml")]):
-        if path.name.startswith("."):  # of an editor or a file system
-            continue
+    for path in sorted(folder.glob("[!.]*.y*ml")):  # those with a dot are of an editor or a file system
         if path.stem in scenes:
             raise InputError(f"{path}: there is a scene of this name in {path.stem}.yaml, too; remove one of them")
         scenes[path.stem] = scene = _read_yaml(path)
@@ -118,17 +116,16 @@ def _describe_error(model: type[BaseModel], values: dict, error: ValidationError
     else:
         # of a value that may be of several kinds there is an error for each kind
         own = _keys_of(values, location)
-        message = " or ".join(
-            dict.fromkeys(lower_first(e["msg"]) for e in errors if _keys_of(values, e["loc"]) == own)
-        )
+        message = " or ".join(dict.fromkeys(lower_first(e["msg"]) for e in errors if _keys_of(values, e["loc"]) == own))
         if first["type"].endswith("_type") and isinstance(first["input"], dict) and first["input"]:
             message = f"there is no key {next(iter(first['input']))!r}; {message}"
-    keys = ".".join([where] * bool(where) + [str(key) for key in _keys_of(values, location)])
-    if first["type"] in ("missing", "extra_forbidden") and not keys.endswith(str(location[-1])):
-        keys = f"{keys}.{location[-1]}".lstrip(".")
+    keys = [where] * bool(where) + [str(key) for key in _keys_of(values, location)]
     if first["type"] == "extra_forbidden":
-        keys = keys.rpartition(".")[0]
-    return f"config: {keys + ': ' if keys else ''}{message} ({REFERENCE})"
+        keys.pop()
+    if first["type"] == "missing":
+        keys.append(str(location[-1]))
+    place = f"{'.'.join(keys)}: " if keys else ""
+    return f"config: {place}{message} ({REFERENCE})"
 
 
 def _keys_of(values: Any, location: tuple) -> list:
@@ -153,5 +150,3 @@ def _describe_unknown_key(model: type[BaseModel], location: tuple) -> str:
     )
     near = get_close_matches(unknown, known, 1, 0.55)  # finds `photo_count` for `photos`
     return f"there is no key {unknown!r}" + (f"; is {near[0]!r} meant?" if near else f", only {', '.join(known)}")
-
-

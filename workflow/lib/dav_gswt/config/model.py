@@ -1,6 +1,6 @@
 """The whole config of the product."""
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
@@ -102,9 +102,11 @@ class Config(ConfigModel):
         """A value of `sweeps` has the type and the bounds of the setting itself."""
         for name, values in self.sweeps.items():
             field = Config.model_fields[name]
-            checked = TypeAdapter(list[Annotated[field.annotation, *field.metadata]], config=ConfigModel.model_config)
+            setting: Any = Annotated[field.annotation, *field.metadata]
+            adapter = TypeAdapter(setting, config=ConfigModel.model_config)
             try:
-                checked.validate_python(values)
+                for value in values:
+                    adapter.validate_python(value)
             except ValidationError as error:
                 raise ValueError(f"sweeps.{name}: {lower_first(error.errors()[0]['msg'])}") from None
         return self

@@ -34,12 +34,10 @@ after "not" have no effect. k is the config's `k`.
 
 def describe_tables(model: type[BaseModel], place: Place = ()) -> str:
     """Every table of a model once, with its places and its keys. place: where the model lies in the config."""
-    places: dict[int, list[Place]] = {}
-    tables = {}
+    found: dict[int, tuple[list[Place], Schema]] = {}
     for where, table in iterate_tables(model):
-        places.setdefault(id(table), []).append((*place, *where))
-        tables[id(table)] = table
-    return "\n\n".join(_describe_table(places[number], table) for number, table in tables.items())
+        found.setdefault(id(table), ([], table))[0].append((*place, *where))
+    return "\n\n".join(_describe_table(places, table) for places, table in found.values())
 
 
 def describe_policies() -> str:
@@ -110,8 +108,6 @@ def _format_value(value: Any) -> str:
     """A default as YAML and JSON have it, without the keys that have no value."""
     if isinstance(value, dict):
         value = {key: each for key, each in value.items() if each is not None}
-    if isinstance(value, list):
-        return f"[{', '.join(map(_format_value, value))}]"
     return json.dumps(value)
 
 

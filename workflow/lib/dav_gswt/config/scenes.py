@@ -74,10 +74,11 @@ class _Scene(ConfigModel):
 
 
 class _PhotographedScene(_Scene):
-    candidates: int = key("poses that may be asked for", 250, read_by=POSE_READERS, agents=POSED, ge=0, le=10_000)
+    candidates: int = key("poses that may be asked for", 250, read_by=POSE_READERS, agents=POSED, ge=1, le=10_000)
     poses: Literal["orbit", "free"] | Route = key(
-        "which poses these are: `orbit`, all at the flying height from the exemplar's middle, and looking there; `free`, "
-        "any direction, aim point and distance (0.4 to 1.5 flying heights for `agent: render`, else 0.4 to 1); or a path",
+        "which poses these are: `orbit`, all at the flying height from the exemplar's middle, and looking there; "
+        "`free`, any direction, aim point and distance (0.4 to 1.5 flying heights for `agent: render`, else 0.4 to 1); "
+        "or a path",
         "orbit",
         read_by=POSE_READERS,
         agents=POSED,
@@ -187,9 +188,6 @@ class PhotoScene(_PhotographedScene):
         "who takes further photos: `replay` takes them from the photos of the folder that are left; `serial` is a "
         "camera rig, `plan` a drone, `handheld` a person",
         read_by=POSE_READERS,
-    )
-    candidates: int = key(
-        "poses that a device may be asked for", 250, read_by=POSE_READERS, agents=POSED, ge=1, le=10_000
     )
     rig: SerialRig | None = key("the camera rig of `agent: serial`", None, read_by=CAPTURING, agents=("serial",))
     drone: Drone = key("how a drone flies, for `agent: plan`", Drone(), read_by=CAPTURING, agents=("plan",))
