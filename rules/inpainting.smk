@@ -31,9 +31,7 @@ rule inpaint_field:
         mem_mb=per_attempt(3000),
         runtime=per_attempt("30m"),
     params:
-        prior=lambda wildcards: select_keys(
-            TerrainPriorSettings, "inpaint_field", config["priors"][wildcards.inpainter]
-        ),
+        prior=entry("priors", "inpainter"),
         seed=integer("seed"),
         source=code_of("inpaint_field"),
     script:

@@ -186,11 +186,10 @@ def prior_weights(wildcards):
     """What scoring reads beside the field: the weights of the prior and of LPIPS."""
     if wildcards.prior == "none":
         return {}
-    prior, where = config["priors"][wildcards.prior], f"priors.{wildcards.prior}"
-    files = lpips_weights(wildcards)
+    prior, files = config["priors"][wildcards.prior], lpips_weights(wildcards)
     if prior["model"] == "terrain":
         return files | {"weights": terrain_weights(wildcards.prior)}
-    return files | {"folder": existing(prior["folder"], f"{where}.folder", "; see docs/prior.md")}
+    return files | {"folder": existing(prior["weights"], f"priors.{wildcards.prior}.weights", "; see docs/prior.md")}
 
 
 def pictures_that_tell(wildcards):

@@ -11,7 +11,7 @@ from dav_gswt.config.base import select_keys
 from dav_gswt.config.exports import Export
 from dav_gswt.config.load import add_scene_files, check_config, merge_tables, parse_command_line
 from dav_gswt.config.scenes import SCENES
-from dav_gswt.config.settings import Preset, TerrainPriorSettings
+from dav_gswt.config.settings import Preset
 from dav_gswt.errors import InputError
 from dav_gswt.files import is_from_future, locate_path
 from dav_gswt.images.lpips_weights import locate_weights

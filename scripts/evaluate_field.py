@@ -15,7 +15,7 @@ from dav_gswt.reconstruction.observation import mask_to_ground
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
     split, captures = read_view_split(paths.views), list(paths.get("captures", []))
-    tests = read_training_views(paths.images, paths.model, list(split.test), [], params.preset["size"])
+    tests = read_training_views(paths.images, paths.model, list(split.test), [], params.preset["fit_size"])
     photos = len(split.start) + sum(len(read_capture_record(folder)) for folder in captures)
     fitted, grid = read_field(paths.field), ground.read_ground(paths.ground)
     perceptual = lpips_weights.read(paths.lpips) if paths.get("lpips") else None

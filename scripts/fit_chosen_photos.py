@@ -12,7 +12,7 @@ from dav_gswt.reconstruction import ground, update
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
-    names, size = list(read_view_split(paths.views).start), params.preset["size"]
+    names, size = list(read_view_split(paths.views).start), params.preset["fit_size"]
     photos = read_training_views(paths.images, paths.model, names, list(paths.captures), size, params.keep)
     files = update.PhotoFiles(paths.model, paths.images, len(names), params.scene.get("whole", False))
     frame, rng = read_scene_frame(paths.frame), np.random.default_rng([params.seed, params.t])

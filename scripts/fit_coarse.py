@@ -14,7 +14,7 @@ from dav_gswt.reconstruction.fitting.plan import FitSettings
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
     settings, names = FitSettings.from_preset(params.preset), list(read_view_split(paths.views).start)
-    photos = read_training_views(paths.images, paths.model, names, [], settings.size, params.keep)
+    photos = read_training_views(paths.images, paths.model, names, [], settings.fit_size, params.keep)
     frame, whole = read_scene_frame(paths.frame), params.scene.get("whole", False)
     start = coarse.read_start_views(frame, photos, paths.model, paths.images, whole)
     fitted = coarse.fit_coarse_field(start, settings, np.random.default_rng(params.seed))

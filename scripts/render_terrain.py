@@ -13,4 +13,4 @@ with logging_to(snakemake.log[0]):
     terrain = endless.terrain_from_bundle(bundle, params.heights, params.classes)
     targets = {Path(path).stem: path for path in snakemake.output.stills}
     for shot in progress(stills.list_shots(terrain, bundle.manifest.eye_floor), "render stills"):
-        image_files.write_png(targets[shot.name], stills.render_shot(terrain, shot, bundle.manifest, **params.size))
+        image_files.write_png(targets[shot.name], stills.render_shot(terrain, shot, bundle.manifest, *params.size))

@@ -9,7 +9,7 @@ from dav_gswt.photos.view_split import split_views, write_view_split
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
-    start, whole = params.scene.get("start") or params.scene["photos"], params.scene.get("whole", False)
+    start, whole = params.scene.get("start") or params.scene["photo_count"], params.scene.get("whole", False)
     rng = np.random.default_rng(params.seed)
     split = split_views(read_colmap_model(paths.model), read_scene_frame(paths.frame), start, rng, whole)
     write_view_split(snakemake.output.views, split)

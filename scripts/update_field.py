@@ -12,7 +12,7 @@ from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground, update
 
 with logging_to(snakemake.log[0]):
-    paths, params, size = snakemake.input, snakemake.params, snakemake.params.preset["size"]
+    paths, params, size = snakemake.input, snakemake.params, snakemake.params.preset["fit_size"]
     captures, names = list(paths.captures), list(read_view_split(paths.views).start)
     views = read_training_views(paths.images, paths.model, names, captures, size, params.keep)
     count = len(views) - len(read_capture_record(captures[-1]))

@@ -13,8 +13,8 @@ from record import report_figures
 from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt_study import fit_profile
 
-COPR = FitSettings(size=256, spacing=1.5, max_gaussians=350_000, steps=1000)
-HIGH = FitSettings(size=384, spacing=1.25, max_gaussians=150_000, steps=400)
+COPR = FitSettings(fit_size=256, spacing=1.5, max_gaussians=350_000, steps=1000)
+HIGH = FitSettings(fit_size=384, spacing=1.25, max_gaussians=150_000, steps=400)
 SCENES = ("desert_high", "meadow_high")
 
 
@@ -41,7 +41,7 @@ def photos(scene: str) -> Path:
 
 def copr() -> dict[str, float | None]:
     """Of the 38 photos that register every tenth is for testing; all ground that any photo sees is modelled."""
-    given = fit_profile.read_photo_set(photos("copr_dunes"), COPR.size)
+    given = fit_profile.read_photo_set(photos("copr_dunes"), COPR.fit_size)
     found = fit_profile.profile_fit(given, COPR)
     last = found.curve[-1]
     shape = f"{len(given.train)} photos, {last['gaussians']} Gaussians, {last['step']} steps"
@@ -60,7 +60,7 @@ def offpath() -> dict[str, float]:
     """Fitted from above 60 degrees of elevation: PSNR of high test views less that of test views at 45 degrees."""
     out, losses = {}, []
     for scene in SCENES:
-        given = fit_profile.read_photo_set(photos(scene), HIGH.size, 0.15)
+        given = fit_profile.read_photo_set(photos(scene), HIGH.fit_size, 0.15)
         seen = fit_profile.measure_test_groups(given, fit_profile.profile_fit(given, HIGH, every=10**6).made)
         losses.append(seen["high"] - seen["oblique"])
         out |= {f"offpath_{scene}_{group}_psnr": value for group, value in seen.items()}

@@ -51,7 +51,7 @@ def list_seeds(measure: dict[str, list[int]]) -> list[int]:
 
 def count_start_photos(scene: dict) -> int:
     """Photos that a scene starts from."""
-    return scene["start"] if "start" in scene else scene["photos"]
+    return scene["start"] if "start" in scene else scene["photo_count"]
 
 
 def split_tiling(tiling: str) -> tuple[str, str]:
@@ -123,7 +123,7 @@ def list_settings(config: dict) -> list[Setting]:
 
 def find_test_size(config: dict) -> int:
     """The size of the photos that all settings are tested on: the largest that one is fitted to. config: `entries`'."""
-    return max(config["presets"][setting.chosen["preset"]]["size"] for setting in list_settings(config))
+    return max(config["presets"][setting.chosen["preset"]]["fit_size"] for setting in list_settings(config))
 
 
 def add_entries(config: dict) -> dict:

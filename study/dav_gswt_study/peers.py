@@ -160,7 +160,7 @@ def describe(rows: list[dict], photos: PhotoSet, asked: dict, made: dict) -> dic
         "renderer": ", ".join(str(value) for value in made["renderer"].values()),
         "processor": f"{made['cores']} cores of {made['processor']}",
         "scene": asked["scene"],
-        "size": asked["size"],
+        "size": asked["fit_size"],
         "seconds": f"{asked['seconds']:g}",
         "train": len(photos.train),
         "photo": Path(test_photo(photos).name).stem,

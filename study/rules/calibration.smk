@@ -29,7 +29,7 @@ rule calibrate_coarse:
         runtime=per_attempt("60m"),
     params:
         scene=scene_keys("select_poses"),
-        size=lambda wildcards: config["presets"][wildcards.preset]["size"],
+        size=lambda wildcards: config["presets"][wildcards.preset]["fit_size"],
         prior=lambda wildcards: config["priors"].get(wildcards.prior),
         p_drop=real("p_drop"),
         lam=lookup(dpath="lam", within=config),

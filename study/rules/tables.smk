@@ -47,7 +47,7 @@ rule plot_estimators:
         runtime=per_attempt("10m"),
     params:
         titles=lambda wildcards: STUDY["tables"]["figures"]["estimators"],
-        size=lambda wildcards: config["presets"][config["scenes"][wildcards.scene]["preset"]]["size"],
+        size=lambda wildcards: config["presets"][config["scenes"][wildcards.scene]["preset"]]["fit_size"],
         source=code_of_study("plot_evolution"),
     script:
         "../scripts/plot_evolution.py"

@@ -31,7 +31,7 @@ rule evaluate_at:
         mem_mb=per_attempt(1500),
         runtime=per_attempt("10m"),
     params:
-        preset=lambda wildcards: preset_keys("evaluate_round")(wildcards) | {"size": int(wildcards.size)},
+        preset=lambda wildcards: preset_keys("evaluate_round")(wildcards) | {"fit_size": int(wildcards.size)},
         t=integer("t"),
         source=code_of("evaluate_field"),
     script:

@@ -85,7 +85,7 @@ rule plot_evolution:
         mem_mb=per_attempt(1500),
         runtime=per_attempt("10m"),
     params:
-        size=lambda wildcards: config["presets"][wildcards.preset]["size"],
+        size=lambda wildcards: config["presets"][wildcards.preset]["fit_size"],
         titles=lambda wildcards: [f"round {t}" for t in figure_rounds(wildcards)],
         source=code_of_study("plot_evolution"),
     script:

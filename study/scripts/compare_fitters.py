@@ -13,7 +13,7 @@ with logging_to(snakemake.log[0]):
     program = peers.find_program(asked["opensplat"])  # before any work
     settings = FitSettings.from_preset(asked)
     folder = Path(snakemake.input.frame).parent
-    photos = peers.select_photos(fit_profile.read_photo_set(folder, settings.size, asked["margin"]))
+    photos = peers.select_photos(fit_profile.read_photo_set(folder, settings.fit_size, asked["margin"]))
     curves = {peers.OURS: fit_profile.profile_fit(photos, settings, every=asked["every"]).curve}
     curves |= peers.profile_others(program, photos, asked, Path(out.table).parent)
     rows = [{"program": program} | row for program, curve in curves.items() for row in curve]

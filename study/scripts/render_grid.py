@@ -24,5 +24,5 @@ with logging_to(snakemake.log[0]):
         above = stills.Shot("grid", (0.5, 0.5), float(high), 90.0, 90.0)
         far = replace(terrain, reach=2 * TILES + 8)  # all tiles are nearer than the far ground
         image_files.write_png(folder / f"grid_{surface}.png", stills.render_shot(far, above, manifest, SQUARE, SQUARE))
-        walker = stills.render_shot(terrain, stills.SHOTS[0], manifest, **snakemake.params.size)
+        walker = stills.render_shot(terrain, stills.SHOTS[0], manifest, *snakemake.params.size)
         image_files.write_png(folder / f"walker_{surface}.png", walker)

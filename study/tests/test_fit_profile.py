@@ -19,7 +19,7 @@ def photo_set(tests):
 
 def test_a_trial_tells_seconds_steps_and_quality_and_gives_the_field_that_a_fit_gives():
     photos = photo_set(made.photos(5)[4:])
-    quality = FitSettings(size=48, spacing=1.0, max_gaussians=5000, steps=12)
+    quality = FitSettings(fit_size=48, spacing=1.0, max_gaussians=5000, steps=12)
     found = fit_profile.profile_fit(photos, quality, every=5)
     assert [row["step"] for row in found.curve] == [5, 10, 12]
     assert all(row["seconds"] > 0 and row["psnr"] > 10 for row in found.curve)

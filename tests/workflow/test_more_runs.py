@@ -115,7 +115,14 @@ def test_a_run_leaves_for_other_programs(tiny, snakemake, tmp_path):
 def test_another_preset_fits_the_photos_that_the_first_one_chose(tiny, snakemake, tmp_path):
     """The rounds of the tiny run stay: one fit to their photos, of another size, and what follows from it."""
     folder, config = shutil.copytree(tiny.folder, tmp_path / "chosen"), tmp_path / "finer.yaml"
-    preset = {"size": 96, "spacing": 2.0, "max_gaussians": 9000, "steps": 40, "steps_per_photo": 10, "level_steps": 10}
+    preset = {
+        "fit_size": 96,
+        "spacing": 2.0,
+        "max_gaussians": 9000,
+        "steps": 40,
+        "steps_per_photo": 10,
+        "level_steps": 10,
+    }
     entries = {"presets": {"finer": preset | {"choose_with": "draft"}}, "scenes": {"desert": {"preset": "finer"}}}
     config.write_text(yaml.safe_dump(entries))
     own = tiny.round.relative_to(tiny.folder)

@@ -35,7 +35,7 @@ LEVELS = {"make_levels"} | TILES
 LAST_ROUND = {"select_poses", "capture_views", "update_field", "score_round", "evaluate_round"}
 FIT = {"fit_coarse", "evaluate_coarse", "score_coarse"} | LAST_ROUND
 TABLE = [  # changed keys, and the rules that must run again on a finished run of the synthetic scene
-    ({"stills": {"width": 320, "height": 180}}, LOOK),
+    ({"stills": [320, 180]}, LOOK),
     ({"heights": {"kind": "hills", "height": 2, "wavelength": 20}}, LOOK),
     ({"tau": 0.3}, {"bundle_tiles"} | LOOK),
     ({"tilings": {"semantic": {"candidates": 25}}}, TILES),
@@ -69,7 +69,7 @@ def test_photos_and_their_cameras_are_there(tiny, tiny_config):
     scene = tiny_config["scenes"]["desert"]
     known, frame = read_colmap_model(tiny.photos / "sparse"), read_json(tiny.photos / "ground.json")
     assert {p.name for p in (tiny.photos / "images").glob("[!.]*")} == set(known.names)
-    assert len(known.names) == scene["photos"] + scene["test"] and len(frame["test"]) == scene["test"]
+    assert len(known.names) == scene["photo_count"] + scene["test"] and len(frame["test"]) == scene["test"]
     for name in known.names:
         assert image_files.read_size(tiny.photos / "images" / name) == (scene["size"], scene["size"])
 
@@ -145,11 +145,11 @@ def test_nothing_but_results_is_written(tiny):
 
 def test_stills_show_ground_without_holes(made, tiny_config):
     """Not black, not flat, no haze of one colour; and nothing darker than shade in a place that is lit."""
-    size = tiny_config["stills"]
+    width, height = tiny_config["stills"]
     for shot in SHOTS:
         still = image_files.read_photo(made.terrain / f"{shot.name}.png")
-        assert still.shape == (size["height"], size["width"], 3)
-        below = still[size["height"] // 2 :]
+        assert still.shape == (height, width, 3)
+        below = still[height // 2 :]
         assert 0.15 < below.mean() < 0.9 and below.std() > 0.01, shot.name
         assert (below.max(2) < 0.03).mean() < 0.01, shot.name
 

@@ -83,7 +83,7 @@ def override_views(**keys) -> dict:
 FIELD_SCENE = {"scene": "finished"}
 FOLDER_SCENE = {"kind": "photos", "folder": "photos", "size": 128, "start": 3, "agent": "replay"}
 FOLDER_SCENE |= {"preset": "draft", "tiling": "semantic"}
-MILLION = {"size": 128, "spacing": 1.5, "max_gaussians": 2_000_000, "steps": 60, "steps_per_photo": 10}
+MILLION = {"fit_size": 128, "spacing": 1.5, "max_gaussians": 2_000_000, "steps": 60, "steps_per_photo": 10}
 MILLION |= {"level_steps": 4}
 MILLION_SCENE = {"scenes": {"finished": {"preset": "million"}}, "presets": {"million": MILLION}}
 
@@ -91,8 +91,8 @@ ALL = (
     Extreme(
         "two-photos",
         "one synthetic photo too few",
-        override_desert(photos=2),
-        error_pattern=r"scenes\.desert\.photos: .*greater than or equal to 3",
+        override_desert(photo_count=2),
+        error_pattern=r"scenes\.desert\.photo_count: .*greater than or equal to 3",
     ),
     Extreme(
         "two-in-folder",
@@ -101,7 +101,9 @@ ALL = (
         write_two_photos,
         error_pattern="at least 3 overlapping photos are needed",
     ),
-    Extreme("all-start", "start views ask for all photos: no pool", override_desert(agent="replay", photos=5, start=6)),
+    Extreme(
+        "all-start", "start views ask for all photos: no pool", override_desert(agent="replay", photo_count=5, start=6)
+    ),
     Extreme("k-pool", "k = pool", {"k": 6} | override_desert(candidates=6)),
     Extreme("k-over-pool", "k far above the pool", {"k": 1000} | override_desert(candidates=6)),
     Extreme("lam-0", "lambda 0", override_views(lam=0)),

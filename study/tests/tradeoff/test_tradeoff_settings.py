@@ -14,18 +14,18 @@ def test_every_setting_is_an_entry_with_one_name_that_differs_in_one_key(config)
     assert names == ["draft-cap-70000", "draft-cap-1_25", "draft-cap-auto"]
     made = settings.add_entries(config)
     new = set(made["presets"]) - set(config["presets"])
-    assert {"draft-size-192", "draft-spacing-1_75", "draft-max_gaussians-70000"} < new
+    assert {"draft-fit_size-192", "draft-spacing-1_75", "draft-max_gaussians-70000"} < new
     for entry in new:
         below = made["presets"][entry.split("-")[0]]
         differing = {key for key, value in made["presets"][entry].items() if value != below.get(key)}
         assert len(differing) == 1 and f"-{differing.pop()}-" in entry
     assert made["priors"]["terrain-steps-16"]["steps"] == 16
     assert made["tilings"]["semantic-variants-1"]["candidates"] == config["tilings"]["semantic"]["candidates"]
-    own = {"presets": "draft-size-384", "priors": "terrain-steps-8", "tilings": "semantic-variants-2"}
+    own = {"presets": "draft-fit_size-384", "priors": "terrain-steps-8", "tilings": "semantic-variants-2"}
     assert not [name for table, name in own.items() if name in made[table]]  # the base's own values
     check_flat(made)
     assert settings.add_entries(made) == made
-    assert settings.find_test_size(made) == config["presets"]["reference"]["size"]  # the largest
+    assert settings.find_test_size(made) == config["presets"]["reference"]["fit_size"]  # the largest
 
 
 def test_the_base_of_a_knob_that_does_not_name_it_is_its_last(config):

@@ -127,4 +127,4 @@ def test_a_run_that_cannot_be_done_leaves_its_message(snakemake, tmp_path):
     snakemake(tmp_path, "--cores", "1", "study/results/stability/two-photos")
     found = json.loads((tmp_path / "study/results/stability/two-photos/outcome.json").read_text())
     assert found["exit_code"] == 1 and not found["traceback"]
-    assert found["message"].startswith("config: scenes.desert.photos: input should be greater than or equal to 3")
+    assert found["message"].startswith("config: scenes.desert.photo_count: input should be greater than or equal to 3")

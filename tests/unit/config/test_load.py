@@ -65,7 +65,18 @@ RIG = {"port": "p", "inbox": "in", "millimetres": 250, "limits": {"pan": [0, 1],
         pytest.param(["presets", "draft", "choose_with"], "best", "there is no 'best'", id="an unknown chooser"),
         pytest.param(["presets", "draft", "choose_with"], "draft", "chooses no photos itself", id="its own chooser"),
         pytest.param(["presets", "reference", "choose_with"], "standard", "one that does .draft", id="no chooser"),
-        pytest.param(["presets", "draft", "size"], "own", "draft.size: .*or input should be 'native'", id="a word"),
+        pytest.param(
+            ["presets", "draft", "fit_size"], "own", "draft.fit_size: .*or input should be 'native'", id="a word"
+        ),
+        pytest.param(["presets", "draft", "size"], 384, "no key 'size'; is 'fit_size' meant", id="size of a fit"),
+        pytest.param(["scenes", "desert", "photos"], 8, "no key 'photos'; is 'photo_count' meant", id="photos"),
+        pytest.param(["stills"], {"width": 8}, "config: stills: there is no key 'width'; .*valid list", id="a table"),
+        pytest.param(["scenes", "desert", "poses"], {"kind": "free"}, "no key 'kind', only places, h", id="a kind"),
+        pytest.param(["scenes", "desert", "poses"], "route", "poses: input should be 'orbit' or 'free'", id="no poses"),
+        pytest.param(["priors", "z"], {"model": "zero123", "samples": 2, "steps": 2}, "z: .* needs `weights`", id="z"),
+        pytest.param(["sweeps", "tau"], [0.3, 2], "sweeps.tau: input should be less than or equal to 1", id="swept"),
+        pytest.param(["sweeps", "k"], [2.5], "sweeps.k: input should be a valid integer", id="half a photo"),
+        pytest.param(["sweeps", "seeds"], [1], "sweeps.seeds: input should be 'k', ", id="no setting"),
         pytest.param(["k"], 0, "config: k: input should be greater", id="no photo a round"),
         pytest.param(["scenes", "copr_dunes", "agent"], "serial", "copr_dunes: agent serial needs `rig`", id="no rig"),
         pytest.param(["scenes", "copr_dunes", "rig"], RIG | {"limits": {}}, "limits.pan: is missing", id="no limits"),
@@ -89,16 +100,16 @@ def test_what_is_wrong_is_named(config, keys, value, message):
 def test_what_cannot_be_inpainted_is_refused_and_why(root, change, message):
     config = read(root)
     config["scenes"]["finished"] = {"kind": "field", "field": "a.ply", "preset": "draft", "tiling": "auto"}
-    config["priors"]["other"] = {"model": "zero123", "folder": "a", "samples": 2, "steps": 2}
+    config["priors"]["other"] = {"model": "zero123", "weights": "a", "samples": 2, "steps": 2}
     with pytest.raises(InputError, match=message):
         check_config(config | {"inpaint": True} | change)
 
 
 def test_a_config_replaces_another_key_by_key(tmp_path):
-    (tmp_path / "below.yaml").write_text("{k: 4, stills: {width: 2, height: 1}, seeds: [0, 1]}")
-    (tmp_path / "above.yaml").write_text("{stills: {width: 8}, seeds: [5]}")
+    (tmp_path / "below.yaml").write_text("{k: 4, export: {rows: 2, columns: 1}, seeds: [0, 1]}")
+    (tmp_path / "above.yaml").write_text("{export: {rows: 8}, seeds: [5]}")
     files = [tmp_path / "below.yaml", tmp_path / "above.yaml"]
-    assert read_config(files, {"k": 2}) == {"k": 2, "stills": {"width": 8, "height": 1}, "seeds": [5]}
+    assert read_config(files, {"k": 2}) == {"k": 2, "export": {"rows": 8, "columns": 1}, "seeds": [5]}
 
 
 def test_a_scene_of_the_config_replaces_keys_of_its_file(tmp_path):
@@ -137,8 +148,8 @@ def test_a_config_file_that_cannot_be_read_is_named(tmp_path, text, message):
 
 def test_numbers_in_lists_and_tables_of_the_command_line_are_numbers():
     """As Snakemake reads `--config`: scalars are parsed, what is in lists and tables is text."""
-    given = {"seeds": ["1", "2"], "stills": {"width": "320"}, "scene": "desert", "tau": 0.3, "inpaint": True}
-    parsed = {"seeds": [1, 2], "stills": {"width": 320}, "scene": "desert", "tau": 0.3, "inpaint": True}
+    given = {"seeds": ["1", "2"], "export": {"rows": "8"}, "scene": "desert", "tau": 0.3, "inpaint": True}
+    parsed = {"seeds": [1, 2], "export": {"rows": 8}, "scene": "desert", "tau": 0.3, "inpaint": True}
     assert parse_command_line(given) == parsed
 
 

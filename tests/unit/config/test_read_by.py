@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.capture import serial_rig
-from dav_gswt.config.base import EntryKeys, is_read, select_keys
+from dav_gswt.config.base import EntryKeys, select_keys
 from dav_gswt.config.load import check_model
 from dav_gswt.config.scenes import SCENES, PhotoScene, SyntheticScene
 from dav_gswt.config.settings import Preset
@@ -16,7 +16,7 @@ from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.views import candidates
 
 RIG = {"port": "p", "inbox": "in", "millimetres": 250.0, "limits": dict.fromkeys(("pan", "tilt", "radius"), (0, 1000))}
-SYNTHETIC = {"kind": "synthetic", "family": "desert", "seed": 0, "photos": 5, "test": 2, "size": 128}
+SYNTHETIC = {"kind": "synthetic", "family": "desert", "seed": 0, "photo_count": 5, "test": 2, "size": 128}
 SYNTHETIC |= {"agent": "render", "preset": "draft", "tiling": "auto", "oblique": 2, "walkers": 2, "layout": "cap"}
 PHOTOS = {"kind": "photos", "folder": "x", "size": 512, "start": 8, "preset": "draft", "tiling": "auto"}
 
@@ -42,11 +42,9 @@ def test_a_key_that_a_rule_is_not_given_has_no_default(read):
 
 def test_keys_follow_from_the_rule_and_the_agent():
     read = {agent: set(select_keys(PhotoScene, "score_coarse", photo_scene(agent))) for agent in ("replay", "plan")}
-    assert read == {"replay": {"agent"}, "plan": {"agent", "candidates", "drone"}}
+    assert read == {"replay": {"agent"}, "plan": {"agent", "candidates", "poses", "drone"}}
     assert select_keys(PhotoScene, "score_coarse", photo_scene("plan"))["drone"] == {"min_altitude": 2.0}
     assert "clearance" in select_keys(PhotoScene, "request_views", photo_scene("plan"))["drone"]
-    assert is_read(PhotoScene, "score_coarse", "rig.limits", "serial")
-    assert not is_read(PhotoScene, "score_coarse", "rig.port", "serial")
     assert set(select_keys(PhotoScene, "register_photos", photo_scene("replay"))) == {"folder", "size"}
 
 

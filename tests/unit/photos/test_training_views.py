@@ -51,7 +51,7 @@ def test_ground_outside_of_a_rectangle_does_not_count():
 
 
 def test_a_fit_is_the_same_from_files_to_the_bit(filed):
-    settings = FitSettings(size=48, spacing=1.0, max_gaussians=2000, steps=6)
+    settings = FitSettings(fit_size=48, spacing=1.0, max_gaussians=2000, steps=6)
     none = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
     fields = [
         fit_coarse_field(StartViews(FRAME, views, *none, 0.15), settings, np.random.default_rng(0)).field

@@ -16,10 +16,10 @@ from dav_gswt.reconstruction.fitting.plan import UPDATE_RATE, FitSettings
 from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.reconstruction.update import UpdateInput
 
-SETTINGS = FitSettings(size=48, spacing=1.0, max_gaussians=5000, steps=12, steps_per_photo=20)
+SETTINGS = FitSettings(fit_size=48, spacing=1.0, max_gaussians=5000, steps=12, steps_per_photo=20)
 NONE = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
 FRAME = replace(made.FRAME, kind="synthetic")
-PRESET = {"size": 48, "spacing": 1.0, "max_gaussians": 5000, "steps": 12, "steps_per_photo": 20}
+PRESET = {"fit_size": 48, "spacing": 1.0, "max_gaussians": 5000, "steps": 12, "steps_per_photo": 20}
 FILES = update.PhotoFiles("model", "images", 3, False)
 GRAIN = 0.03  # as coarse as what a real field does not know of its photos
 

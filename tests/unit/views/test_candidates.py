@@ -23,10 +23,8 @@ MIDDLE = np.array([12.0, 22.0, 0.0])
 LENS = cameras.pinhole([0.0, 0.0, 5.0], [0.0, 1.0, 0.0], 60, 40, 50.0)
 
 
-def stand(agent="handheld", count=120, **poses):
-    poses = ({"down": 35.0} | poses) if poses else {}
-    scene = {"agent": agent, "candidates": count} | ({"poses": poses} if poses else {})
-    return candidates.list_poses(scene, FRAME, LENS)
+def stand(poses, agent="handheld", count=120):
+    return candidates.list_poses({"agent": agent, "candidates": count, "poses": poses}, FRAME, LENS)
 
 
 def aim(camera):
@@ -35,29 +33,29 @@ def aim(camera):
     return (camera.centre + away * camera.forward)[:2] - MIDDLE[:2], away
 
 
-def test_an_orbit_which_is_what_is_taken_unless_told_otherwise_looks_at_the_middle_from_the_flying_height():
-    for found in (stand(kind="orbit", count=20), stand("serial", count=20)):
-        assert all(aim(camera)[1] == pytest.approx(5.0) for _, camera in found)
-        assert max(np.abs(aim(camera)[0]).max() for _, camera in found) < 1e-9
-        assert min(pose.elevation for pose, _ in found) >= 30 - 1e-9
+def test_an_orbit_looks_at_the_middle_from_the_flying_height():
+    found = stand("orbit", count=20)
+    assert all(aim(camera)[1] == pytest.approx(5.0) for _, camera in found)
+    assert max(np.abs(aim(camera)[0]).max() for _, camera in found) < 1e-9
+    assert min(pose.elevation for pose, _ in found) >= 30 - 1e-9
 
 
 def test_free_poses_spread_over_distances_aim_points_and_directions():
-    aims, away = zip(*(aim(camera) for _, camera in stand("render", kind="free")), strict=True)
+    aims, away = zip(*(aim(camera) for _, camera in stand("free", "render")), strict=True)
     assert 2 <= min(away) < 2.2 and 7.2 < max(away) <= 7.5
     counts = np.histogram2d(*np.array(aims).T, bins=3, range=[[-2, 2], [-2, 2]])[0]
     assert counts.min() >= 10 and counts.sum() == 120  # 13.3 in each of nine parts of the exemplar
-    steep = [camera.forward[2] for _, camera in stand("render", kind="free")]
+    steep = [camera.forward[2] for _, camera in stand("free", "render")]
     assert np.corrcoef(np.column_stack([aims, away, steep]).T)[0, 1:] == pytest.approx(0, abs=0.1)
 
 
 def test_nobody_is_sent_higher_than_the_first_photos_were_taken():
-    found = [aim(camera)[1] for _, camera in stand("handheld", kind="free")]
+    found = [aim(camera)[1] for _, camera in stand("free")]
     assert min(found) >= 2 and max(found) <= 5.0
 
 
 def test_a_route_has_stops_along_it_with_headings_to_all_sides():
-    found = stand(kind="route", places=[[-0.5, 0.0], [0.5, 0.0], [0.5, 0.5]], height=0.2, down=30.0, count=60)
+    found = stand({"places": [[-0.5, 0.0], [0.5, 0.0], [0.5, 0.5]], "height": 0.2, "down": 30.0}, count=60)
     at = np.array([camera.centre - MIDDLE for _, camera in found])[::4]
     assert at[0] == pytest.approx([-2, 0, 1]) and at[-1] == pytest.approx([2, 2, 1])
     steps = np.linalg.norm(np.diff(at, axis=0), axis=1)
@@ -66,7 +64,7 @@ def test_a_route_has_stops_along_it_with_headings_to_all_sides():
     headings = np.degrees([np.arctan2(camera.forward[1], camera.forward[0]) for _, camera in found[:4]]) % 360
     assert headings == pytest.approx([0, 90, 180, 270], abs=1e-6)
     with pytest.raises(InputError, match=r"poses\.places: a route needs two places"):
-        stand(kind="route", places=[[0.1, 0.1], [0.1, 0.1]], height=0.2)
+        stand({"places": [[0.1, 0.1], [0.1, 0.1]], "height": 0.2, "down": 35.0})
 
 
 def test_photos_are_asked_for_with_the_lens_of_most_pictures(tmp_path):
@@ -74,14 +72,14 @@ def test_photos_are_asked_for_with_the_lens_of_most_pictures(tmp_path):
     none = np.zeros(0, int)
     points = np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
     write_colmap_model(ColmapModel(("a.png", "b.png", "c.png"), (turned, LENS, LENS), *points), tmp_path)
-    scene = {"agent": "handheld", "candidates": 4}
+    scene = {"agent": "handheld", "candidates": 4, "poses": "orbit"}
     found = candidates.list_remaining(scene, FRAME, tmp_path, ViewSplit(("a.png",), (), ()), [])
     assert {(camera.width, camera.height) for _, camera in found} == {(60, 40)}
 
 
-@pytest.mark.parametrize("kind", ["orbit", "free", "route"])
-def test_every_candidate_has_the_lens_it_is_given_and_a_name_of_its_own(kind):
-    none, found = (stand(kind=kind, places=[[0, 0], [1, 0]], height=0.3, count=count) for count in (0, 8))
+@pytest.mark.parametrize("poses", ["orbit", "free", {"places": [[0, 0], [1, 0]], "height": 0.3, "down": 35.0}])
+def test_every_candidate_has_the_lens_it_is_given_and_a_name_of_its_own(poses):
+    none, found = (stand(poses, count=count) for count in (0, 8))
     assert none == [] and len({pose.name for pose, _ in found}) == 8
     assert all((c.fx, c.cx, c.width, c.height) == (LENS.fx, LENS.cx, 60, 40) for _, c in found)
 

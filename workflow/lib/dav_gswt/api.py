@@ -93,7 +93,7 @@ def fit_field(
     from dav_gswt.reconstruction.fitting.plan import FitSettings
 
     size = max(max(view.camera.width, view.camera.height) for view in photos.views)
-    settings = FitSettings(size=size, spacing=spacing, max_gaussians=max_gaussians, steps=steps, steps_per_photo=28)
+    settings = FitSettings(fit_size=size, spacing=spacing, max_gaussians=max_gaussians, steps=steps, steps_per_photo=28)
     start = read_start_views(photos.frame, photos.views, photos.folder / "sparse", photos.folder / "images", False)
     return fit_coarse_field(start, settings, np.random.default_rng(seed))
 
@@ -108,7 +108,7 @@ def score_poses(fitted: Reconstruction, photos: Photos, count: int = 250) -> Sco
     """
     from dav_gswt.views import candidates, feasibility, scoring
 
-    scene = {"agent": "handheld", "candidates": count}
+    scene = {"agent": "handheld", "candidates": count, "poses": "orbit"}
     listed = candidates.list_poses(scene, photos.frame, photos.views[0].camera)
     free = feasibility.filter_feasible(listed, fitted.field, fitted.grid, photos.frame.flying_height)
     return scoring.score_poses(fitted.field, fitted.grid, free, photos.views, photos.frame)

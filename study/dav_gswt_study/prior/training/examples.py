@@ -127,7 +127,7 @@ def simulate_points(
 def fit_field(world: World, photos: list[TrainingView], rng: np.random.Generator) -> GaussianField:
     """The coarse fit of the reconstruction, small and short; in some worlds of more or less ground than usual."""
     steps = int(rng.integers(*STEPS, endpoint=True))
-    settings = FitSettings(size=photos[0].camera.width, spacing=1.25, max_gaussians=MOST_GAUSSIANS, steps=steps)
+    settings = FitSettings(fit_size=photos[0].camera.width, spacing=1.25, max_gaussians=MOST_GAUSSIANS, steps=steps)
     frame = world.frame
     if rng.uniform() < OTHER_EXTENT:
         share = rng.uniform(*EXTENTS) / 1.25

@@ -9,7 +9,7 @@ from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.synthetic import photo_set
 from dav_gswt.photos.synthetic import scene as synthetic
 
-ENTRY = {"family": "desert", "seed": 0, "photos": 3, "test": 2, "size": 64, "candidates": 0}
+ENTRY = {"family": "desert", "seed": 0, "photo_count": 3, "test": 2, "size": 64, "candidates": 0}
 
 
 def test_views_yield_points_on_the_ground(tmp_path, monkeypatch):

@@ -12,8 +12,8 @@ from dav_gswt.photos.synthetic.land import Land, Light
 from dav_gswt.photos.synthetic.meshes import Mesh
 
 mi = pytest.importorskip("mitsuba")
-ENTRY = {"family": "desert", "seed": 0, "photos": 8, "test": 6, "size": 64, "candidates": 20}
-HIGH = ENTRY | {"layout": "cap", "min_elevation": 60, "photos": 24, "test": 12, "oblique": 8}
+ENTRY = {"family": "desert", "seed": 0, "photo_count": 8, "test": 6, "size": 64, "candidates": 20}
+HIGH = ENTRY | {"layout": "cap", "min_elevation": 60, "photo_count": 24, "test": 12, "oblique": 8}
 
 
 @pytest.fixture(autouse=True)

@@ -68,10 +68,10 @@ def key(
     )
 
 
-def get_extra(field: FieldInfo, name: str) -> Any:
-    """What `key` was given as `unit`, `read_by` or `agents`; None where it was given nothing."""
+def _get_extra(field: FieldInfo, name: str) -> Any:
+    """What `key` was given as `read_by` or `agents`."""
     extra = field.json_schema_extra
-    return extra.get(name) if isinstance(extra, dict) else None
+    return extra.get(name, []) if isinstance(extra, dict) else []
 
 
 class EntryKeys(dict):
@@ -103,32 +103,35 @@ class EntryKeys(dict):
 
 def select_keys(model: type[BaseModel], rule: str, entry: Mapping[str, Any]) -> EntryKeys:
     """The keys of an entry that a rule reads, as `read_by` of the model's keys says."""
-    read = [name for name in model.model_fields if is_read(model, rule, name, entry.get("agent", ""))]
+    read = [name for name in model.model_fields if _is_read(model, rule, name, entry.get("agent", ""))]
     values = {name: entry[name] for name in read if name in entry}
     for name, value in values.items():
         field = model.model_fields[name]
-        if (table := find_table(field)) and rule not in (get_extra(field, "read_by") or ()):
+        if (table := _find_table(field)) and rule not in _get_extra(field, "read_by"):
             values[name] = select_keys(table, rule, value)
     return EntryKeys(values, model.model_fields.keys() - read)
 
 
-def is_read(model: type[BaseModel], rule: str, name: str, agent: str = "") -> bool:
-    """Whether a rule reads a key, or some key of the table that it is. name: may be dotted, as `rig.limits`."""
-    name, _, inner = name.partition(".")
+def _is_read(model: type[BaseModel], rule: str, name: str, agent: str = "") -> bool:
+    """Whether a rule reads a key, or some key of the table that it is."""
     field, own = model.model_fields[name], model.model_fields.get("agent")
-    agents = get_extra(field, "agents")
-    if agents and agent not in agents and own and rule in (get_extra(own, "read_by") or ()):
+    agents = _get_extra(field, "agents")
+    if agents and agent not in agents and own and rule in _get_extra(own, "read_by"):
         return False
-    if rule in (get_extra(field, "read_by") or ()):
-        return True
-    table = find_table(field)
-    return bool(table) and any(is_read(table, rule, each) for each in ([inner] if inner else table.model_fields))
+    table = _find_table(field)
+    inner = bool(table) and any(_is_read(table, rule, each) for each in table.model_fields)
+    return inner or rule in _get_extra(field, "read_by")
 
 
-def find_table(field: FieldInfo) -> type[BaseModel] | None:
+def _find_table(field: FieldInfo) -> type[BaseModel] | None:
     """The model of a key that is one table; None for any other key."""
     kinds = [field.annotation, *get_args(field.annotation)]
     return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
+
+
+def lower_first(message: str) -> str:
+    """A message of pydantic as part of a sentence."""
+    return message[:1].lower() + message[1:]
 
 
 ANY = "*"  # in a place: any name of an entry, or any position in a list
@@ -143,25 +146,20 @@ def iterate_tables(model: type[BaseModel]) -> Iterator[tuple[Place, Schema]]:
     kinds is followed by its kind, as in ("scenes", "*", "synthetic").
     """
     schema = model.model_json_schema()
-    yield from _iterate_table(schema, schema.get("$defs", {}), ())
-
-
-def _iterate_table(table: Schema, defs: Schema, place: Place) -> Iterator[tuple[Place, Schema]]:
-    yield place, table
-    for name, value in table["properties"].items():
-        yield from _iterate_value(value, defs, (*place, name))
+    yield from _iterate_value(schema, schema.get("$defs", {}), ())
 
 
 def _iterate_value(value: Schema, defs: Schema, place: Place) -> Iterator[tuple[Place, Schema]]:
-    if "$ref" in value:
-        yield from _iterate_table(_resolve(value, defs), defs, place)
+    value = _resolve(value, defs)
+    if "properties" in value:
+        yield place, value
+    for name, inner in value.get("properties", {}).items():
+        yield from _iterate_value(inner, defs, (*place, name))
     choices = value.get("anyOf", value.get("oneOf", []))
     several = sum("$ref" in choice for choice in choices) > 1
     for choice in choices:
-        own = _resolve(choice, defs).get("properties", {}) if several else {}
-        name = own.get("kind", own.get("model", {}))
-        kind = name.get("const", ANY if "enum" in name else None)
-        yield from _iterate_value(choice, defs, (*place, kind) if kind else place)
+        kind = [_resolve(choice, defs)["properties"]["kind"].get("const", ANY)] if several else []
+        yield from _iterate_value(choice, defs, (*place, *kind))
     for inner in ("items", "additionalProperties"):
         if isinstance(value.get(inner), dict):
             yield from _iterate_value(value[inner], defs, (*place, ANY))

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from dav_gswt.config.base import ANY, iterate_tables
+from dav_gswt.config.base import ANY, iterate_tables, lower_first
 from dav_gswt.config.model import Config
 from dav_gswt.errors import InputError, summarize_error
 
@@ -44,9 +44,7 @@ def add_scene_files(config: dict, folder: Path) -> dict:
     Raises: InputError: a file is no YAML, two have one name, or the config has a scene of that name of another kind.
     """
     scenes, own = {}, config.get("scenes") or {}
-    for path in sorted([*folder.glob("*.yaml"), *folder.glob("*.yml")]):
-        if path.name.startswith("."):  # of an editor or a file system
-            continue
+    for path in sorted(folder.glob("[!.]*.y*ml")):  # those with a dot are of an editor or a file system
         if path.stem in scenes:
             raise InputError(f"{path}: there is a scene of this name in {path.stem}.yaml, too; remove one of them")
         scenes[path.stem] = scene = _read_yaml(path)
@@ -118,15 +116,16 @@ def _describe_error(model: type[BaseModel], values: dict, error: ValidationError
     else:
         # of a value that may be of several kinds there is an error for each kind
         own = _keys_of(values, location)
-        message = " or ".join(
-            dict.fromkeys(_lower_first(e["msg"]) for e in errors if _keys_of(values, e["loc"]) == own)
-        )
-    keys = ".".join([where] * bool(where) + [str(key) for key in _keys_of(values, location)])
-    if first["type"] in ("missing", "extra_forbidden") and not keys.endswith(str(location[-1])):
-        keys = f"{keys}.{location[-1]}".lstrip(".")
+        message = " or ".join(dict.fromkeys(lower_first(e["msg"]) for e in errors if _keys_of(values, e["loc"]) == own))
+        if first["type"].endswith("_type") and isinstance(first["input"], dict) and first["input"]:
+            message = f"there is no key {next(iter(first['input']))!r}; {message}"
+    keys = [where] * bool(where) + [str(key) for key in _keys_of(values, location)]
     if first["type"] == "extra_forbidden":
-        keys = keys.rpartition(".")[0]
-    return f"config: {keys + ': ' if keys else ''}{message} ({REFERENCE})"
+        keys.pop()
+    if first["type"] == "missing":
+        keys.append(str(location[-1]))
+    place = f"{'.'.join(keys)}: " if keys else ""
+    return f"config: {place}{message} ({REFERENCE})"
 
 
 def _keys_of(values: Any, location: tuple) -> list:
@@ -140,16 +139,14 @@ def _keys_of(values: Any, location: tuple) -> list:
 
 
 def _describe_unknown_key(model: type[BaseModel], location: tuple) -> str:
-    unknown, where = str(location[-1]), location[:-1]
-    tables = (
-        table
-        for place, table in iterate_tables(model)
+    unknown = str(location[-1])
+    tables = list(iterate_tables(model))
+    titles = {table["title"] for _, table in tables}
+    where = [part for part in location[:-1] if part not in titles]  # pydantic adds the model that a value may be of
+    known = next(
+        list(table["properties"])
+        for place, table in tables
         if len(place) == len(where) and all(p in (ANY, part) for p, part in zip(place, where, strict=True))
     )
-    known = list(next(tables)["properties"])
-    near = get_close_matches(unknown, known, 1)
+    near = get_close_matches(unknown, known, 1, 0.55)  # finds `photo_count` for `photos`
     return f"there is no key {unknown!r}" + (f"; is {near[0]!r} meant?" if near else f", only {', '.join(known)}")
-
-
-def _lower_first(text: str) -> str:
-    return text[:1].lower() + text[1:]

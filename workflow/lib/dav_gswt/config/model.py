@@ -1,10 +1,10 @@
 """The whole config of the product."""
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
-from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
+from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key, lower_first
 from dav_gswt.config.exports import Export
 from dav_gswt.config.scenes import FieldScene, Scene
 from dav_gswt.config.settings import (
@@ -12,10 +12,8 @@ from dav_gswt.config.settings import (
     Flat,
     NoiseClasses,
     Preset,
-    PriorSettings,
-    Stills,
+    Prior,
     Surface,
-    TerrainPriorSettings,
     Tiling,
 )
 from dav_gswt.views.policies import POLICY_NAMES
@@ -25,16 +23,7 @@ if TYPE_CHECKING:
 else:
     Policy = Literal[POLICY_NAMES]
 Lpips = Literal["installed", "none"] | Text
-
-
-class Sweeps(ConfigModel):
-    """`snakemake sweeps`: values of settings, each varied by itself with the other settings as the config has them."""
-
-    k: list[Annotated[int, Field(ge=1, le=1000)]] | None = key("views chosen in a round", None)
-    p_drop: list[Annotated[float, Field(ge=0, lt=1)]] | None = key("dropouts of the prior", None)
-    lam: list[Annotated[float, Field(ge=0, le=1e6)]] | None = key("weights of LPIPS", None)
-    tau: list[Share] | None = key("uncertainties from which a tile keeps all orders", None)
-    rounds: list[Annotated[int, Field(ge=0, le=100)]] | None = key("numbers of rounds", None)
+SweptSetting = Literal["k", "p_drop", "lam", "tau", "rounds"]
 
 
 class Config(ConfigModel):
@@ -81,12 +70,18 @@ class Config(ConfigModel):
         min_length=1,
         max_length=16,
     )
-    stills: Stills = key("size of the stills", Stills())
+    stills: list[Annotated[int, Field(ge=16, le=8192)]] = key(
+        "width and height of the stills", [1920, 1080], unit="pixels", min_length=2, max_length=2
+    )
     export: Export = key("a finite terrain for other programs, asked for by its path: docs/exports.md", Export())
     scenes: dict[Name, Scene] = key("what there is to make a terrain of", {})
-    priors: dict[Name, PriorSettings] = key("diffusion priors", {})
+    priors: dict[Name, Prior] = key("diffusion priors", {})
     presets: dict[Name, Preset] = key("speed against accuracy", min_length=1)
-    sweeps: Sweeps = key("`snakemake sweeps`: values of settings, each varied by itself", Sweeps())
+    sweeps: dict[SweptSetting, list[int | float]] = key(
+        "`snakemake sweeps`: a list of values for each of `k`, `p_drop`, `lam`, `tau` and `rounds` that is varied, by "
+        "itself, with the other settings as the config has them",
+        {},
+    )
     tilings: dict[Name, Tiling] = key("how tiles are cut", min_length=1)
 
     @model_validator(mode="after")
@@ -103,6 +98,20 @@ class Config(ConfigModel):
         return self
 
     @model_validator(mode="after")
+    def _require_swept_values(self) -> "Config":
+        """A value of `sweeps` has the type and the bounds of the setting itself."""
+        for name, values in self.sweeps.items():
+            field = Config.model_fields[name]
+            setting: Any = Annotated[field.annotation, *field.metadata]
+            adapter = TypeAdapter(setting, config=ConfigModel.model_config)
+            try:
+                for value in values:
+                    adapter.validate_python(value)
+            except ValidationError as error:
+                raise ValueError(f"sweeps.{name}: {lower_first(error.errors()[0]['msg'])}") from None
+        return self
+
+    @model_validator(mode="after")
     def _require_inpainter(self) -> "Config":
         """Ground can be inpainted where there are photos, by a prior that knows depth."""
         if not self.inpaint:
@@ -112,8 +121,8 @@ class Config(ConfigModel):
                 f"inpaint: {self.scene} is a finished field: without photos nothing says what they did not see; "
                 "set inpaint: false"
             )
-        if not isinstance(self.priors[self.prior], TerrainPriorSettings):
-            able = [name for name, prior in self.priors.items() if isinstance(prior, TerrainPriorSettings)]
+        if self.priors[self.prior].model != "terrain":
+            able = [name for name, prior in self.priors.items() if prior.model == "terrain"]
             raise ValueError(
                 f"inpaint: the prior {self.prior} knows no depth; set prior to one of model terrain "
                 f"({', '.join(able) or 'none is'} in priors), or inpaint: false"

@@ -33,8 +33,11 @@ after "not" have no effect. k is the config's `k`.
 
 
 def describe_tables(model: type[BaseModel], place: Place = ()) -> str:
-    """Every table of a model, with its keys. place: where the model lies in the config."""
-    return "\n\n".join(_describe_table((*place, *where), table) for where, table in iterate_tables(model))
+    """Every table of a model once, with its places and its keys. place: where the model lies in the config."""
+    found: dict[int, tuple[list[Place], Schema]] = {}
+    for where, table in iterate_tables(model):
+        found.setdefault(id(table), ([], table))[0].append((*place, *where))
+    return "\n\n".join(_describe_table(places, table) for places, table in found.values())
 
 
 def describe_policies() -> str:
@@ -68,11 +71,11 @@ def write_files(texts: dict[str, str]) -> None:
         Path(name).write_text(text, encoding="utf-8")
 
 
-def _describe_table(place: Place, table: Schema) -> str:
-    name = ".".join("<name>" if part == ANY else part for part in place) or "Top level"
+def _describe_table(places: list[Place], table: Schema) -> str:
+    names = [".".join("<name>" if part == ANY else part for part in place) or "Top level" for place in places]
     rows = [_describe_key(key, value, key in table.get("required", ())) for key, value in table["properties"].items()]
     head = ["| key | meaning | values | default |", "|---|---|---|---|"]
-    return "\n".join([f"### {name}", "", table.get("description", ""), "", *head, *rows])
+    return "\n".join([f"### {', '.join(names)}", "", table.get("description", ""), "", *head, *rows])
 
 
 def _describe_key(key: str, value: Schema, required: bool) -> str:
@@ -105,8 +108,6 @@ def _format_value(value: Any) -> str:
     """A default as YAML and JSON have it, without the keys that have no value."""
     if isinstance(value, dict):
         value = {key: each for key, each in value.items() if each is not None}
-    if isinstance(value, list):
-        return f"[{', '.join(map(_format_value, value))}]"
     return json.dumps(value)
 
 

@@ -55,22 +55,9 @@ class Drone(ConfigModel):
     clearance: float = key("below it the drone only climbs and sinks", 5, unit="m above ground", ge=1, le=100)
 
 
-class OrbitPoses(ConfigModel):
-    """All at the flying height from the exemplar's middle, and looking there."""
-
-    kind: Literal["orbit"]
-
-
-class FreePoses(ConfigModel):
-    """Any direction, distance (0.4 to 1.5 flying heights for `agent: render`, else 0.4 to 1) and aim point."""
-
-    kind: Literal["free"]
-
-
-class RoutePoses(ConfigModel):
+class Route(ConfigModel):
     """Stops along a path, as a walker or a drone in a corridor has them; four headings at each."""
 
-    kind: Literal["route"]
     places: list[GroundPlace] = key(
         "corners of the path, east and north of the exemplar's middle",
         unit="sides of the exemplar",
@@ -81,18 +68,20 @@ class RoutePoses(ConfigModel):
     down: float = key("how far below the horizon the camera looks", 35, unit="degrees", ge=1, le=89)
 
 
-CandidatePoses = Annotated[OrbitPoses | FreePoses | RoutePoses, Field(discriminator="kind")]
-
-
 class _Scene(ConfigModel):
     preset: Name = key("an entry of `presets`")
     tiling: Name = key("an entry of `tilings`")
 
 
 class _PhotographedScene(_Scene):
-    candidates: int = key("poses that may be asked for", 250, read_by=POSE_READERS, agents=POSED, ge=0, le=10_000)
-    poses: CandidatePoses | None = key(
-        "which poses these are; if left out `{kind: orbit}`", None, read_by=POSE_READERS, agents=POSED
+    candidates: int = key("poses that may be asked for", 250, read_by=POSE_READERS, agents=POSED, ge=1, le=10_000)
+    poses: Literal["orbit", "free"] | Route = key(
+        "which poses these are: `orbit`, all at the flying height from the exemplar's middle, and looking there; "
+        "`free`, any direction, aim point and distance (0.4 to 1.5 flying heights for `agent: render`, else 0.4 to 1); "
+        "or a path",
+        "orbit",
+        read_by=POSE_READERS,
+        agents=POSED,
     )
 
 
@@ -117,7 +106,7 @@ class SyntheticScene(_PhotographedScene):
         "which generator", read_by=(*RENDERED, *CAPTURING), agents=("render",)
     )
     seed: Seed = key("which scene of the family", read_by=(*RENDERED, *CAPTURING), agents=("render",))
-    photos: int = key("photos that are rendered beforehand", read_by=(*RENDERED, "split_views"), ge=3, le=200)
+    photo_count: int = key("photos that are rendered beforehand", read_by=(*RENDERED, "split_views"), ge=3, le=200)
     start: int | None = key(
         "photos to start from, with `agent: replay`; all if left out", None, read_by=("split_views",), ge=2, le=200
     )
@@ -199,9 +188,6 @@ class PhotoScene(_PhotographedScene):
         "who takes further photos: `replay` takes them from the photos of the folder that are left; `serial` is a "
         "camera rig, `plan` a drone, `handheld` a person",
         read_by=POSE_READERS,
-    )
-    candidates: int = key(
-        "poses that a device may be asked for", 250, read_by=POSE_READERS, agents=POSED, ge=1, le=10_000
     )
     rig: SerialRig | None = key("the camera rig of `agent: serial`", None, read_by=CAPTURING, agents=("serial",))
     drone: Drone = key("how a drone flies, for `agent: plan`", Drone(), read_by=CAPTURING, agents=("plan",))

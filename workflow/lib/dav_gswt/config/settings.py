@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dav_gswt.config.base import Auto, ConfigModel, Name, PhotoSize, Text, key
 
@@ -79,13 +79,6 @@ class PaintedClasses(ConfigModel):
 ClassTerm = Annotated[NoiseClasses | RangeClasses | PaintedClasses, Field(discriminator="kind")]
 
 
-class Stills(ConfigModel):
-    """Size of the stills."""
-
-    width: int = key("of a still", 1920, unit="pixels", ge=16, le=8192)
-    height: int = key("of a still", 1080, unit="pixels", ge=16, le=8192)
-
-
 EVALUATING = ("evaluate_round",)  # metrics.json records what its field was fitted with
 FITTING = ("fit_coarse", "evaluate_coarse", "update_field", "fit_chosen_photos", *EVALUATING)
 
@@ -93,7 +86,7 @@ FITTING = ("fit_coarse", "evaluate_coarse", "update_field", "fit_chosen_photos",
 class Preset(ConfigModel):
     """How much a fit may spend."""
 
-    size: PhotoSize = key(
+    fit_size: PhotoSize = key(
         "longer side of the photos that the fit sees, or `native`: the scene's", unit="pixels", read_by=FITTING
     )
     spacing: float = key(
@@ -126,29 +119,25 @@ class Preset(ConfigModel):
     level_steps: int = key("optimiser steps for a coarser level", read_by=("make_levels",), ge=1, le=100_000)
 
 
-INPAINTING = ("inpaint_field",)  # scoring reads all keys of a prior
+class Prior(ConfigModel):
+    """A diffusion prior, and how it samples."""
 
+    samples: int = key("drawn for each pose", ge=2, le=100)
+    steps: int = key("denoising steps of a sample", ge=1, le=1000)
+    model: Literal["terrain", "zero123"] = key(
+        "`terrain`: the project's own latent diffusion model of terrain; `zero123`: Zero-1-to-3, published weights"
+    )
+    weights: Text | None = key(
+        "of `terrain`: other weights of the same network; of `zero123`: the folder of its weights, required "
+        "(docs/prior.md)",
+        None,
+    )
 
-class _Prior(ConfigModel):
-    samples: int = key("drawn for each pose", read_by=INPAINTING, ge=2, le=100)
-    steps: int = key("denoising steps of a sample", read_by=INPAINTING, ge=1, le=1000)
-
-
-class TerrainPriorSettings(_Prior):
-    """The project's own latent diffusion model of terrain."""
-
-    model: Literal["terrain"] = key("`terrain`", read_by=INPAINTING)
-    weights: Text | None = key("other weights of the same network", None, read_by=INPAINTING)
-
-
-class Zero123Settings(_Prior):
-    """Zero-1-to-3 from a folder of published weights."""
-
-    model: Literal["zero123"]
-    folder: Text = key("its weights: docs/prior.md")
-
-
-PriorSettings = Annotated[TerrainPriorSettings | Zero123Settings, Field(discriminator="model")]
+    @model_validator(mode="after")
+    def _require_weights(self) -> "Prior":
+        if self.model == "zero123" and self.weights is None:
+            raise ValueError("model zero123 needs `weights`, a folder: docs/prior.md")
+        return self
 
 
 class Tiling(ConfigModel):

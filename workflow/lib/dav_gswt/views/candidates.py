@@ -1,7 +1,7 @@
 """Candidate poses: where a camera may stand and look, or the photos of a replayed scene.
 
 Where photos can be taken, the scene's `poses` says which: `free` (any direction, distance and aim point over the
-exemplar), `orbit` (on a hemisphere, all looking at the middle) or `route` (along a path).
+exemplar), `orbit` (on a hemisphere, all looking at the middle), or a table that describes a route.
 """
 
 from dataclasses import replace
@@ -51,25 +51,25 @@ def list_remaining(
 
 
 def list_poses(scene: dict, frame: SceneFrame, lens: Camera) -> Candidates:
-    """List the poses that a scene's `poses` describes; an orbit where it says nothing.
+    """List the poses that a scene's `poses` describes.
 
     scene: its keys `agent`, `candidates` (number), `poses`, and of synthetic scenes `min_elevation` (degrees) are used.
     lens: a camera whose lens and picture all have.
     Raises: InputError: a route without length.
     """
-    poses = scene.get("poses", {"kind": "orbit"})
-    if poses["kind"] == "route":
-        found = _stand_along_route(scene["candidates"], poses, frame, lens)
+    poses = scene["poses"]
+    if isinstance(poses, str):
+        found = _stand_around(scene, poses == "free", frame, lens)
     else:
-        found = _stand_around(scene, poses, frame, lens)
+        found = _stand_along_route(scene["candidates"], poses, frame, lens)
     return [(pose_of_camera(f"pose_{i:04d}", camera, frame), camera) for i, camera in enumerate(found)]
 
 
-def _stand_around(scene: dict, poses: dict, frame: SceneFrame, lens: Camera) -> list[Camera]:
+def _stand_around(scene: dict, free: bool, frame: SceneFrame, lens: Camera) -> list[Camera]:
     """Cameras all around, each looking at its own aim point (free) or all at the middle (orbit)."""
     count, lowest = scene["candidates"], scene.get("min_elevation", LOWEST)
     radii, aims = (1.0, 1.0), 0.0
-    if poses["kind"] == "free":
+    if free:
         radii, aims = FREE_RADII if scene["agent"] == "render" else REACHED_RADII, 1.0
     low, high = (frame.flying_height * radius for radius in radii)
     placed = camera_layouts.spread_free(count, lowest, (low, high), aims * frame.exemplar.side)

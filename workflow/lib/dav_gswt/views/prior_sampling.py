@@ -53,7 +53,7 @@ def load_prior(entry: dict) -> Prior:
         return TerrainPrior.open(locate_path(entry.get("weights", TERRAIN_WEIGHTS)))
     from dav_gswt.prior.zero123 import Zero123
 
-    return Zero123.open(locate_path(entry["folder"]))
+    return Zero123.open(locate_path(entry["weights"]))
 
 
 SampledTerms = dict[str, Array]  # by name the terms of poses, row by row, and `maps` of w2_sq, in cells of the latents

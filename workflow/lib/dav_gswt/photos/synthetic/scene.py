@@ -69,11 +69,11 @@ def start_views(entry: dict) -> list[Camera]:
     """
     layout = entry.get("layout", "ring")
     if layout == "cap":
-        places = camera_layouts.hemisphere(entry["photos"], _lowest(entry), RADIUS, turn=35.0)
+        places = camera_layouts.hemisphere(entry["photo_count"], _lowest(entry), RADIUS, turn=35.0)
     elif layout == "paper":
-        places = camera_layouts.paper(entry["photos"], SIDE_ELEVATION, _lowest(entry), RADIUS)
+        places = camera_layouts.paper(entry["photo_count"], SIDE_ELEVATION, _lowest(entry), RADIUS)
     else:
-        places = camera_layouts.start_ring(entry["photos"], RING_ELEVATION, RADIUS)
+        places = camera_layouts.start_ring(entry["photo_count"], RING_ELEVATION, RADIUS)
     return _orbit_cameras(places, entry["size"])
 
 

@@ -35,12 +35,12 @@ class FitPlan:
 class FitSettings:
     """The keys of a preset that the first fit and its updates read.
 
-    size: longer side of the photos, pixels. spacing: of the discs, in sizes of a photo's pixel on the ground. steps: of
-    the first fit. steps_per_photo: of the first fit for each photo beyond FEW_PHOTOS, and of an update for each
-    new photo.
+    fit_size: longer side of the photos, pixels. spacing: of the discs, in sizes of a photo's pixel on the ground.
+    steps: of the first fit. steps_per_photo: of the first fit for each photo beyond FEW_PHOTOS, and of an update for
+    each new photo.
     """
 
-    size: int
+    fit_size: int
     spacing: float
     max_gaussians: int
     steps: int
