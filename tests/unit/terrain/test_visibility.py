@@ -53,11 +53,14 @@ def test_too_many_gaussians_go_farthest_first(terrain):
     assert (np.diff(np.abs(few.i) + np.abs(few.j)) <= 0).all(), "and the order stays"
 
 
-def test_distances_bound_those_of_the_gaussians(hilly):
-    camera = walking(hilly)
-    cells = visibility.visible_cells(hilly, camera)
-    for k in range(0, len(cells), 37):
-        field, _ = placement.place_cell(hilly, cells[k : k + 1], camera.centre)
+@pytest.mark.parametrize("shown, height, step", [("hilly", 3.0, 37), ("stony", 0.7, 5)])
+def test_distances_bound_those_of_the_gaussians(request, shown, height, step):
+    """On hills, and of stones that stand on level ground."""
+    terrain = request.getfixturevalue(shown)
+    camera = walking(terrain, height=height)
+    cells = visibility.visible_cells(terrain, camera)
+    for k in range(len(cells) - 1, -1, -step):  # from the nearest
+        field, _ = placement.place_cell(terrain, cells[k : k + 1], camera.centre)
         distance = np.linalg.norm(field.means.astype(float), axis=1)
         assert cells.nearest[k] <= distance.min() + 1e-4 and distance.max() <= cells.farthest[k] + 1e-4
 

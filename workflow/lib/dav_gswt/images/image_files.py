@@ -173,7 +173,10 @@ def shrink_image(image: Float32[Array, "h w c"], width: int, height: int) -> Flo
     """The image on a coarser grid: each pixel is the exact mean over its area, of the encoded values.
 
     Exact for any ratio (a box filter sampled at pixel centres is up to 7 % off for ratios like 10 to 4).
+    Raises: ValueError: the image would be enlarged, or have no pixels.
     """
+    if not (1 <= width <= image.shape[1] and 1 <= height <= image.shape[0]):
+        raise ValueError(f"an image of {image.shape[1]} x {image.shape[0]} does not shrink to {width} x {height}")
     return np.ascontiguousarray(_average_axis(_average_axis(image, height, 0), width, 1), np.float32)
 
 
