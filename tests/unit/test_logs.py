@@ -36,7 +36,7 @@ def test_the_last_words_of_a_library_that_aborts_are_in_the_log(tmp_path):
     code = (
         "import os, logging\nfrom dav_gswt import logs\n"
         "with logs.logging_to('a.log'):\n"
-        "    logging.info('at work')\n    os.write(2, b'database is locked\\n')\n    os.abort()"
+        "    logging.warning('at work')\n    os.write(2, b'database is locked\\n')\n    os.abort()"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     text = (tmp_path / "a.log").read_text()
@@ -52,6 +52,16 @@ def test_stderr_is_as_before_when_a_job_is_over(tmp_path, capfd):
     assert (tmp_path / "a.log").read_text() == "inside"
 
 
+def test_the_terminal_has_warnings_and_progress_and_the_log_has_all(tmp_path, capfd):
+    with logs.logging_to(tmp_path / "a.log"):
+        logging.info("a detail")
+        logging.warning("a warning")
+        list(logs.progress(range(3), "count", every=0.0))
+    text, shown = (tmp_path / "a.log").read_text(), capfd.readouterr().err
+    assert all(words in text for words in ("a detail", "a warning", "count: 3/3"))
+    assert "a detail" not in shown and "a warning" in shown and "count: 3/3" in shown
+
+
 def test_progress_tells_how_far_and_how_long(tmp_path, caplog):
     caplog.set_level(logging.INFO)
     assert list(logs.progress(range(3), "count", every=0.0)) == [0, 1, 2]
@@ -63,7 +73,7 @@ def test_progress_tells_how_far_and_how_long(tmp_path, caplog):
 
 def test_a_log_on_a_full_disk_leaves_the_terminal_its_messages(capfd):
     with logs.logging_to("/dev/full"):
-        logging.info("a message")
+        logging.warning("a message")
     assert capfd.readouterr().err == "  a message\n"
     with pytest.raises(SystemExit) as ended, logs.logging_to("/none/a.log"):
         pass

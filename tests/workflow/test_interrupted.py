@@ -109,8 +109,8 @@ def test_a_stopped_run_leaves_what_is_whole_and_nothing_half_made(story, way):
 
 
 def test_a_stopped_run_goes_on_where_it_was(story):
-    assert "render_photos" not in story.killed.out and "split_views" not in story.killed.out
-    assert re.search(r"\[1 of \d+\] fit_coarse\n", story.killed.out)
+    assert "render the photos" not in story.killed.out and "set test photos aside" not in story.killed.out
+    assert re.search(r"\[1 of \d+\] fit the ground: \d+ s\n", story.killed.out)
 
 
 def test_a_killed_run_leaves_no_capture_that_looks_whole(story):
@@ -121,7 +121,7 @@ def test_a_killed_run_leaves_no_capture_that_looks_whole(story):
 def test_the_lock_of_a_killed_run_does_not_stop_the_next_one(story):
     assert story.last.returncode == 0, story.last.stdout
     assert "The last run was cut short; going on where it stopped." in story.last.stdout
-    assert "] capture_views" in story.last.stdout and "fit_coarse" not in story.last.stdout
+    assert "] take photos" in story.last.stdout and "] fit the ground:" not in story.last.stdout
 
 
 def test_what_is_said_at_the_end_is_there(story):

@@ -71,7 +71,7 @@ def test_a_lock_of_a_killed_run_is_removed_and_that_of_a_living_one_is_not(tmp_p
     monkeypatch.chdir(tmp_path)
     commands = []
     monkeypatch.setattr(run.subprocess, "run", lambda command, **_: commands.append(command))
-    monkeypatch.setattr(run, "follow", lambda command: (1, 0))
+    monkeypatch.setattr(run, "follow", lambda command, root: (1, 0))
     with start("signal.default_int_handler") as job:
         with pytest.raises(InputError, match=rf"another run works in this folder \(process {job.pid}\)"):
             run.run({"scene": "desert"}, 1, [])
@@ -79,3 +79,15 @@ def test_a_lock_of_a_killed_run_is_removed_and_that_of_a_living_one_is_not(tmp_p
         run.end_run(job, signal.SIGTERM)
     assert run.run({"scene": "desert"}, 1, []) == 1
     assert commands[0][-1] == "--unlock" and "cut short" in capsys.readouterr().out
+
+
+def test_what_a_job_does_now_is_written_over_on_a_terminal_and_seldom_elsewhere(monkeypatch, capsys):
+    lines = ["[1 of 2] fit the ground ...", "  fit: 1/3, 00:01 gone, about 00:02 left", "  a warning"]
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: False)
+    display = run._Display()
+    for line in [*lines, "[1 of 2] fit the ground: 3 s"]:
+        display.show(line)
+    assert capsys.readouterr().out == "  a warning\n[1 of 2] fit the ground: 3 s\n"
+    monkeypatch.setattr(run, "SELDOM", 0.0)
+    display.show(lines[1])
+    assert capsys.readouterr().out == "[1 of 2] fit the ground: fit: 1/3, 00:01 gone, about 00:02 left\n"

@@ -25,11 +25,14 @@ def record(event: LogEvent | None, message: str = "", level: int = logging.INFO,
 
 
 PLAN = record(LogEvent.RUN_INFO, stats={"fit_coarse": 1, "all": 1, "total": 2})
-JOB = record(LogEvent.JOB_INFO, rule_name="fit_coarse", log=["results/logs/a.log"])
+JOB = record(LogEvent.JOB_INFO, rule_name="fit_coarse", jobid=3, log=["results/logs/a.log"])
+END = record(LogEvent.JOB_FINISHED, job_id=3)
 
 
-def test_the_plan_and_each_job_are_a_line(handler):
-    assert [handler.describe(each) for each in (PLAN, JOB)] == ["1 jobs to do", "[1 of 1] fit_coarse"]
+def test_the_plan_and_the_begin_and_the_end_of_each_job_are_a_line(handler):
+    lines = ["1 jobs to do", "[1 of 1] fit the ground ...", "[1 of 1] fit the ground: 0 s"]
+    assert [handler.describe(each) for each in (PLAN, JOB, END)] == lines
+    assert handler.describe(record(LogEvent.JOB_FINISHED, job_id=4)) is None
     assert handler.describe(record(LogEvent.JOB_INFO, rule_name="all", log=[])) is None
     failed = record(LogEvent.JOB_ERROR, rule_name="fit_coarse", log=["results/logs/a.log"])
     assert handler.describe(failed) == "fit_coarse is not finished; its log: results/logs/a.log"

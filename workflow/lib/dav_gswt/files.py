@@ -23,7 +23,9 @@ from dav_gswt.errors import InputError, summarize_error
 
 Record = TypeVar("Record")
 
-REPOSITORY = Path(__file__).parents[3]
+# where Snakefile, rules, scripts, config and page are: in the package of a wheel, or in the clone that it lies in
+PIPELINE = Path(__file__).parent / "pipeline"
+REPOSITORY = PIPELINE if PIPELINE.is_dir() else Path(__file__).parents[3]
 
 # what reading a damaged archive, or arrays in one, may end in
 UNREADABLE = (OSError, ValueError, ArithmeticError, TypeError, EOFError, LookupError, RuntimeError, SyntaxError)

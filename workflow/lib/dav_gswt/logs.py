@@ -1,4 +1,4 @@
-"""Logging of a job: its log file has everything, the terminal a short form."""
+"""Logging of a job: its log file has everything, the terminal warnings, errors and progress."""
 
 import errno
 import logging
@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from dav_gswt.errors import InputError
 
-_log = logging.getLogger("dav_gswt")
+PROGRESS = "dav_gswt.progress"  # the logger of lines that say how far a job is
 
 Item = TypeVar("Item")
 
@@ -27,7 +27,7 @@ class _MessageFormatter(logging.Formatter):
 
 @contextmanager
 def logging_to(path):
-    """Send messages, warnings and the traceback of a script to `path`, and a short form to the terminal.
+    """Send all messages and the traceback of a script to `path`; to the terminal what one can act on, and progress.
 
     What libraries in C++ write to standard error is in the file alone. An error that a user can mend (bad input, a full
     disk, too little memory) ends the job with its message alone on the terminal; any other is raised again.
@@ -42,6 +42,7 @@ def logging_to(path):
         file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
         terminal = logging.StreamHandler(stream)
         terminal.setFormatter(_MessageFormatter())
+        terminal.addFilter(lambda record: record.levelno >= logging.WARNING or record.name == PROGRESS)
         shows_errors, logging.raiseExceptions = logging.raiseExceptions, False  # of writing the log, on a full disk
         logging.basicConfig(level=logging.INFO, handlers=[terminal, file], force=True)
         logging.captureWarnings(True)
@@ -51,7 +52,7 @@ def logging_to(path):
             logging.error("%s", error)
             sys.exit(1)
         except KeyboardInterrupt:
-            logging.info("stopped on request")
+            logging.warning("stopped on request")
             sys.exit(130)
         except MemoryError:
             logging.exception("out of memory: choose a smaller preset, or a machine with more")
@@ -104,7 +105,7 @@ def progress(items: Iterable[Item], what: str, every: float = 5.0) -> "tqdm[Item
     class Lines:
         def write(self, text: str) -> None:
             if text := text.strip():
-                _log.info(text)
+                logging.getLogger(PROGRESS).info(text)
 
         def flush(self) -> None:
             pass

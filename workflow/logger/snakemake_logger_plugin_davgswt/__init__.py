@@ -1,6 +1,6 @@
-"""A short log for `make run`: which job of how many begins, and why one failed (`snakemake --logger davgswt`).
+"""A short log for `make run`: which job of how many runs, how long it took, and why one failed.
 
-Snakemake's own events are printed in a line each; warnings and errors go through as they are.
+`snakemake --logger davgswt`: Snakemake's own events are printed in a line each; warnings and errors go through.
 """
 
 import errno
@@ -9,6 +9,7 @@ import re
 import resource
 import signal
 import sys
+import time
 from collections import deque
 from pathlib import Path
 
@@ -27,13 +28,38 @@ FAILED_JOB = ("RuleException", "CalledProcessError")
 SYSTEM_ERROR = re.compile(r"^(?:\w+: |Error recording metadata.*?\()?\[Errno (\d+)\] ([^)\n]+)", re.M)
 OWN_FILES = ("Traceback (most", "Error recording metadata")  # are in what Snakemake says of its own files, at the end
 NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
+RUNNING = " ..."  # ends the line of a job that begins; the line of one that has ended has its time
+STAGES = {  # rules in words
+    "register_photos": "place the photos",
+    "render_photos": "render the photos",
+    "import_field": "read the splat",
+    "split_views": "set test photos aside",
+    "report_photos": "report on the photos",
+    "fit_coarse": "fit the ground",
+    "evaluate_coarse": "judge by test photos",
+    "score_coarse": "score poses",
+    "select_poses": "choose photos",
+    "capture_views": "take photos",
+    "update_field": "fit the ground with more photos",
+    "fit_chosen_photos": "fit the ground to the chosen photos",
+    "evaluate_round": "judge by test photos",
+    "score_round": "score poses",
+    "find_materials": "tell materials and objects apart",
+    "make_levels": "make levels of detail",
+    "cut_tiles": "cut tiles",
+    "bundle_tiles": "pack the tiles",
+    "make_page": "write the page",
+    "render_terrain": "render stills",
+    "make_contact_sheet": "lay stills side by side",
+}
 ENDINGS = ("Exiting because a job execution failed", "At least one job did not complete")  # said by the caller
 
 
 class LogHandler(LogHandlerBase):
-    """Prints a line for the plan, each job's begin, each failed job and each error."""
+    """Prints a line for the plan, each job's begin and end, each failed job and each error."""
 
     def __post_init__(self) -> None:
+        self.running: dict[int, tuple[str, float]] = {}  # lines of jobs and when they began, by Snakemake's number
         self.jobs = 0  # to do, without the rule that only names the targets
         self.begun = 0
         self.signals: deque[str] = deque()  # of killed jobs whose name and log are still to come
@@ -53,6 +79,8 @@ class LogHandler(LogHandlerBase):
             return self._describe_plan(dict(record.__dict__["stats"]))
         if event == LogEvent.JOB_INFO:
             return self._describe_job(record.__dict__)
+        if event == LogEvent.JOB_FINISHED:
+            return self._describe_end(record.__dict__)
         if event == LogEvent.JOB_ERROR:
             return self._describe_failed_job(record.__dict__)
         if event == LogEvent.ERROR:
@@ -67,7 +95,13 @@ class LogHandler(LogHandlerBase):
         if not job["log"]:  # a rule that only names targets
             return None
         self.begun += 1
-        return f"[{self.begun} of {self.jobs}] {job['rule_name']}"
+        line = f"[{self.begun} of {self.jobs}] {STAGES.get(job['rule_name'], job['rule_name'])}"
+        self.running[job["jobid"]] = line, time.monotonic()
+        return line + RUNNING
+
+    def _describe_end(self, job: dict) -> str | None:
+        line, begun = self.running.pop(job["job_id"], (None, 0.0))
+        return line and f"{line}: {time.monotonic() - begun:.0f} s"
 
     def _describe_failed_job(self, job: dict) -> str:
         logs = [Path(path) for path in job.get("log") or []]

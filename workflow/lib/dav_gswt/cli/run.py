@@ -3,6 +3,7 @@
 import argparse
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -24,7 +25,9 @@ CONFIG, SCENES = Path("config/config.yaml"), Path("config/scenes")
 SMALLER = Path("config/without_compiler.yaml")
 LOGGER = Path("workflow/logger")  # a plugin of Snakemake, found by PYTHONPATH
 PROFILE_NOTE = "Using workflow specific profile"  # printed by Snakemake before its loggers begin
-JOB = re.compile(r"\[\d+ of \d+\] \w+$")  # a line of the log at which a job begins
+JOB = re.compile(r"\[\d+ of \d+\] .* \.\.\.$")  # a line of the log at which a job begins
+PROGRESS = re.compile(r"  .* gone, about .* left")  # a line of a job that says how far it is
+SELDOM = 30.0  # seconds between such lines where they are not written over each other
 GRACE = 5.0  # seconds that jobs have to end by themselves after a signal, and then Snakemake
 
 
@@ -68,37 +71,50 @@ def select_overlays(quietly: bool) -> list[Path]:
 
 
 def run(given: dict, cores: int, overlays: list[Path]) -> int:
-    """Run the workflow for the config's scene. Returns the exit status.
+    """Run this folder's workflow for the config's scene and say what was made. Returns the exit status."""
+    code, done = run_workflow(given["scene"], cores, overlays)
+    if code == 0:
+        report_result(given, done, overlays)
+    return code
 
-    Snakemake finds profiles/default beside the Snakefile, which makes half-made outputs again. It does not remove the
-    lock of a run that was killed; this function does, unless a process still works in the folder.
+
+def run_workflow(
+    scene: str, cores: int, overlays: list[Path], root: Path = Path(), folder: Path = Path()
+) -> tuple[int, str]:
+    """Run a workflow for a scene. Returns the exit status, 130 after a signal, and what was done, in words.
+
+    root: of the workflow. folder: gets `results`. Snakemake does not remove the lock of a run that was killed; this
+    function does, unless a process still works in the folder.
 
     Raises: InputError: another run works in the folder.
     """
-    snakemake = [sys.executable, "-m", "snakemake", "--config", f"scene={given['scene']}"]
+    snakemake = [sys.executable, "-m", "snakemake", "--config", f"scene={scene}"]
+    if root != Path():
+        profile = root / "workflow/profiles/default"  # Snakemake finds it in a clone, beside the Snakefile
+        snakemake += ["--snakefile", str(root / "Snakefile"), "--workflow-profile", str(profile)]
+        snakemake += ["--directory", str(folder)]
     if overlays:
-        snakemake += ["--configfile", *map(str, [CONFIG, *overlays])]
-    if any(Path(".snakemake/locks").glob("*")):
-        if others := find_running_processes():
+        snakemake += ["--configfile", *map(str, [root / CONFIG, *overlays])]
+    if any((folder / ".snakemake/locks").glob("*")):
+        if others := find_running_processes(folder):
             raise InputError(f"another run works in this folder (process {others[0]}): wait for it or stop it")
         print("The last run was cut short; going on where it stopped.")
         subprocess.run([*snakemake, "--unlock"], check=False, capture_output=True)
     start = time.monotonic()
-    code, jobs = follow([*snakemake, "--cores", str(cores), "--logger", "davgswt"])
+    code, jobs = follow([*snakemake, "--cores", str(cores), "--logger", "davgswt"], root)
     if code < 0 or code == 130:
         print("\nStopped. The same command goes on where this ended.", file=sys.stderr)
-        return 130
+        return 130, ""
     if code:
         print("\nNot finished. What stands above says why; the same command goes on from here.", file=sys.stderr)
-        return code
+        return code, ""
     seconds = time.monotonic() - start
-    report_result(given, f"{jobs} jobs done in {seconds:.0f} s" if jobs else "Up to date, nothing to do", overlays)
-    return 0
+    return 0, f"{jobs} jobs done in {seconds:.0f} s" if jobs else "Up to date, nothing to do"
 
 
-def find_running_processes() -> list[int]:
-    """The processes that work in this folder: Snakemake, or a job that outlived it."""
-    here, found = Path.cwd(), []
+def find_running_processes(folder: Path = Path()) -> list[int]:
+    """The processes that work in a folder: Snakemake, or a job that outlived it."""
+    here, found = folder.resolve(), []
     for process in psutil.process_iter():
         with suppress(psutil.Error, OSError):
             words = process.cmdline()[:4]
@@ -114,7 +130,7 @@ def short_log(root: Path) -> dict[str, str]:
     return os.environ | {"PYTHONPATH": os.pathsep.join(places)}
 
 
-def follow(command: list[str]) -> tuple[int, int]:
+def follow(command: list[str], root: Path = Path()) -> tuple[int, int]:
     """Run Snakemake with the short log. Returns its exit status (130 after a signal) and the number of jobs begun."""
     begun, received = 0, []
 
@@ -131,16 +147,49 @@ def follow(command: list[str]) -> tuple[int, int]:
         stderr=subprocess.STDOUT,
         text=True,
         errors="replace",
-        env=short_log(Path.cwd()),
+        env=short_log(root.resolve()),
     ) as job:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, receive)
+        display = _Display()
         for line in job.stdout or ():
             begun += bool(JOB.match(line))
             if not received and not line.startswith(PROFILE_NOTE):  # a job that a signal ends has nothing to tell
-                print(line, end="", flush=True)
+                display.show(line.rstrip("\n"))
+        display.clear()
         code = job.wait()
     return (130 if received and code else code), begun
+
+
+class _Display:
+    """The short log. On a terminal, what a job does now is written over; elsewhere it is written now and then."""
+
+    def __init__(self):
+        self.lasting, self.last, self.job = not sys.stdout.isatty(), time.monotonic(), ""
+
+    def show(self, line: str) -> None:
+        now = JOB.match(line), PROGRESS.match(line)
+        if not any(now):
+            self.clear()
+            print(line, flush=True)
+        elif now[0]:
+            self.job = line.removesuffix(" ...")
+            self._show_now(self.job)
+        else:
+            self._show_now(f"{self.job}: {line.strip()}")
+
+    def clear(self) -> None:
+        """Remove the line of what a job does now."""
+        if not self.lasting:
+            print("\r\x1b[K", end="", flush=True)
+
+    def _show_now(self, text: str) -> None:
+        if not self.lasting:
+            width = shutil.get_terminal_size().columns - 1
+            print(f"\r\x1b[K{text[:width]}", end="", flush=True)
+        elif time.monotonic() - self.last >= SELDOM:
+            self.last = time.monotonic()
+            print(text, flush=True)
 
 
 def end_run(job: subprocess.Popen, number: int) -> None:

@@ -1,0 +1,223 @@
+"""`dav-gswt make INPUT`: photos, a video, a splat or another program's project become a terrain, in one command.
+
+The terrain lies in a folder of its own, `NAME-terrain`: the page, a still, the field, a report, `scene.yaml`, which can
+be edited and run again, and `results`, the files of all stages.
+"""
+
+import argparse
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from dav_gswt.cli import run
+from dav_gswt.config.load import add_scene_files, check_config, read_config
+from dav_gswt.errors import InputError
+from dav_gswt.files import REPOSITORY, atomic_file
+from dav_gswt.paths import encode_branch, stage_folder
+from dav_gswt.photos.recognition import Recognised, recognize_input
+
+SCENE_FILE = "scene.yaml"
+AGENTS = {"drone": "plan", "handheld": "handheld", "rig": "serial"}  # --capture, and the scene's agent
+START, USUAL_ROUND = 8, 4  # photos of the first fit and of a round where a budget is given
+HEAD = """\
+# A terrain of {about}.
+# Change what you like and run `dav-gswt make {folder}` again. Every key: docs/reference/config.md.
+"""
+
+
+@dataclass(frozen=True)
+class Made:
+    """What `make` wrote. page: a folder to serve or publish. scene: the file to edit and run again."""
+
+    page: Path
+    still: Path
+    field: Path
+    report: Path | None
+    scene: Path
+
+
+def add_command(commands) -> None:
+    """Add the command to a parser's commands."""
+    about = "photos, a video, a splat or another program's project become a terrain"
+    parser = commands.add_parser("make", help=about, description=__doc__)
+    parser.add_argument("input", nargs="+", type=Path, help="photos or folders of them, a video, a splat, a project")
+    parser.add_argument("-o", "--out", type=Path, metavar="FOLDER", help="where it is written (default: NAME-terrain)")
+    parser.add_argument("--preset", help="draft, standard or reference: speed against accuracy (default: standard)")
+    parser.add_argument("--model", type=Path, help="known cameras: COLMAP, nerfstudio or OpenSfM")
+    parser.add_argument("--masks", type=Path, metavar="FOLDER", help="masks named as the photos: black is no ground")
+    parser.add_argument("--focal", type=float, metavar="MM", help="focal length (35 mm equivalent) where EXIF has none")
+    parser.add_argument("--test", type=int, metavar="N", help="photos set aside to judge the result")
+    parser.add_argument("--budget", type=int, metavar="N", help="use N photos, chosen where they matter most")
+    parser.add_argument("--capture", choices=AGENTS, help="who takes photos that do not exist yet")
+    parser.add_argument("--cores", type=int, default=os.cpu_count() or 2)
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    out, settings = prepare_scene(options)
+    return run_scene(out, settings, options.cores)
+
+
+def prepare_scene(options: argparse.Namespace) -> tuple[Path, dict[str, Any]]:
+    """The folder of the terrain, with its scene.yaml, and the config that it stands for.
+
+    Raises: InputError: the input is not understood, or the folder is in the way.
+    """
+    if earlier := find_earlier(options.input):
+        out = earlier
+        given = read_config([out / SCENE_FILE])
+        print(f"Goes on with {out / SCENE_FILE}")
+        recognised = None
+    else:
+        recognised = recognize_input(options.input, options.model)
+        out = options.out or Path(f"{recognised.name}-terrain")
+        print(f"{', '.join(map(str, options.input))}: {recognised.about}")
+        given = read_earlier(out, recognised)
+    changed = apply_options(given, options)
+    if recognised or changed != given:
+        folder = out if earlier is None else options.input[0]
+        write_scene(out / SCENE_FILE, changed, HEAD.format(about=recognised.about if recognised else "", folder=folder))
+    return out, load_scene(out)
+
+
+def find_earlier(inputs: list[Path]) -> Path | None:
+    """The folder of a terrain, if the input is one, or its scene.yaml."""
+    if len(inputs) > 1:
+        return None
+    path = inputs[0]
+    if path.is_file() and path.suffix in (".yaml", ".yml"):
+        if path.name != SCENE_FILE:
+            raise InputError(f"{path}: a scene is run again by its {SCENE_FILE}; config files go to Snakemake")
+        return path.parent
+    return path if path.is_dir() and (path / SCENE_FILE).is_file() else None
+
+
+def read_earlier(out: Path, recognised: Recognised) -> dict[str, Any]:
+    """The settings of a folder that an earlier run of this input left, or those of a new one.
+
+    Raises: InputError: the folder is not empty, or has the terrain of another input.
+    """
+    fresh = {"scene": recognised.name, "scenes": {recognised.name: recognised.entry}}
+    if not out.exists() or out.is_dir() and not any(out.iterdir()):
+        return fresh
+    if not out.is_dir() or not (out / SCENE_FILE).is_file():
+        raise InputError(f"{out}: is in the way and no terrain (it has no {SCENE_FILE}); name another with -o FOLDER")
+    earlier = read_config([out / SCENE_FILE])
+    entry = (earlier.get("scenes") or {}).get(earlier.get("scene"), {})
+    keys = ("folder", "field")
+    if any(entry.get(key) != recognised.entry.get(key) for key in keys):
+        raise InputError(f"{out}: has the terrain of another input; name another folder with -o FOLDER")
+    return earlier
+
+
+def apply_options(given: Mapping[str, Any], options: argparse.Namespace) -> dict[str, Any]:
+    """The settings with those of the command line."""
+    name = given["scene"]
+    entry = dict(given["scenes"][name])
+    for key in ("preset", "focal", "test"):
+        if getattr(options, key) is not None:
+            entry[key] = getattr(options, key)
+    for key in ("model", "masks"):
+        if (path := getattr(options, key)) is not None:
+            entry[key] = str(path.resolve())
+    settings = dict(given)
+    if options.budget is not None:
+        entry["start"], settings["rounds"], settings["k"] = split_budget(options.budget)
+    if options.capture:
+        entry["agent"] = AGENTS[options.capture]
+    settings["scenes"] = dict(given["scenes"]) | {name: entry}
+    return settings
+
+
+def split_budget(photos: int) -> tuple[int, int, int]:
+    """The photos to start from, rounds, and photos a round: the paper's loop for so many photos in all."""
+    if photos < START:
+        return photos, 0, 1
+    rounds = max(1, round((photos - START) / USUAL_ROUND)) if photos > START else 0
+    per_round = (photos - START) // rounds if rounds else 1
+    return photos - rounds * per_round, rounds, per_round
+
+
+def write_scene(path: Path, settings: Mapping[str, Any], head: str) -> None:
+    """Write a scene.yaml whole or not at all."""
+    with atomic_file(path) as part:
+        part.write_text(head + yaml.safe_dump(dict(settings), sort_keys=False, width=100), encoding="utf-8")
+
+
+def load_scene(out: Path) -> dict[str, Any]:
+    """The config of a terrain's folder, with all defaults. Raises: InputError."""
+    files = [REPOSITORY / run.CONFIG, *list_overlays(quietly=True), out / SCENE_FILE]
+    return check_config(add_scene_files(read_config(files), REPOSITORY / run.SCENES))
+
+
+def run_scene(out: Path, settings: dict[str, Any], cores: int) -> int:
+    """Run the workflow in the folder, and put its results where they are found. Returns the exit status."""
+    overlays = [*list_overlays(quietly=False), (out / SCENE_FILE).resolve()]
+    status, done = run.run_workflow(settings["scene"], cores, overlays, REPOSITORY, out.resolve())
+    if status == 0:
+        print(f"\n{done}.")
+        report_made(collect_results(out, settings))
+    return status
+
+
+def list_overlays(quietly: bool) -> list[Path]:
+    """The config files to read before scene.yaml."""
+    return [REPOSITORY / path for path in run.select_overlays(quietly)]
+
+
+def collect_results(out: Path, settings: dict[str, Any]) -> Made:
+    """Link the page, a still, the field and the report into the folder; they replace those of an earlier run."""
+    branch = encode_branch(settings, settings["scene"]) | {"seed": settings["seeds"][0]}
+    terrain, round_folder = (out / stage_folder(stage, branch) for stage in ("terrain", "round"))
+    photos = out / stage_folder("photos", branch)
+    link_folder(terrain / "page", out / "page")
+    still = next(iter(sorted(terrain.glob("*.png"))))
+    link_file(still, out / "terrain.png")
+    link_file(round_folder / "field.ply", out / "field.ply")
+    report = out / "report.html" if (photos / "report.html").is_file() else None
+    if report:
+        link_file(photos / "report.html", report)
+    return Made(out / "page", out / "terrain.png", out / "field.ply", report, out / SCENE_FILE)
+
+
+def link_file(source: Path, target: Path) -> None:
+    """A second name of a file, or a copy where the disk has no such names. It takes the target's place at once."""
+    with atomic_file(target) as part:
+        part.unlink(missing_ok=True)
+        try:
+            part.hardlink_to(source)
+        except OSError:
+            shutil.copyfile(source, part)
+
+
+def link_folder(source: Path, target: Path) -> None:
+    """A folder whose files are second names of another folder's."""
+    part = target.with_name(f".{target.name}.part")
+    shutil.rmtree(part, ignore_errors=True)
+    for path in sorted(source.rglob("*")):
+        if path.is_file():
+            (part / path.relative_to(source)).parent.mkdir(parents=True, exist_ok=True)
+            link_file(path, part / path.relative_to(source))
+    shutil.rmtree(target, ignore_errors=True)
+    part.rename(target)
+
+
+def report_made(made: Made) -> None:
+    """Print where the results are, and what to type next."""
+    size, folder = sum(path.stat().st_size for path in made.page.rglob("*") if path.is_file()), made.page.parent
+    lines = [
+        f"  page     {made.page} ({size / 1e6:.0f} MB; any web host can serve it)",
+        f"  still    {made.still}",
+        f"  field    {made.field} (for any splat viewer)",
+    ]
+    lines += [f"  report   {made.report}"] if made.report else []
+    lines += [
+        f"  scene    {made.scene} (edit it, then run `dav-gswt make {folder}`)",
+        f"Walk over it: dav-gswt view {folder}",
+    ]
+    print("\n".join(lines), flush=True)
