@@ -13,19 +13,16 @@ def test_an_interval_holds_the_truth_as_often_as_it_says():
         rng = np.random.default_rng(study)
         scenes = {str(i): 0.3 + rng.normal(0, 0.2) + rng.normal(0, 0.2, 4) for i in range(10)}
         found = statistics.bootstrap_paired(scenes, seed=study, level=0.9, replicates=150)
-        inside += found.low <= 0.3 <= found.high
+        inside += found[1] <= 0.3 <= found[2]
     assert 80 <= inside <= 96
 
 
-def test_scenes_count_alike_whatever_their_seeds_a_sure_win_is_sure_and_the_same_seed_says_the_same():
-    found = statistics.bootstrap_paired({"a": np.array([0.3, 0.01, 0.2]), "b": np.array([-0.2, 0.4])}, seed=0)
-    assert (found.wins, found.ties, found.losses) == (3, 1, 1)
-    assert found.mean == pytest.approx((0.17 + 0.1) / 2) and found.low < found.mean < found.high
+def test_scenes_count_alike_whatever_their_seeds_and_the_same_seed_says_the_same():
+    mean, low, high = statistics.bootstrap_paired({"a": np.array([0.3, 0.01, 0.2]), "b": np.array([-0.2, 0.4])}, seed=0)
+    assert mean == pytest.approx((0.17 + 0.1) / 2) and low < mean < high
     scenes = {"a": np.array([1, 1.1, 0.9]), "b": np.array([1.2, 1, 1])}
     one, two = (statistics.bootstrap_paired(scenes, seed=3) for _ in range(2))
-    assert one == two and one.low > 0.8 and one.p == pytest.approx(2 / statistics.REPLICATES)
-    nothing = statistics.bootstrap_paired({"a": np.zeros(2)}, seed=0)
-    assert (nothing.low, nothing.high, nothing.p) == (0, 0, 1)
+    assert one == two and one[1] > 0.8
     for bad in ({"a": np.array([])}, {"a": np.array([1, np.inf])}):
         with pytest.raises(ValueError, match="differences"):
             statistics.bootstrap_paired(bad, seed=0)
