@@ -7,17 +7,34 @@ is to run all of it. `snakemake tradeoff`, `snakemake preset_costs`.
 """
 
 
-use rule evaluate_round as evaluate_at with:
+rule evaluate_at:
+    """Compare a round's field with the test photos at another size than it was fitted at."""
+    input:
+        unpack(lpips_weights),
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        fit="<results>/<round>/fit.json",
+        captures=captures_until,
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
     output:
         metrics="<results>/<round>/metrics_{size}.json",
     log:
         "<logs>/<round>/evaluate_at_{size}.log",
-    benchmark:
-        "<benchmarks>/<round>/evaluate_at_{size}.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
+    threads: 2
+    resources:
+        mem_mb=per_attempt(1500),
+        runtime=per_attempt("10m"),
     params:
         preset=lambda wildcards: preset_keys("evaluate_round")(wildcards) | {"fit_size": int(wildcards.size)},
         t=integer("t"),
         source=code_of("evaluate_field"),
+    script:
+        "../../scripts/evaluate_field.py"
 
 
 rule compare_settings:
