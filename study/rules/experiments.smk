@@ -130,7 +130,10 @@ def pair_inputs(wildcards):
     """A scene's levels, and its tiles of each seam."""
     values = seam_branch(wildcards.scene) | {"seed": config["seeds"][0]}
     made, names = rules.cut_tiles.output, list(compared_tilings())
-    tiles = {key: expand(path, **(values | {"tiling": names})) for key, path in (("seams", made.seams), ("tiles", made.tiles))}
+    tiles = {
+        key: expand(path, **(values | {"tiling": names}))
+        for key, path in (("seams", made.seams), ("tiles", made.tiles))
+    }
     return tiles | {"levels": expand(rules.make_levels.output.levels, **values)[0]}
 
 

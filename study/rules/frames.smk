@@ -21,7 +21,9 @@ rule time_page:
         mem_mb=per_attempt(3000),
         runtime=per_attempt("2h"),
     params:
-        asked=lambda wildcards: {key: STUDY["frames"][key] for key in ("heights", "flight", "width", "height", "budgets")},
+        asked=lambda wildcards: {
+            key: STUDY["frames"][key] for key in ("heights", "flight", "width", "height", "budgets")
+        },
         source=code_of_study("time_page"),
     script:
         "../scripts/time_page.py"

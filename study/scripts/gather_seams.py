@@ -17,5 +17,5 @@ with logging_to(snakemake.log[0]):
     for new, kept, key in zip(found, out.kept, summary.KEYS, strict=True):
         csv_tables.update_table(kept, new, key)
     report.write_ablation(out.plot, ablation, study["baseline"])
-    tables = [summary.read_seam_table(path) for path in out.kept]
-    write_page(out.page, snakemake.input.template, report.describe_seams(*tables, params.own))
+    every, differences = (summary.read_seam_table(path) for path in out.kept)
+    write_page(out.page, snakemake.input.template, report.describe_seams(every, differences, params.own))
