@@ -13,6 +13,7 @@ from pathlib import Path
 import torch
 from diffusers.models.autoencoders.vae import DiagonalGaussianDistribution
 from jaxtyping import Float, UInt8
+from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from dav_gswt.files import atomic_file
