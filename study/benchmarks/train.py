@@ -9,13 +9,20 @@ from pathlib import Path
 
 import numpy as np
 from record import report_figures
+from scipy.spatial import cKDTree
 
+from dav_gswt import raster
+from dav_gswt.field import GaussianField
+from dav_gswt.reconstruction.coarse import Reconstruction
 from dav_gswt.reconstruction.fitting.plan import FitSettings
+from dav_gswt.reconstruction.ground import Ground
 from dav_gswt_study import fit_profile
 
 COPR = FitSettings(fit_size=256, spacing=1.5, max_gaussians=350_000, steps=1000)
 HIGH = FitSettings(fit_size=384, spacing=1.25, max_gaussians=150_000, steps=400)
 SCENES = ("desert_high", "meadow_high")
+FREE = 0.1  # flying heights above the ground from which space is free
+NEAR = 3.0  # spacings to a matched point within which a Gaussian may stand in it
 
 
 def photos(scene: str) -> Path:
@@ -39,6 +46,27 @@ def photos(scene: str) -> Path:
     return folder
 
 
+def measure_haze(field: GaussianField, grid: Ground, given: fit_profile.PhotoSet) -> float:
+    """Mean accumulated alpha, over the test views, of what stands higher than FREE flying heights above the ground and
+    not at a matched point: the haze that photos from their own places reward."""
+    above = field.means[:, 2] - grid.height_at(field.means)
+    high = field[above > FREE * given.frame.flying_height]
+    if len(high):
+        distance = np.asarray(cKDTree(given.model.points).query(high.means)[0])
+        high = high[distance > NEAR * grid.spacing]
+    views = [view for group in given.tests.values() for view in group]
+    return float(np.mean([raster.render(high, v.camera).alpha.mean() if len(high) else 0.0 for v in views]))
+
+
+def measure_test_groups(given: fit_profile.PhotoSet, made: Reconstruction) -> dict[str, float]:
+    """Mean PSNR of each group of test views, raw."""
+    seen = {
+        g: fit_profile.measure_quality(lambda v: raster.render(made.field, v.camera).colour, v)
+        for g, v in given.tests.items()
+    }
+    return {group: metrics["psnr"] for group, metrics in seen.items()}
+
+
 def copr() -> dict[str, float | None]:
     """Of the 38 photos that register every tenth is for testing; all ground that any photo sees is modelled."""
     given = fit_profile.read_photo_set(photos("copr_dunes"), COPR.fit_size)
@@ -52,7 +80,7 @@ def copr() -> dict[str, float | None]:
         "train_copr_final_ccpsnr": last["psnr_colour_corrected"],
         "train_copr_final_psnr": last["psnr"],
         "train_copr_seconds": last["seconds"],
-        "train_copr_free_space_opacity": fit_profile.measure_haze(found.made.field, found.made.grid, given),
+        "train_copr_free_space_opacity": measure_haze(found.made.field, found.made.grid, given),
     }
 
 
@@ -61,7 +89,7 @@ def offpath() -> dict[str, float]:
     out, losses = {}, []
     for scene in SCENES:
         given = fit_profile.read_photo_set(photos(scene), HIGH.fit_size, 0.15)
-        seen = fit_profile.measure_test_groups(given, fit_profile.profile_fit(given, HIGH, every=10**6).made)
+        seen = measure_test_groups(given, fit_profile.profile_fit(given, HIGH, every=10**6).made)
         losses.append(seen["high"] - seen["oblique"])
         out |= {f"offpath_{scene}_{group}_psnr": value for group, value in seen.items()}
         out[f"offpath_{scene}_loss_db"] = losses[-1]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt_study.csv_tables import read_table
-from dav_gswt_study.markdown import render_template, write_page
+from dav_gswt_study.markdown import write_page
 
 PAGE = "study/docs/results/claims.md"
 TEMPLATE = "study/report/claims.md"
@@ -54,8 +54,8 @@ class Difference:
         return f"{self.mean:+.{digits}f}{ends} {unit}".strip() + test
 
 
-def write_claims(root: Path) -> str:
-    """The page's text from the tables below a folder of the repository's shape.
+def describe_claims(root: Path) -> dict:
+    """The values of the page's template, from the tables below a folder of the repository's shape.
 
     Raises: KeyError: a table lacks a row or column that a claim is judged by.
     """
@@ -64,8 +64,7 @@ def write_claims(root: Path) -> str:
         return read_table(root / DATA / f"{name}.csv")
 
     tables = (_describe_views, _describe_scores, _describe_settings, _describe_seams, _describe_frames)
-    values = {key: value for describe in tables for key, value in describe(rows).items()}
-    return render_template(root / TEMPLATE, values)
+    return {key: value for describe in tables for key, value in describe(rows).items()}
 
 
 def _compare(row: Row, measure: str) -> Difference:
@@ -157,8 +156,7 @@ def _describe_frames(rows: Reader) -> dict:
         of.setdefault(row["scene"], {}).setdefault(int(row["level"]), []).append(float(row["count"]))
     counts = [[np.mean(levels[level]) for level in sorted(levels)] for levels in of.values()]
     ratios = [before / after for each in counts for before, after in zip(each[:-1], each[1:], strict=True)]
-    page = [row for row in rows("frames") if row["renderer"] == "page"]
-    page = [row for row in page if row["budget"] == page[0]["budget"]]
+    page = [row for row in rows("frames") if row["budget"] == rows("frames")[0]["budget"]]
     times = {name: _range([float(row[name]) for row in page]) for name in ("render_ms", "sort_ms", "update_ms")}
     return {
         "levels": [len(each) for each in counts],
@@ -173,4 +171,4 @@ def _range(values: list[float]) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    write_page(PAGE, write_claims(Path()))
+    write_page(PAGE, TEMPLATE, describe_claims(Path()))

@@ -34,7 +34,7 @@ class FixedSettings(ConfigModel):
     preset: Name | None = key("an entry of `presets`", None)
 
 
-Policies = Annotated[list[Policy | FixedSettings], Field(min_length=1)]
+Policies = Annotated[list[Policy], Field(min_length=1)]
 
 
 class Levels(ConfigModel):
@@ -65,7 +65,7 @@ class GalleryPage(ConfigModel):
 
 
 class Frames(Levels):
-    """`snakemake frame_times`: milliseconds of a frame on a walk, by the library and by the page in a browser."""
+    """`snakemake frame_times`: milliseconds of a frame of the page in a browser, on a walk."""
 
     heights: Heights = key("the surface")
     flight: Flight = key("the walk")
@@ -109,7 +109,7 @@ class ViewBenchmark(ConfigModel):
 
 
 class Seams(ConfigModel):
-    """`snakemake seams`: can anybody find the seams, and does the terrain repeat?"""
+    """`snakemake seams`: can anybody find the seams?"""
 
     scenes: Names = key("whose tiles are measured: by their own `tiling`, and by those below")
     tilings: Names = key("entries of `tilings` that are compared")
@@ -138,7 +138,7 @@ class Sweep(ConfigModel):
 
     scenes: Names = key("scenes with photos; policies are compared fairly with `agent: replay`")
     vary: Annotated[dict[str, Annotated[list[Any], Field(min_length=1)]], Field(min_length=1, max_length=2)] = key(
-        "a key of `fixed` and its values, or two keys, of which every combination is made; of policies also tables"
+        "a key of `fixed` and its values, or two keys, of which every combination is made"
     )
     fixed: FixedSettings = key("settings that replace the config's", FixedSettings())
     measure: Annotated[dict[Literal["views", "tiles", "seams", "stills"], Seeds], Field(min_length=1)] = key(
@@ -150,7 +150,7 @@ class Sweep(ConfigModel):
     def _check_values(self) -> "Sweep":
         for name, values in self.vary.items():
             for value in values:
-                FixedSettings.model_validate(value if isinstance(value, dict) else {name: value})
+                FixedSettings.model_validate({name: value})
         return self
 
 
@@ -229,7 +229,7 @@ class StudyConfig(ConfigModel):
     calibration: Calibration | None = key("scores against true errors", None)
     view_benchmark: ViewBenchmark | None = key("policies", None)
     compare: Comparison | None = key("another program's fit beside ours", None)
-    seams: Seams | None = key("seams and repetition", None)
+    seams: Seams | None = key("seams", None)
     forced_choice: ForcedChoice | None = key("the study with people", None)
     sweeps: dict[Name, Sweep] = key("by name", {})
     tradeoff: Tradeoff | None = key("speed against accuracy", None)

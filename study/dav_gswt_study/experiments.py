@@ -12,7 +12,7 @@ from itertools import product
 from dav_gswt.paths import encode_number
 
 EVERYTHING = "all"  # the policy that takes the whole pool in one round
-SUFFIXES = ("-expansion",)  # of tilings that the study makes of an entry of `tilings`
+EXPANSION = "-expansion"  # of tilings that the study makes of an entry of `tilings`
 CALLED = {"presets": "preset", "tilings": "tiling", "priors": "prior"}  # how what is chosen calls an entry of a table
 PRESET = "preset"  # the knob of the named presets
 
@@ -20,25 +20,17 @@ PRESET = "preset"  # the knob of the named presets
 def list_combinations(vary: dict[str, list], fixed: dict) -> list[dict]:
     """The settings of every combination, in the order they stand in: `fixed`, and a value of each of `vary` over it.
 
-    A policy with settings of its own, {policy: w2, prior: terrain-m2, p_drop: 0}, brings these. `shown` holds
-    for each of `vary` the value as tables name it. The policy that takes everything has one round, whatever is asked.
+    `shown` holds the values of `vary` alone.
     """
-    found = []
-    for values in product(*vary.values()):
-        chosen = dict(fixed)
-        for key, value in zip(vary, values, strict=True):
-            chosen |= value if isinstance(value, dict) else {key: value}
-        found.append(chosen | {"shown": dict(zip(vary, map(name_value, values), strict=True))})
-    return found
-
-
-def name_value(value):
-    """A varied value as tables name it: of a policy with settings of its own the policy."""
-    return value["policy"] if isinstance(value, dict) else value
+    combined = (dict(zip(vary, values, strict=True)) for values in product(*vary.values()))
+    return [fixed | values | {"shown": values} for values in combined]
 
 
 def count_rounds(chosen: dict, policy: str, start: int, k: int, rounds: int) -> int:
-    """How many rounds a cell takes: those asked for, or as many of k as `photos` of `chosen` have room for."""
+    """How many rounds a cell takes: those asked for, or as many of k as `photos` of `chosen` have room for.
+
+    The policy that takes everything has one round, whatever is asked.
+    """
     if "photos" in chosen:
         rounds = (chosen["photos"] - start) // k
     return min(rounds, 1) if policy == EVERYTHING else rounds
@@ -56,8 +48,8 @@ def count_start_photos(scene: dict) -> int:
 
 def split_tiling(tiling: str) -> tuple[str, str]:
     """The entry of `tilings` that a tiling is made of, and the suffix that says how."""
-    suffix = next((each for each in SUFFIXES if tiling.endswith(each)), "")
-    return tiling.removesuffix(suffix), suffix
+    plain = tiling.removesuffix(EXPANSION)
+    return plain, tiling.removeprefix(plain)
 
 
 def name_replicate(tiling: str, number: int) -> str:

@@ -12,10 +12,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
-from scipy.spatial import cKDTree
 
 from dav_gswt import raster
-from dav_gswt.field import GaussianField
 from dav_gswt.geometry.scene_frame import SceneFrame, Square, read_scene_frame
 from dav_gswt.images import metrics
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
@@ -23,11 +21,9 @@ from dav_gswt.photos.training_views import TrainingView, mask_outside_ground, re
 from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coarse_field
 from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions
-from dav_gswt.reconstruction.ground import WHOLE, Ground
+from dav_gswt.reconstruction.ground import WHOLE
 
 FIRST_TEST, EACH = 5, 10
-FREE = 0.1  # flying heights above the ground from which space is free
-NEAR = 3.0  # spacings to a matched point within which a Gaussian may stand in it
 
 
 @dataclass(frozen=True)
@@ -115,23 +111,3 @@ def find_time_to(curve: list[dict], decibel: float) -> float | None:
     """When the colour-corrected PSNR first reached so much; None: never."""
     reached = [row["seconds"] for row in curve if row["psnr_colour_corrected"] >= decibel]
     return reached[0] if reached else None
-
-
-def measure_haze(field: GaussianField, grid: Ground, photos: PhotoSet) -> float:
-    """Mean accumulated alpha, over the test views, of what stands higher than FREE flying heights above the ground and
-    not at a matched point: the haze that photos from their own places reward."""
-    above = field.means[:, 2] - grid.height_at(field.means)
-    high = field[above > FREE * photos.frame.flying_height]
-    if len(high):
-        distance = np.asarray(cKDTree(photos.model.points).query(high.means)[0])
-        high = high[distance > NEAR * grid.spacing]
-    views = [view for group in photos.tests.values() for view in group]
-    return float(np.mean([raster.render(high, v.camera).alpha.mean() if len(high) else 0.0 for v in views]))
-
-
-def measure_test_groups(photos: PhotoSet, made: Reconstruction) -> dict[str, float]:
-    """Mean PSNR of each group of test views, raw."""
-    seen = {
-        g: measure_quality(lambda v: raster.render(made.field, v.camera).colour, v) for g, v in photos.tests.items()
-    }
-    return {group: metrics["psnr"] for group, metrics in seen.items()}

@@ -25,10 +25,10 @@ def render_template(template: Path | str, values: dict) -> str:
     return environment.from_string(Path(template).read_text(encoding="utf-8")).render(values)
 
 
-def write_page(path: Path | str, text: str) -> None:
-    """Write a page, whole or not at all."""
+def write_page(path: Path | str, template: Path | str, values: dict) -> None:
+    """Write a template filled with values, whole or not at all. Raises: as `render_template`."""
     with atomic_file(path) as part:
-        part.write_text(text, encoding="utf-8")
+        part.write_text(render_template(template, values), encoding="utf-8")
 
 
 def format_number(value: float | None, digits: int) -> str:

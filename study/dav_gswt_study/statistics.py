@@ -18,24 +18,9 @@ from statsmodels.stats.proportion import proportion_confint
 REPLICATES = 10_000  # of the bootstrap over scenes and seeds
 CLUSTER_REPLICATES = 4000  # of the bootstrap over clusters
 LEVEL = 0.95  # of intervals
-TIE = 0.05  # dB: two fits of the same photos differ by less
 SEED = 0  # of the bootstrap, in published tables
 
 ClusterSums = dict[str, Float[Array, "_"]]  # by cluster: sums of some values, and last how many rows they are of
-
-
-@dataclass(frozen=True)
-class PairedDifference:
-    """A policy minus a baseline, in dB: mean over scenes, ends of its interval, two-sided p, and over how many pairs
-    it wins, ties (within `TIE`) and loses."""
-
-    mean: float
-    low: float
-    high: float
-    p: float
-    wins: int
-    ties: int
-    losses: int
 
 
 @dataclass(frozen=True)
@@ -70,29 +55,23 @@ class ClusteredShare:
 
 def bootstrap_paired(
     differences: dict[str, Float[Array, "_"]], seed: int = SEED, level: float = LEVEL, replicates: int = REPLICATES
-) -> PairedDifference:
-    """Mean of paired differences with an interval from a two-stage bootstrap: scenes, then seeds within each.
+) -> tuple[float, float, float]:
+    """Mean of paired differences, and the ends of its interval by a two-stage bootstrap: scenes, then seeds of each.
 
-    With a single scene only its seeds are drawn, and the interval tells nothing about other scenes. p is twice the
-    share of replicates beyond 0, at least one replicate.
+    With a single scene only its seeds are drawn, and the interval tells nothing about other scenes.
 
     Args:   differences: by scene, one value a seed.
     Raises: ValueError: no difference, or one that is not finite.
     """
     scenes = [values for values in differences.values() if len(values)]
-    everything = np.concatenate(scenes) if scenes else np.zeros(0)
-    if not len(everything) or not np.isfinite(everything).all():
+    if not scenes or not np.isfinite(np.concatenate(scenes)).all():
         raise ValueError("a comparison needs differences, all of them finite")
     rng, means = np.random.default_rng(seed), np.empty(replicates)
     for i in range(replicates):
         drawn = (scenes[j] for j in rng.integers(len(scenes), size=len(scenes)))
         means[i] = np.mean([np.mean(values[rng.integers(len(values), size=len(values))]) for values in drawn])
     low, high = np.quantile(means, [(1 - level) / 2, (1 + level) / 2])
-    beyond = min((means <= 0).mean(), (means >= 0).mean())
-    wins, losses = int((everything > TIE).sum()), int((everything < -TIE).sum())
-    mean = float(np.mean([values.mean() for values in scenes]))
-    p = float(min(1.0, 2 * max(beyond, 1 / replicates)))
-    return PairedDifference(mean, float(low), float(high), p, wins, len(everything) - wins - losses, losses)
+    return float(np.mean([values.mean() for values in scenes])), float(low), float(high)
 
 
 def compute_paired_test(differences: dict[str, Float[Array, "_"]]) -> PairedTest:
@@ -104,17 +83,17 @@ def compute_paired_test(differences: dict[str, Float[Array, "_"]]) -> PairedTest
     With one pair a scene (df 0), or equal differences, t, p and d are None.
     Raises: ValueError: no difference, or one that is not finite.
     """
-    boot = bootstrap_paired(differences)
+    mean, *ends = bootstrap_paired(differences)
     groups = [values for values in differences.values() if len(values)]
     units, scenes = sum(map(len, groups)), len(groups)
     df = units - scenes
     squares = sum(float(((values - values.mean()) ** 2).sum()) for values in groups)
-    low, high = (boot.low, boot.high) if units > 1 else (None, None)
+    low, high = ends if units > 1 else (None, None)
     if df == 0 or squares == 0:
-        return PairedTest(units, boot.mean, low, high, None, df, None, None)
+        return PairedTest(units, mean, low, high, None, df, None, None)
     deviation = float(np.sqrt(squares / df))
-    t = boot.mean / (deviation * float(np.sqrt(sum(1 / len(values) for values in groups))) / scenes)
-    return PairedTest(units, boot.mean, low, high, t, df, two_sided_p(t, df), boot.mean / deviation)
+    t = mean / (deviation * float(np.sqrt(sum(1 / len(values) for values in groups))) / scenes)
+    return PairedTest(units, mean, low, high, t, df, two_sided_p(t, df), mean / deviation)
 
 
 def subtract_or_none(a: float | None, b: float | None) -> float | None:

@@ -10,7 +10,7 @@ import numpy as np
 from dav_gswt.files import read_json
 from dav_gswt.images import figures
 from dav_gswt.sweeps import CELL, COLUMNS, QUALITY, TILES, TIMES, describe_origin, tabulate_cell
-from dav_gswt_study import csv_tables
+from dav_gswt_study import csv_tables, plots
 from dav_gswt_study.experiments import EVERYTHING
 from dav_gswt_study.figures import OKABE_ITO
 from dav_gswt_study.seams import summary
@@ -117,7 +117,9 @@ def _draw_panel(panel, axis: str, key: str, rows: list[dict], scenes: list[str])
     panel.set_xticks(range(len(values)), values, fontsize=8, **askew)
     panel.set_xlim(-0.5, len(values) - 0.5)
     panel.set_xlabel(axis, fontsize=9)
-    _label_axes(panel, PANELS[key])
+    panel.set_ylabel(PANELS[key], fontsize=9)
+    panel.tick_params(labelsize=8)
+    panel.grid(alpha=0.3)
 
 
 def _is_number(text: str) -> bool:
@@ -125,19 +127,9 @@ def _is_number(text: str) -> bool:
 
 
 def _draw_curves(panel, rows: list[dict]) -> None:
-    for value, colour in zip(dict.fromkeys(row["varied_0"] for row in rows), OKABE_ITO * len(rows), strict=False):
-        mine = [row for row in rows if row["varied_0"] == value and row["psnr"] is not None]
-        photos = sorted({row["photos"] for row in mine})
-        means = [float(np.mean([row["psnr"] for row in mine if row["photos"] == n])) for n in photos]
-        if value == EVERYTHING:  # what there is to reach, and no curve
-            panel.axhline(means[-1], color="0.6", linewidth=1.2, linestyle=":", label=f"all {photos[-1]:.0f} photos")
-        else:
-            panel.plot(photos, means, marker="o", markersize=3.5, linewidth=1.4, color=colour, label=value)
-    panel.set_xlabel("photos", fontsize=9)
-    _label_axes(panel, PANELS["psnr"])
-
-
-def _label_axes(panel, label: str) -> None:
-    panel.set_ylabel(label, fontsize=9)
-    panel.tick_params(labelsize=8)
-    panel.grid(alpha=0.3)
+    values = [value for value in dict.fromkeys(row["varied_0"] for row in rows) if value != EVERYTHING]
+    for value, colour in zip(values, OKABE_ITO * len(values), strict=False):
+        plots.draw_curve(panel, [row for row in rows if row["varied_0"] == value], value, color=colour, linewidth=1.4)
+    everything = [row for row in rows if row["varied_0"] == EVERYTHING and row["psnr"] is not None]
+    plots.draw_everything(panel, [row for row in everything if row["photos"] == everything[-1]["photos"]])
+    plots.label_curves(panel)

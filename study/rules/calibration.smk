@@ -9,7 +9,6 @@ study/docs/data/calibration.csv and figures/calibration.png of all that the conf
 rule calibrate_coarse:
     """Compare the scores of some candidates with the true error of the field there."""
     input:
-        unpack(prior_weights),
         field="<results>/<coarse>/field.ply",
         ground="<results>/<coarse>/ground.exr",
         scores="<results>/<scored>/scores.csv",
@@ -30,8 +29,6 @@ rule calibrate_coarse:
     params:
         scene=scene_keys("select_poses"),
         size=lambda wildcards: config["presets"][wildcards.preset]["fit_size"],
-        prior=lambda wildcards: config["priors"].get(wildcards.prior),
-        p_drop=real("p_drop"),
         lam=lookup(dpath="lam", within=config),
         seed=integer("seed"),
         poses=40,  # spread over all candidates
@@ -42,7 +39,6 @@ rule calibrate_coarse:
 
 use rule calibrate_coarse as calibrate_round with:
     input:
-        unpack(prior_weights),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         scores="<results>/<round>/scores.csv",

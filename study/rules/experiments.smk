@@ -2,7 +2,6 @@
 
 from itertools import product
 
-from dav_gswt.paths import encode_number
 from dav_gswt_study import experiments
 
 SHOWN = {  # figures of a scene in the page of results
@@ -66,23 +65,17 @@ def benchmark_experiments():
         for scene, policy, seed, k in product(
             group["scenes"], group.get("policies", asked["policies"]), group.get("seeds", asked["seeds"]), group["k"]
         ):
-            policy = {"policy": policy} if isinstance(policy, str) else policy
-            if policy["policy"] != "all" or k == group["k"][0]:  # all of the pool is one round, whatever k is
+            if policy != experiments.EVERYTHING or k == group["k"][0]:  # all of the pool is one round, whatever k is
                 cells.append(benchmark_experiment(scene, policy, seed, k, group))
     return cells
 
 
-def benchmark_experiment(scene, asked, seed, k, group):
+def benchmark_experiment(scene, policy, seed, k, group):
     """One of them: rounds of k from the scene's start until there are as many photos as the set asks for."""
-    entry, policy = config["scenes"][scene], asked["policy"]
-    rounds = 1 if policy == "all" else (group["photos"] - entry["start"]) // k
-    own = {
-        key: asked[key] if key == "prior" else encode_number(asked[key])
-        for key in ("prior", "p_drop", "lam")
-        if key in asked
-    }
+    entry = config["scenes"][scene]
+    rounds = experiments.count_rounds(group, policy, entry["start"], k, 0)
     preset = {key: group[key] for key in ("preset",) if key in group}
-    values = branch(scene, policy, preset) | own | {"seed": seed, "k": k}
+    values = branch(scene, policy, preset) | {"seed": seed, "k": k}
     chosen, before, after = values_of_choice(values), range(1, rounds), range(1, rounds + 1)
 
     def of(first, later, ts, wildcards=values):
@@ -119,19 +112,12 @@ def seam_experiments():
         for (variant, entry, number), seed in product(variants, config["seeds"]):
             values = seam_branch(scene, entry) | {"seed": seed}
             files = {"table": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts}
-            files |= {} if number else {"repeats": rules.measure_repetition.output.table}
             about = {key: values[key] for key in ("scene", "seed", "preset")} | {
                 "variant": variant,
                 "replicate": number,
             }
             cells.append(about | {name: expand(path, **values)[0] for name, path in files.items()})
     return cells
-
-
-def seam_pictures():
-    """What rule draw_grid draws of each scene, in the order of its shots."""
-    drawn = list(rules.render_grid.output.pictures)
-    return {scene: expand(drawn, **seam_branch(scene)) for scene in STUDY["seams"]["scenes"]}
 
 
 def compared_tilings():
@@ -141,13 +127,14 @@ def compared_tilings():
 
 
 def pair_inputs(wildcards):
-    """A scene's levels, its tiles of each seam, LPIPS's weights where they are."""
+    """A scene's levels, and its tiles of each seam."""
     values = seam_branch(wildcards.scene) | {"seed": config["seeds"][0]}
     made, names = rules.cut_tiles.output, list(compared_tilings())
-    found = {"levels": expand(rules.make_levels.output.levels, **values)[0]}
-    found |= {"seams": expand(made.seams, **(values | {"tiling": names}))}
-    found |= {"tiles": expand(made.tiles, **(values | {"tiling": names}))}
-    return found | lpips_weights(wildcards)
+    tiles = {
+        key: expand(path, **(values | {"tiling": names}))
+        for key, path in (("seams", made.seams), ("tiles", made.tiles))
+    }
+    return tiles | {"levels": expand(rules.make_levels.output.levels, **values)[0]}
 
 
 def saved_answers(wildcards):
@@ -239,11 +226,6 @@ def preset_experiment(scene, preset):
     return cell | {"files": cell["files"] | {"metrics": metrics}, "times": times}
 
 
-def walk_settings(wildcards):
-    """A params function: what of the config's `frames` a walk is measured by, whichever the scene."""
-    return {key: STUDY["frames"][key] for key in ("heights", "flight", "width", "height", "budgets")}
-
-
 def tabled_sweeps():
     """The sweeps that the paper's tables are made from."""
     asked = STUDY["tables"]
@@ -285,16 +267,6 @@ def figure_files():
             f"{name}_{scene}": expand(rule.output.plot, **values)[0] for name, rule in zip(SHOWN, drawn, strict=True)
         }
     return found | {"budget": "study/results/sweeps/budget.png"}
-
-
-def terrain_sheets():
-    """The stills of the terrain of each scene that the study's figures show."""
-    asked = STUDY["tables"]["figures"]
-    return [
-        path
-        for scene in asked["scenes"]
-        for path in expand(rules.make_contact_sheet.output.sheet, **estimator_branch(scene, asked["policy"]))
-    ]
 
 
 def kept_suffix(name):

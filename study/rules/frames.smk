@@ -1,29 +1,9 @@
-"""Frame times on a walk at a fixed height over hills, for several budgets of Gaussians in view: `snakemake frame_times`.
+"""Frame times of the page on a walk at a fixed height over hills, for several budgets of Gaussians: `snakemake frame_times`.
 
-In: the bundles of the config's `study.frames`, the viewer. Out, beside each bundle: frames/library.csv (rendered by the library on
-the CPU), frames/page.csv (by the page in a headless Chromium); study/results/tables/frames.csv, viewer.csv and a figure. Needs Chromium
-and requirements-test.lock. Milliseconds hold for the machine and its load, which every row names.
+In: the bundles of the config's `study.frames`, the viewer. Out: frames/page.csv beside each bundle (a headless Chromium);
+study/results/tables/frames.csv, viewer.csv and a figure. Needs Chromium and requirements-test.lock. Milliseconds hold for the
+machine and its load, which every row names.
 """
-
-
-rule time_library:
-    """Frames as the library draws them."""
-    input:
-        manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
-    output:
-        table="<results>/<bundle>/frames/library.csv",
-    log:
-        "<logs>/<bundle>/time_library.log",
-    threads: 2
-    resources:
-        mem_mb=per_attempt(4000),
-        runtime=per_attempt("1h"),
-    params:
-        asked=walk_settings,
-        source=code_of_study("time_frames"),
-    script:
-        "../scripts/time_frames.py"
 
 
 rule time_page:
@@ -41,16 +21,17 @@ rule time_page:
         mem_mb=per_attempt(3000),
         runtime=per_attempt("2h"),
     params:
-        asked=walk_settings,
-        source=code_of_study("time_frames"),
+        asked=lambda wildcards: {
+            key: STUDY["frames"][key] for key in ("heights", "flight", "width", "height", "budgets")
+        },
+        source=code_of_study("time_page"),
     script:
-        "../scripts/time_frames.py"
+        "../scripts/time_page.py"
 
 
 rule gather_frames:
     """All scenes in one table and figure; of the page at the first budget what the study's tables show."""
     input:
-        library=lambda wildcards: list(measured_of_tiles(rules.time_library, "frames")),
         page=lambda wildcards: list(measured_of_tiles(rules.time_page, "frames")),
     output:
         table="study/results/tables/frames.csv",

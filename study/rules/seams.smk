@@ -1,8 +1,8 @@
-"""Seams: can anybody find the borders and the cuts, and does the terrain repeat? `snakemake seams`.
+"""Seams: can anybody find the borders and the cuts? `snakemake seams`.
 
-In: levels and tiles. Out, per experiment (a scene, a seed, a tiling): crops.csv, facts.json, repetition.csv; of each scene's
-own tiling 20 x 20 tiles from above and walking, flat and hilly. Gathered: study/results/tables/seams.csv (every crop); in
-study/docs/data seam_summary.csv, seam_ablation.csv and repetition.csv, where runs add up; the page study/docs/results/seams.md.
+In: levels and tiles. Out, per experiment (a scene, a seed, a tiling): crops.csv, facts.json. Gathered:
+study/results/tables/seams.csv (every crop); in study/docs/data seam_summary.csv and seam_ablation.csv, where runs add up; the
+page study/docs/results/seams.md.
 """
 
 
@@ -32,74 +32,21 @@ rule measure_seams:
         "../scripts/measure_seams.py"
 
 
-rule measure_repetition:
-    """Autocorrelation of a large top view and of the exemplar."""
-    input:
-        levels="<results>/<levels>",
-        seams="<results>/<tiles>/seams.json",
-        tiles="<results>/<tiles>/tiles",
-    output:
-        table="<results>/<seams>/repetition.csv",
-    log:
-        "<logs>/<seams>/measure_repetition.log",
-    threads: 2
-    resources:
-        mem_mb=per_attempt(4000),
-        runtime=per_attempt("10m"),
-    params:
-        tiling=lambda wildcards: config["tilings"][plain_tiling(wildcards)],
-        seed=integer("seed"),
-        source=code_of_study("measure_repetition"),
-    script:
-        "../scripts/measure_repetition.py"
-
-
-rule render_grid:
-    """Twenty by twenty tiles, from above and at a walker's height: is there a grid?"""
-    input:
-        manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
-    output:
-        pictures=expand(
-            "<results>/<seams>/{shot}_{surface}.png",
-            shot=["grid", "walker"],
-            surface=["flat", "hilly"],
-            allow_missing=True,
-        ),
-    log:
-        "<logs>/<seams>/render_grid.log",
-    priority: -1
-    threads: 1  # most of it places Gaussians, one cell after another
-    resources:
-        mem_mb=per_attempt(6000),
-        runtime=per_attempt("20m"),
-    params:
-        size=lookup(dpath="stills", within=config),
-        source=code_of_study("render_grid"),
-    script:
-        "../scripts/render_grid.py"
-
-
 rule gather_seams:
-    """Every crop of every cell in one table; what follows from them, added to what earlier runs found; the page and its pictures."""
+    """Every crop of every cell in one table; what follows from them, added to what earlier runs found; the page and its figure."""
     input:
-        measured=lambda wildcards: [
-            cell[name] for cell in seam_experiments() for name in ("table", "facts", "repeats") if name in cell
-        ],
-        drawn=lambda wildcards: [path for paths in seam_pictures().values() for path in paths],
+        measured=lambda wildcards: [cell[name] for cell in seam_experiments() for name in ("table", "facts")],
         template=str(HERE / "report/seams.md"),
     output:
         crops="study/results/tables/seams.csv",
-        kept=update(expand("study/docs/data/{table}.csv", table=["seam_summary", "seam_ablation", "repetition"])),
+        kept=update(expand("study/docs/data/{table}.csv", table=["seam_summary", "seam_ablation"])),
         plot="study/docs/figures/seam_ablation.png",
-        sheet="study/docs/figures/seam_sheet.jpg",
         page="study/docs/results/seams.md",
     log:
         "<logs>/seams/gather_seams.log",
     params:
         cells=lambda wildcards: seam_experiments(),
         study=lambda wildcards: STUDY["seams"],
-        pictures=lambda wildcards: seam_pictures(),
         own=lambda wildcards: {scene: config["scenes"][scene]["tiling"] for scene in STUDY["seams"]["scenes"]},
         source=code_of_study("gather_seams"),
     script:
@@ -122,7 +69,7 @@ rule plot_cuts:
 
 
 rule seams:
-    """Measure the seams of the config's `seam_study`, and draw what is to be looked at."""
+    """Measure the seams of the config's `study.seams`, and draw cuts."""
     input:
         rules.gather_seams.output,
         lambda wildcards: [

@@ -96,7 +96,6 @@ rule study:
         rules.write_stability.output.page,
         rules.compare_settings.output.page,
         lambda wildcards: expand("study/results/sweeps/{name}.png", name=[*tabled_sweeps(), *STUDY["tables"]["also"]]),
-        lambda wildcards: terrain_sheets(),
 
 
 localrules:

@@ -14,7 +14,6 @@ rule evaluate_at:
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         fit="<results>/<round>/fit.json",
-        poses="<results>/<round>/poses.json",
         captures=captures_until,
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",

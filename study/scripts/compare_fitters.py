@@ -21,4 +21,4 @@ with logging_to(snakemake.log[0]):
     peers.plot_programs(rows, out.plot)
     made = record_provenance({"frame": snakemake.input.frame}, asked) | describe_machine()
     values = peers.describe(rows, photos, asked, made)
-    markdown.write_page(out.page, markdown.render_template(snakemake.input.template, values))
+    markdown.write_page(out.page, snakemake.input.template, values)

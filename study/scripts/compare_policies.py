@@ -3,7 +3,7 @@
 from dav_gswt.logs import logging_to
 from dav_gswt_study import csv_tables
 from dav_gswt_study.comparison import curves, page, tables
-from dav_gswt_study.markdown import render_template, write_page
+from dav_gswt_study.markdown import write_page
 
 with logging_to(snakemake.log[0]):
     out, params = snakemake.output, snakemake.params
@@ -16,4 +16,4 @@ with logging_to(snakemake.log[0]):
     page.write_figure(out.plot, rounds, compared, params.baseline)
     grouped = tables.compare_groups(results, params.baseline, params.groups)
     values = page.describe_comparison(rounds, results, compared, grouped, params.baseline)
-    write_page(out.page, render_template(snakemake.input.template, values | {"table": snakemake.wildcards.table}))
+    write_page(out.page, snakemake.input.template, values | {"table": snakemake.wildcards.table})

@@ -3,7 +3,7 @@
 from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
 from dav_gswt_study import csv_tables
-from dav_gswt_study.markdown import render_template, write_page
+from dav_gswt_study.markdown import write_page
 from dav_gswt_study.tradeoff import page, plots, tables
 
 with logging_to(snakemake.log[0]):
@@ -15,4 +15,4 @@ with logging_to(snakemake.log[0]):
     rows, front = tables.read_tradeoff(out.table), tables.read_tradeoff(out.pareto)
     figures.save_figure(plots.draw_fronts(front), out.fronts)
     figures.save_figure(plots.draw_knobs(rows), out.knobs)
-    write_page(out.page, render_template(snakemake.input.template, page.describe_tradeoff(rows, front)))
+    write_page(out.page, snakemake.input.template, page.describe_tradeoff(rows, front))

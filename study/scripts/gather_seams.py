@@ -1,8 +1,5 @@
-"""Rule gather_seams: crops of all experiments in one table, its summaries, and the page with its pictures."""
+"""Rule gather_seams: crops of all experiments in one table, its summaries, and the page with its figure."""
 
-from pathlib import Path
-
-from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
 from dav_gswt_study import csv_tables
 from dav_gswt_study.markdown import write_page
@@ -16,15 +13,9 @@ with logging_to(snakemake.log[0]):
         row for row in rows if row["variant"] in study["tilings"] and row["replicate"] < study["compared_replicates"]
     ]
     ablation = summary.compare_variants(compared, study["baseline"])
-    repetition = [row for cell in cells if "repeats" in cell for row in summary.tabulate_repetition(cell)]
-    found = (summary.summarise_crops(rows), ablation, repetition)
+    found = (summary.summarise_crops(rows), ablation)
     for new, kept, key in zip(found, out.kept, summary.KEYS, strict=True):
         csv_tables.update_table(kept, new, key)
     report.write_ablation(out.plot, ablation, study["baseline"])
-    figures.save_figure(figures.draw_sheet(params.pictures, list(report.SHOT_CAPTIONS.values())), out.sheet)
-    pictures = {
-        f"../figures/{Path(out.plot).name}": "Every variant minus the baseline, in three measures",
-        f"../figures/{Path(out.sheet).name}": "Twenty by twenty tiles from above, and at walker height",
-    }
-    tables = tuple(summary.read_seam_table(path) for path in out.kept)
-    write_page(out.page, report.format_seam_page(snakemake.input.template, tables, params.own, pictures))
+    every, differences = (summary.read_seam_table(path) for path in out.kept)
+    write_page(out.page, snakemake.input.template, report.describe_seams(every, differences, params.own))

@@ -1,6 +1,5 @@
 """Rule render_pairs: pairs of crops of a scene for the forced-choice study."""
 
-from dav_gswt.images import lpips_weights
 from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import record_provenance
@@ -15,7 +14,6 @@ with logging_to(snakemake.log[0]):
     for name, *files in zip(params.tilings, paths.tiles, paths.seams, strict=True):
         cut = tiles.read_tiles(*files)
         sets[name] = placed_tiles.place_tiles(cut, maps.detrend(cut, params.tilings[name]), params.salt, params.tau)
-    alexnet = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
-    inputs = {"seams": list(paths.seams)} | ({"lpips": paths.lpips} if alexnet else {})
     asked = dict(params.study)
-    kit.write_pairs(snakemake.output.pairs, pairs.sample_pairs(sets, asked, alexnet), record_provenance(inputs, asked))
+    origin = record_provenance({"seams": list(paths.seams)}, asked)
+    kit.write_pairs(snakemake.output.pairs, pairs.sample_pairs(sets, asked), origin)

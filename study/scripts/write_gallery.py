@@ -7,4 +7,4 @@ with logging_to(snakemake.log[0]):
     params = snakemake.params
     rows = [gallery.tabulate_scene(cell) for cell in params.cells]
     values = gallery.describe_gallery(rows, params.walk, params.seconds)
-    markdown.write_page(snakemake.output.page, markdown.render_template(snakemake.input.template, values))
+    markdown.write_page(snakemake.output.page, snakemake.input.template, values)

@@ -13,4 +13,4 @@ with logging_to(snakemake.log[0]):
         out.verdicts, page.tabulate_verdicts(dict(zip(snakemake.params.scenes, paths.found, strict=True)))
     )
     values = page.describe_materials(out)
-    markdown.write_page(out.page, markdown.render_template(paths.template, values))
+    markdown.write_page(out.page, paths.template, values)

@@ -14,4 +14,4 @@ with logging_to(snakemake.log[0]):
     formulas, runs = csv_tables.read_table(paths.formulas), csv_tables.read_table(out.runs)
     figures.save_figure(page.plot_tolerances(formulas), out.plot)
     values = page.describe_stability(formulas, runs, read_json(paths.facts))
-    markdown.write_page(out.page, markdown.render_template(paths.template, values))
+    markdown.write_page(out.page, paths.template, values)

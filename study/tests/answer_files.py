@@ -16,16 +16,11 @@ PAIRS = (("semantic", "colour"), ("semantic", "floor"))
 
 
 def drawn(crops=4, checks=1, scenes=("desert", "grass")) -> list[StoredPair]:
-    """Pairs of noise. The model observer prefers semantic in all pairs but every fourth, and always the floor."""
+    """Pairs of noise."""
     rng, found = np.random.default_rng(3), []
     for scene in scenes:
         for a, b in [pair for pair in PAIRS for _ in range(crops)] + [(PLAIN, CHECK)] * checks:
-            over = (
-                [None, None]
-                if b == CHECK
-                else [0.01, 0.0 if b == "floor" else (0.02, 0.02, 0.02, 0.005)[len(found) % 4]]
-            )
-            about = {"scene": scene, "a": a, "b": b, "view": "top", "ground": "flat", "cluster": "t0:1:1", "over": over}
+            about = {"scene": scene, "a": a, "b": b, "view": "top", "ground": "flat", "cluster": "t0:1:1"}
             found.append(StoredPair(about, (_png(rng), _png(rng))))
     return found
 

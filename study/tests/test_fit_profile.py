@@ -26,4 +26,3 @@ def test_a_trial_tells_seconds_steps_and_quality_and_gives_the_field_that_a_fit_
     start = StartViews(photos.frame, photos.train, *NONE, photos.margin)
     alone = fit_coarse_field(start, quality, np.random.default_rng(0))
     np.testing.assert_array_equal(found.made.field.means, alone.field.means)
-    assert fit_profile.measure_test_groups(photos, found.made) == {"test": found.curve[-1]["psnr"]}

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 from scipy import stats
-from scipy.stats import binomtest
 
 from dav_gswt_study import statistics
 
@@ -13,27 +12,19 @@ def test_an_interval_holds_the_truth_as_often_as_it_says():
         rng = np.random.default_rng(study)
         scenes = {str(i): 0.3 + rng.normal(0, 0.2) + rng.normal(0, 0.2, 4) for i in range(10)}
         found = statistics.bootstrap_paired(scenes, seed=study, level=0.9, replicates=150)
-        inside += found.low <= 0.3 <= found.high
+        inside += found[1] <= 0.3 <= found[2]
     assert 80 <= inside <= 96
 
 
-def test_scenes_count_alike_whatever_their_seeds_a_sure_win_is_sure_and_the_same_seed_says_the_same():
-    found = statistics.bootstrap_paired({"a": np.array([0.3, 0.01, 0.2]), "b": np.array([-0.2, 0.4])}, seed=0)
-    assert (found.wins, found.ties, found.losses) == (3, 1, 1)
-    assert found.mean == pytest.approx((0.17 + 0.1) / 2) and found.low < found.mean < found.high
+def test_scenes_count_alike_whatever_their_seeds_and_the_same_seed_says_the_same():
+    mean, low, high = statistics.bootstrap_paired({"a": np.array([0.3, 0.01, 0.2]), "b": np.array([-0.2, 0.4])}, seed=0)
+    assert mean == pytest.approx((0.17 + 0.1) / 2) and low < mean < high
     scenes = {"a": np.array([1, 1.1, 0.9]), "b": np.array([1.2, 1, 1])}
     one, two = (statistics.bootstrap_paired(scenes, seed=3) for _ in range(2))
-    assert one == two and one.low > 0.8 and one.p == pytest.approx(2 / statistics.REPLICATES)
-    nothing = statistics.bootstrap_paired({"a": np.zeros(2)}, seed=0)
-    assert (nothing.low, nothing.high, nothing.p) == (0, 0, 1)
+    assert one == two and one[1] > 0.8
     for bad in ({"a": np.array([])}, {"a": np.array([1, np.inf])}):
         with pytest.raises(ValueError, match="differences"):
             statistics.bootstrap_paired(bad, seed=0)
-
-
-def test_holm_raises_the_smallest_most_and_keeps_the_order():
-    assert statistics.adjust_holm({"a": 0.01, "b": 0.04, "c": 0.03}) == pytest.approx({"a": 0.03, "c": 0.06, "b": 0.06})
-    assert statistics.adjust_holm({"a": 0.9, "b": 0.8}) == pytest.approx({"b": 1.0, "a": 1.0})
 
 
 def test_crops_of_one_cluster_count_as_one():
@@ -92,11 +83,3 @@ def test_where_all_agree_each_is_worth_one_answer_and_one_participant_has_no_int
     for chosen, asked in ([], []), ([1.0], [0.0]), ([3.0], [2.0]), ([-1.0], [2.0]):
         with pytest.raises(ValueError, match="shares need"):
             statistics.compute_clustered_share(np.array(chosen), np.array(asked))
-
-
-def test_the_plain_binomial_is_the_exact_one():
-    low, high, p = statistics.compute_binomial_test(8, 10)
-    assert p == pytest.approx(2 * (45 + 10 + 1) / 1024)
-    assert binomtest(8, 10, low, "greater").pvalue == pytest.approx(0.025)
-    assert binomtest(8, 10, high, "less").pvalue == pytest.approx(0.025)
-    assert statistics.compute_binomial_test(0, 10)[0] == 0 and statistics.compute_binomial_test(10, 10)[1] == 1

@@ -93,7 +93,7 @@ class Intervals:
 
 
 def calibrate_intervals(
-    u: Float[Array, "n"], error: Float[Array, "n"], rng: np.random.Generator, level: float = 0.9
+    u: Float[Array, "n"], error: Float[Array, "n"], rng: np.random.Generator, level: float = LEVEL
 ) -> Intervals:
     """Calibrate intervals on held-out samples: one random half fits the expected |error| at u, the other its spread.
 
@@ -134,36 +134,32 @@ def _check_finite(u: Float[Array, "n"], error: Float[Array, "n"]) -> tuple[Float
     return u.astype(np.float64), error.astype(np.float64)
 
 
-def evaluate_scores(
-    scores: dict[str, Float[Array, "n"]], error: Float[Array, "n"], seed: int, level: float = LEVEL
-) -> dict[str, Judgement]:
+def evaluate_scores(scores: dict[str, Float[Array, "n"]], error: Float[Array, "n"], seed: int) -> dict[str, Judgement]:
     """Of each score of n poses: `spearman`, `ause`, and `coverage` and mean `width` of split-conformal intervals.
 
     `ause_chance` is the AUSE of a score that says nothing. Intervals are calibrated on a random half of the poses and
     tried on the other, SPLITS times, by the same halves for every score. They are None where a half has too few poses
-    for the level (fewer than 34 at 0.9). All is None of fewer than LEAST_POSES, or where score or error is constant.
-    Raises: ValueError: a value that is not finite, a level outside (0, 1).
+    for LEVEL (fewer than 34). All is None of fewer than LEAST_POSES, or where score or error is constant.
+    Raises: ValueError: a value that is not finite.
     """
     found = {}
     for name, score in scores.items():
         found[name] = dict.fromkeys(("spearman", "ause", "ause_chance", "coverage", "width"))
         if len(error) >= LEAST_POSES and (rank := spearman(score, error)) is not None:
-            coverage, width = _intervals(score, error, seed, level)
+            coverage, width = _intervals(score, error, seed)
             areas = {"ause": ause(score, error), "ause_chance": ause(np.zeros(len(error)), error)}
             found[name] = {"spearman": rank, **areas, "coverage": coverage, "width": width}
     return found
 
 
-def _intervals(
-    score: Float[Array, "n"], error: Float[Array, "n"], seed: int, level: float
-) -> tuple[float | None, float | None]:
+def _intervals(score: Float[Array, "n"], error: Float[Array, "n"], seed: int) -> tuple[float | None, float | None]:
     """How many of the poses left out lie in their intervals, and how wide these are, in units of the error."""
     inside, width = [], []
     for split in range(SPLITS):
         rng = np.random.default_rng([seed, split])
         order = rng.permutation(len(error))
         one, other = order[: len(error) // 2], order[len(error) // 2 :]
-        low, high = calibrate_intervals(score[one], error[one], rng, level).bounds(score[other])
+        low, high = calibrate_intervals(score[one], error[one], rng).bounds(score[other])
         inside.append(((low <= error[other]) & (error[other] <= high)).mean())
         width.append((high - low).mean())
     if not np.isfinite(width).all():
@@ -224,17 +220,16 @@ def summarise(
     error: Float[Array, "n"],
     error_maps: Maps,
     seed: int,
-    level: float = LEVEL,
 ) -> dict:
     """The content of calibration.json, of the poses whose error is known. maps: of those scores that have one."""
     seen = np.flatnonzero(~np.isnan(error))
-    found = evaluate_scores({name: score[seen] for name, score in scores.items()}, error[seen], seed, level)
+    found = evaluate_scores({name: score[seen] for name, score in scores.items()}, error[seen], seed)
     pixels = evaluate_pixels(
         {name: [own[i] for i in seen] for name, own in maps.items()}, [error_maps[i] for i in seen]
     )
     return {
         "poses": len(seen),
         "error_mean": float(error[seen].mean()) if len(seen) else None,
-        "level": level,
+        "level": LEVEL,
         "scores": {name: found[name] | pixels.get(name, {}) for name in scores},
     }

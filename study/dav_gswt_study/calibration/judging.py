@@ -14,17 +14,13 @@ from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import image_files, metrics
 from dav_gswt.photos.training_views import WHOLE, TrainingView, read_training_views
 from dav_gswt.photos.view_split import ViewSplit
-from dav_gswt.prior.interface import Condition
-from dav_gswt.prior.terrain import TerrainPrior, pack_render
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground, read_ground
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.pose_maps import PoseMaps
-from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.scoring import PHOTO_WIDTH, build_conditions, ground_mask, scoring_camera
-from dav_gswt.views.terms import weighted_mean
-from dav_gswt.views.uncertainty import combine_terms, w2_sq
+from dav_gswt.views.scoring import PHOTO_WIDTH, ground_mask, scoring_camera
+from dav_gswt.views.uncertainty import combine_terms
 from dav_gswt_study.calibration import agreement
 
 
@@ -53,24 +49,16 @@ def calibrate_scores(
     scored: tuple[Scores, PoseMaps],
     lam: float,
     seed: int,
-    prior: PriorConfig | None = None,
 ) -> tuple[dict, list[dict]]:
     """Compare scores with true errors. Returns the content of calibration.json, and a row per candidate.
 
-    some, views: candidates and their true pictures. scored: scores and maps. lam: weight of LPIPS in u. prior: also for
-    the estimates of `control_maps`.
+    some, views: candidates and their true pictures. scored: scores and maps. lam: weight of LPIPS in u.
     """
     row = {name: i for i, name in enumerate(scored[0].names)}
     terms, shown = _select_terms(*scored, [row[pose.name] for pose, _ in some], lam)
     terms |= geometric_baselines(
         [pose for pose, _ in some], [pose_of_camera("", v.camera, judged.frame) for v in judged.taken]
     )
-    if prior is not None and some:
-        given = judged.field, judged.grid, some, judged.taken, judged.frame
-        condition, masks = build_conditions(*given, prior.model.size)
-        others = control_maps(prior, condition)
-        shown |= others
-        terms |= {name: weighted_mean(m, masks) for name, m in others.items()}
     corrected = judged.frame.kind == "photos"  # photos differ in exposure
     error, error_maps = measure_errors(judged.field, judged.grid, views, judged.size, corrected)
     table = [
@@ -156,16 +144,3 @@ def _render_at_size(field: GaussianField, camera: Camera, size: int) -> Float32[
     large = camera.resized(round(width * share), round(height * share))
     seen = np.clip(render(field, large).colour, 0, 1).astype(np.float32)
     return image_files.shrink_image(seen, width, height)
-
-
-def control_maps(prior: PriorConfig, condition: Condition) -> dict[str, Float32[Array, "n h w"]]:
-    """Other uncertainty estimates of the project's own prior, as controls: a map a view, in cells of the latents.
-
-    `spread`: how far samples from other noises lie apart, without dropout. `residual`: how far their mean lies from
-    what the field shows.
-    """
-    if not isinstance(prior.model, TerrainPrior):
-        return {}
-    render = prior.model.encode(pack_render(condition)).numpy()
-    drawn = prior.model.sample(condition, prior.samples, 0.0, prior.steps, prior.seed, common=False)
-    return {"spread": w2_sq(drawn)[1], "residual": ((drawn.mean(1) - render) ** 2).sum(1)}

@@ -5,9 +5,8 @@ Its figure has PSNR against photos, scene by scene, and below how far each polic
 
 from pathlib import Path
 
-import numpy as np
-
 from dav_gswt.images import figures
+from dav_gswt_study import plots
 from dav_gswt_study.comparison.tables import EVERY, EVERYTHING
 from dav_gswt_study.figures import OKABE_ITO
 from dav_gswt_study.markdown import format_number, format_table
@@ -117,39 +116,18 @@ def write_figure(path: Path | str, curves: list[dict], compared: list[dict], bas
         axes.set_title(f"{scene}, {k} a round", fontsize=10, loc="left")
     for empty in grid[len(panels) :]:
         empty.axis("off")
-    handles, labels = grid[0].get_legend_handles_labels()
-    top.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    shown = {label: line for axes in grid for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    top.legend(list(shown.values()), list(shown), loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     _draw_forest(bottom.subplots(), compared, baseline)
     figures.save_figure(figure, path)
 
 
 def _draw_curves(axes, rows: list[dict], k: int, looks: dict[str, dict]) -> None:
     for policy, look in looks.items():
-        mine = [row for row in rows if row["policy"] == policy and row["k"] == k]
-        photos = sorted({row["photos"] for row in mine})
-        means = [_mean([row for row in mine if row["photos"] == n]) for n in photos]
-        axes.plot(photos, means, label=policy, marker="o", markersize=3.5, **look)
-    everything = [row for row in rows if row["policy"] == EVERYTHING and row["round"] == 1]
-    if everything:
-        axes.axhline(_mean(everything), color="0.7", linewidth=1.2, linestyle=":")
-        photos = everything[0]["photos"]
-        axes.annotate(
-            f"all {photos} photos",
-            (0.03, _mean(everything)),
-            xycoords=("axes fraction", "data"),
-            xytext=(0, -10),  # under the line: above it is the frame
-            textcoords="offset points",
-            fontsize=8,
-        )
-    axes.set_xlabel("photos", fontsize=9)
+        plots.draw_curve(axes, [row for row in rows if row["policy"] == policy and row["k"] == k], policy, **look)
+    plots.draw_everything(axes, [row for row in rows if row["policy"] == EVERYTHING and row["round"] == 1])
+    plots.label_curves(axes)
     axes.xaxis.get_major_locator().set_params(integer=True)
-    axes.set_ylabel("PSNR of test views (dB)", fontsize=9)
-    axes.tick_params(labelsize=8)
-    axes.grid(alpha=0.3)
-
-
-def _mean(rows: list[dict]) -> float:
-    return float(np.mean([row["psnr"] for row in rows]))
 
 
 def _rank_policies(compared: list[dict]) -> list[dict]:
@@ -159,17 +137,9 @@ def _rank_policies(compared: list[dict]) -> list[dict]:
 def _draw_forest(axes, compared: list[dict], baseline: str) -> None:
     """A bar a policy, its 95 % interval over all scenes, and a dot a scene."""
     ranked = _rank_policies(compared)
-    for place, row in enumerate(ranked):
-        if row["low"] is not None:
-            axes.plot([row["low"], row["high"]], [place, place], color="0.25", linewidth=2)
-        axes.plot(row["mean"], place, "s", color="0.25", markersize=6)
-        alone = [r["mean"] for r in compared if r["policy"] == row["policy"] and r["scene"] != EVERY]
-        axes.plot(alone, [place] * len(alone), "o", color=OKABE_ITO[0], markersize=4, alpha=0.7)
-    axes.axvline(0, color="black", linewidth=1, linestyle=":")
-    axes.set_yticks(range(len(ranked)), [row["policy"] for row in ranked], fontsize=9)
-    axes.set_ylim(len(ranked) - 0.5, -0.5)
+    alone = [[r["mean"] for r in compared if r["policy"] == row["policy"] and r["scene"] != EVERY] for row in ranked]
+    names, found = [row["policy"] for row in ranked], [(row["mean"], row["low"], row["high"]) for row in ranked]
+    plots.draw_forest(axes, names, found, alone)
     axes.set_xlabel(
         f"nAUC less that of {baseline} (dB): mean and 95 % interval over scenes, dots are scenes", fontsize=9
     )
-    axes.tick_params(axis="x", labelsize=8)
-    axes.grid(axis="x", alpha=0.3)

@@ -1,18 +1,17 @@
 """From curves to results: a row a cell, and every policy less the baseline, paired, with intervals."""
 
-from dataclasses import asdict
-
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.sweeps import sum_or_none
 from dav_gswt_study.comparison.curves import CELL
-from dav_gswt_study.statistics import adjust_holm, bootstrap_paired
+from dav_gswt_study.statistics import bootstrap_paired
 
 EVERYTHING = "all"  # the policy that takes the whole pool: what there is to reach, and no curve
 EVERY = "every"  # scene, in the rows over all of them
 UNIT = ("scene", "preset", "seed", "k")
+TIE = 0.05  # dB: two fits of the same photos differ by less
 JUDGED = {"psnr": 1, "worst_psnr": 1, "walker_psnr": 1, "lpips": -1}  # measures of curves: 1 where more is better
 
 
@@ -40,8 +39,8 @@ def compare_to_baseline(table: list[dict], baseline: str) -> list[dict]:
     """Every policy less the baseline by the nAUC of each measure of JUDGED: over all scenes, and of each scene and k
     alone. A difference above 0 is better, of LPIPS too.
 
-    Cells are paired by scene, preset, seed, k and the photos that they end with. holm: p values over all scenes,
-    raised by how many policies were compared. One cell alone has neither interval nor p.
+    Cells are paired by scene, preset, seed, k and the photos that they end with. wins, ties (within TIE), losses: of
+    how many pairs. One cell alone has no interval.
     """
     units = [(*(row[key] for key in UNIT), row["photos"]) for row in table]
     rows = []
@@ -82,10 +81,7 @@ def _compare_cells(cells: dict[tuple, float], baseline: str) -> list[dict]:
             rows.append(
                 _comparison_row(policy, scene, k, {u: v for u, v in pairs.items() if (u[0], u[3]) == (scene, k)})
             )
-    raised = adjust_holm(
-        {" ".join(_policy_key(row)): row["p"] for row in rows if row["scene"] == EVERY and row["p"] is not None}
-    )
-    return [row | {"holm": raised.get(" ".join(_policy_key(row))) if row["scene"] == EVERY else None} for row in rows]
+    return rows
 
 
 def _area(photos: Float[Array, "t"], rounds: list[dict], measure: str) -> float | None:
@@ -111,11 +107,14 @@ def _comparison_row(policy: tuple[str, ...], scene: str, k: int | str, pairs: di
     by_scene: dict[str, list[float]] = {}
     for unit, value in pairs.items():
         by_scene.setdefault(unit[0], []).append(value)
-    found = asdict(bootstrap_paired({name: np.array(values) for name, values in by_scene.items()}))
-    if len(pairs) < 2:  # nothing tells how far another cell would be from this one
-        found |= dict.fromkeys(("low", "high", "p"))
+    mean, *ends = bootstrap_paired({name: np.array(values) for name, values in by_scene.items()})
+    low, high = ends if len(pairs) > 1 else (None, None)  # nothing tells how far another cell would be from this one
+    wins, losses = sum(value > TIE for value in pairs.values()), sum(value < -TIE for value in pairs.values())
     named = dict(zip(("policy", "prior", "p_drop", "lam"), policy, strict=True))
-    return named | {"scene": scene, "k": k, "units": len(pairs)} | found
+    found = {"units": len(pairs), "mean": mean, "low": low, "high": high}
+    return (
+        named | {"scene": scene, "k": k} | found | {"wins": wins, "ties": len(pairs) - wins - losses, "losses": losses}
+    )
 
 
 def _policy_key(row: dict) -> tuple[str, ...]:

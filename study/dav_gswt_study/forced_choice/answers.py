@@ -49,7 +49,7 @@ def read_answers(files: list[str], key: dict, schema: Path | str) -> AnswerSet:
     """All participants with a complete list who passed the attention checks.
 
     Two files of one participant are copies, or one is from earlier on: the longer counts. One who has more than
-    MOST_WRONG of the checks wrong is left out whatever else was chosen; where there is no check nobody is.
+    MAX_WRONG of the checks wrong is left out whatever else was chosen; where there is no check nobody is.
     Raises: InputError: as `read_answer_file`; too many files; two files of one participant that contradict each other.
     """
     if len(files) > MAX_FILES:

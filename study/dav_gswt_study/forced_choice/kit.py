@@ -48,7 +48,7 @@ def write_pairs(folder: Path | str, items: list[Item], origin: dict) -> None:
                 image_files.write_png(part / _picture_name(number, letter), half.picture)
             names = dict(zip("ab", (half.name for half in item.halves), strict=True))
             seen = {"view": item.view, "ground": item.ground, "cluster": item.cluster}
-            pairs.append(names | seen | {"over": list(item.over)})
+            pairs.append(names | seen)
         write_json(part / TABLE, {"pairs": pairs, "provenance": origin})
 
 
@@ -152,7 +152,7 @@ def write_kit(
     Raises: InputError: there is no pair.
     """
     if not any(not pair.check for pair in pairs):
-        raise InputError("perceptual_study: there is no pair to show; ask for `pairs` and `crops`")
+        raise InputError("forced_choice: there is no pair to show; ask for `pairs` and `crops`")
     answer_key = make_key(pairs, seed)
     with atomic_folder(page) as part:
         for path in sorted(parts.iterdir()):

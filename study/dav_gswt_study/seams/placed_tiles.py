@@ -9,7 +9,7 @@ from functools import cached_property
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Int64
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.build import BundleOptions, write_bundle
@@ -18,10 +18,10 @@ from dav_gswt.field import GaussianField
 from dav_gswt.lod.levels import Levels
 from dav_gswt.reconstruction import top_view
 from dav_gswt.terrain import endless
+from dav_gswt.terrain.choice import tiles_at
 from dav_gswt.tiles import build, compose, layout, semantics, texture
 from dav_gswt.tiles.layout import Exemplar, Layout
 from dav_gswt_study.seams.rendering import SpatialIndex
-from dav_gswt_study.seams.repetition import tiles_in
 
 WINDOW = 8  # tiles a side of the terrain that crops are taken from, around its origin
 REACH = 16  # radius of the terrain, in tile sides
@@ -132,6 +132,12 @@ def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau:
         origins,
         np.stack([_measure_correction(tiles, source, number) for number in range(len(tiles.labels))]),
     )
+
+
+def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants: int) -> Int64[Array, "h w"]:
+    """Tile numbers of a window of cells: row 0 holds cells (west, south), (west + 1, south), ..."""
+    height, width = shape
+    return tiles_at(*np.meshgrid(west + np.arange(width), south + np.arange(height)), salt, variants)
 
 
 def _corner_cells(cells: Int[Array, "w w"]) -> Int[Array, "4 v v"]:

@@ -10,38 +10,23 @@ from dav_gswt.geometry import cameras
 from dav_gswt.images import figures
 from dav_gswt.raster import render
 from dav_gswt.tiles.build import TileSet
-from dav_gswt_study.markdown import format_table, render_template
-from dav_gswt_study.seams.repetition import LAGS
+from dav_gswt_study import plots
+from dav_gswt_study.markdown import format_table
 from dav_gswt_study.seams.summary import EVERY, MEASURES
 
-SHOT_CAPTIONS = {  # by the names of rule render_grid
-    "grid_flat": "from above",
-    "grid_hilly": "the same on hills",
-    "walker_flat": "a walker",
-    "walker_hilly": "the same on hills",
-}
 DIGITS = {"seam_lpips": 4, "psnr": 2, "jump": 2}
 HEADS = {"seam_lpips": "Seam-LPIPS over the floor", "psnr": "PSNR (dB)", "jump": "jump"}
 TILES_SHOWN = 4  # tiles of the figure of cuts
 NAMES = {"seam_lpips": "Seam-LPIPS of cuts over their floor", "psnr": "PSNR of cuts (dB)", "jump": "jump across cuts"}
 
 
-def format_seam_page(
-    template: Path | str, tables: tuple[list[dict], ...], own: dict[str, str], pictures: dict[str, str]
-) -> str:
-    """The page of seams. tables: seam_summary, seam_ablation and repetition, as `summary.read_seam_table` reads them.
+def describe_seams(summary: list[dict], ablation: list[dict], own: dict[str, str]) -> dict[str, str]:
+    """Values of the page's template. summary, ablation: as `summary.read_seam_table` reads them.
 
-    own: the tiling of each scene. pictures: captions by path.
+    own: the tiling of each scene.
     """
-    summary, ablation, repetition = tables
-    values = {
-        "baseline": next((row["baseline"] for row in ablation), ""),
-        "scenes": _format_scenes(summary, own),
-        "variants": _format_variants(ablation),
-        "repetition": _format_repetition(repetition, own),
-        "pictures": pictures,
-    }
-    return render_template(template, values)
+    baseline = next((row["baseline"] for row in ablation), "")
+    return {"baseline": baseline, "scenes": _format_scenes(summary, own), "variants": _format_variants(ablation)}
 
 
 def _format_scenes(summary: list[dict], own: dict[str, str]) -> str:
@@ -68,23 +53,6 @@ def _format_variants(ablation: list[dict]) -> str:
     return format_table(["cut", "scene", *(HEADS[measure] for measure in MEASURES)], lines)
 
 
-def _format_repetition(repetition: list[dict], own: dict[str, str]) -> str:
-    lags = [(str(east), str(north)) for east, north in LAGS]
-    at = {(row["scene"], row["variant"], row["east"], row["north"]): row for row in repetition}
-    lines = []
-    for scene, variant in own.items():
-        rows = [at.get((scene, variant, *lag)) for lag in lags]
-        if any(rows):
-            lines.append([scene, *(_format_correlation(row) for row in rows)])
-    return format_table(["scene", *(f"{east}, {north}" for east, north in lags)], lines)
-
-
-def _format_correlation(row: dict | None) -> str:
-    if not row or not row["terrain"]:
-        return ""
-    return f"{float(row['terrain']):.3f}" + (f" ({float(row['exemplar']):.3f})" if row["exemplar"] else "")
-
-
 def format_interval(row: dict, name: str, digits: int) -> str:
     """A value and in brackets its interval; empty where it is not known."""
     if not row[name]:
@@ -98,20 +66,16 @@ def write_ablation(path: Path | str, rows: list[dict], baseline: str) -> None:
     variants = sorted({row["variant"] for row in rows})
     figure = figures.make_figure(11.0, 1.4 + 0.5 * max(len(variants), 1))
     for axes, measure in zip(figure.subplots(1, len(MEASURES)), MEASURES, strict=True):
-        for place, variant in enumerate(variants):
+        found, dots = [], []
+        for variant in variants:
             mine = [r for r in rows if (r["variant"], r["measure"]) == (variant, measure)]
             scenes = [r for r in mine if r["scene"] != EVERY]
-            for row in [r for r in mine if r["scene"] == EVERY] or scenes[:1]:
-                axes.plot([row["difference_low"], row["difference_high"]], [place, place], color="0.25", linewidth=2)
-                axes.plot(row["difference"], place, "s", color="0.25", markersize=6)
-            dots = [r["difference"] for r in scenes]
-            axes.plot(dots, [place] * len(dots), "o", color="#0072b2", markersize=4, alpha=0.7)
-        axes.axvline(0, color="black", linewidth=1, linestyle=":")
-        axes.set_yticks(range(len(variants)), variants if axes.get_subplotspec().is_first_col() else [], fontsize=9)
-        axes.set_ylim(len(variants) - 0.5, -0.5)
+            shown = [r for r in mine if r["scene"] == EVERY] or scenes or [{}]  # without LPIPS there are none
+            found.append(tuple(shown[0].get(key) for key in ("difference", "difference_low", "difference_high")))
+            dots.append([r["difference"] for r in scenes])
+        plots.draw_forest(axes, variants, found, dots)
+        axes.tick_params(labelleft=axes.get_subplotspec().is_first_col())
         axes.set_xlabel(f"{NAMES[measure]}, less that of {baseline}", fontsize=8)
-        axes.tick_params(axis="x", labelsize=7)
-        axes.grid(axis="x", alpha=0.3)
     figures.save_figure(figure, path)
 
 

@@ -20,8 +20,7 @@ MEASURES = ("seam_lpips", "psnr", "jump")
 KEYS = (
     (*CELL, "view", "ground"),
     ("variant", "baseline", "measure", "scene", "seed"),
-    (*CELL, "east", "north"),
-)  # keys of the tables seam_summary, seam_ablation and repetition
+)  # keys of the tables seam_summary and seam_ablation
 NUMBERS = ("seam_lpips", "psnr", "jump")
 
 
@@ -47,11 +46,6 @@ def read_seam_table(path: Path | str) -> list[dict]:
     """Read a table of seams, measures as numbers; no rows where there is no file yet."""
     rows = csv_tables.read_table(path, numbers=NUMBERS, missing_ok=True)
     return [row | {key: int(row[key]) for key in ("seed", "crop") if row.get(key, "").isdigit()} for row in rows]
-
-
-def tabulate_repetition(cell: dict) -> list[dict]:
-    """The rows of an experiment's autocorrelation."""
-    return [{key: cell[key] for key in CELL} | row for row in read_seam_table(cell["repeats"])]
 
 
 def summarise_crops(rows: list[dict]) -> list[dict]:

@@ -1,4 +1,4 @@
-"""Checks of the terrain: weights of levels, cross-fades, tiles on a sphere, places in exported files."""
+"""Checks of the terrain: weights of levels, cross-fades, places in exported files."""
 
 import math
 from fractions import Fraction
@@ -7,14 +7,13 @@ import numpy as np
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
-from dav_gswt.terrain import draw_order, heights, sphere
+from dav_gswt.terrain import draw_order, heights
 from dav_gswt.terrain.heights import FlatSurface
 from dav_gswt_study.stability.formula import FLOAT32, FLOAT32_EPS, Case, Check
 
 BANDS = (0.0, 1e-12, 1e-3, 1.0, 1e6)
 SWITCHES = (2.0**-10, 1.0, 1024.0, 2.0**20)
 EYE = np.concatenate([[0.0], 10.0 ** np.linspace(-12, 12, 97)])
-RADII = (1.0, 4.0, 40.0, 1e3, 1e5, 1e7)  # of spheres, in tile sides
 SIDE = 0.7  # of a tile whose positions are exported, in units
 
 
@@ -77,44 +76,6 @@ def _composite_twice(fade, a: Array, w: Array) -> Array:
 def _equal_splat_cases() -> list[Case]:
     w = np.linspace(0, 1, 33).astype(np.float32)
     return [Case(f"alpha {a:g}, w = ", (np.full(33, a, np.float32), w), w) for a in (1e-6, 0.1, 0.9, 0.99, 0.999)]
-
-
-def _sphere_cases() -> list[Case]:
-    rng, cases = np.random.default_rng(0), []
-    rim = np.array([[x, y, 0] for x in (-0.5, 0, 0.5) for y in (-0.5, 0, 0.5)])
-    local = np.concatenate([rim, rng.uniform(-0.5, 0.5, (20, 3)) * [1, 1, 0.2]])
-    for radius in RADII:
-        cells = heights.make_sphere(radius, 1.0).cells
-        for i, j in ((0, 0), (cells // 2, 0), (cells // 2, cells // 2), (cells - 1, cells // 3)):
-            cases.append(Case(f"radius {radius:g}, cell ({i}, {j})", (radius, i, j, local)))
-    return cases
-
-
-def _bend(radius: float, i: int, j: int, local: Array) -> Array:
-    """Points of a tile on a sphere, from the tile's middle, in float32."""
-    ball = heights.make_sphere(radius, 1.0)
-    tangents = ball.tangents(np.array(i + 0.5), np.array(j + 0.5)).astype(np.float32)
-    return sphere.bend(local.astype(np.float32), tangents, ball.radius, ball.rate)[0]
-
-
-def _place_exactly(radius: float, i: int, j: int, local: Array) -> Array:
-    """The same points from the planet's middle, in 80 bits; the last one is the tile's middle."""
-    ball, real = heights.make_sphere(radius, 1.0), np.longdouble
-    points = np.concatenate([local, np.zeros((1, 3))]).astype(real)
-    angles = ((points[:, :2] + np.array([i, j], real) + real(0.5)) / ball.cells - real(0.5)) * 2 * np.arctan(real(1))
-    ray = np.concatenate([np.tan(angles), np.ones_like(points[:, :1])], 1)
-    return ray / np.sqrt((ray * ray).sum(1, keepdims=True)) * (real(radius) + points[:, 2:])
-
-
-def _bend_reference(radius: float, i: int, j: int, local: Array) -> Array:
-    points = _place_exactly(radius, i, j, local)
-    return (points[:-1] - points[-1]).astype(float)
-
-
-def _bend_naive(radius: float, i: int, j: int, local: Array) -> Array:
-    """By positions from the planet's middle in float32."""
-    points = _place_exactly(radius, i, j, local).astype(np.float32)
-    return points[:-1] - points[-1]
 
 
 def _export_cases() -> list[Case]:
@@ -188,14 +149,6 @@ CHECKS = [
         relative=FLOAT32,
         absolute=1e-6,
         printed=lambda a, w: _composite_twice(lambda x, y: x * y, a, w),
-    ),
-    Check(
-        "a place in a tile on a sphere",
-        _sphere_cases,
-        _bend,
-        _bend_reference,
-        absolute=5e-7,
-        printed=_bend_naive,
     ),
     Check(
         "a place in an exported file",

@@ -20,7 +20,6 @@ from dav_gswt.geometry import cameras
 from dav_gswt.raster import render
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.finite import Area, list_grid, place_block
-from dav_gswt_study.seams.repetition import autocorrelate
 
 TILES = 20  # a side of the picture
 PIXELS = 32  # a side of a tile
@@ -88,6 +87,21 @@ def measure_lattice(picture: Float[Array, "h w 3"], pixels: int = PIXELS) -> Lat
     found = measure_excess(autocorrelate(marks[..., None].astype(float)), pixels) if marks.any() else 0.0
     busyness, mean_tile = explain_variance(local, pixels)
     return LatticeMeasures(measure_excess(r, pixels), found, busyness, mean_tile, following)
+
+
+def autocorrelate(picture: Float[Array, "h w c"]) -> Float[Array, "h1 w1"]:
+    """Autocorrelation at all lags up to the picture's size, lag 0 in the middle; 0 for a picture of one colour.
+
+    r(d) = mean over x of (f(x) - m)(f(x + d) - m) / variance, summed over colour channels, where x and x + d are both
+    in the picture: 1 at d = 0.
+    """
+    f = picture - picture.mean((0, 1))
+    shape = [2 * n for n in f.shape[:2]]
+    power = (np.abs(np.fft.rfft2(f, shape, (0, 1))) ** 2).sum(-1)
+    total = np.fft.fftshift(np.fft.irfft2(power, shape))
+    (h, w), variance = f.shape[:2], float((f**2).sum(-1).mean())
+    pairs = np.outer(h - np.abs(np.arange(-h, h)), w - np.abs(np.arange(-w, w)))
+    return total / np.maximum(pairs, 1) / variance if variance > 1e-12 else np.zeros_like(total)
 
 
 def measure_excess(r: Float[Array, "h w"], pixels: int) -> float:

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.images import figures
-from dav_gswt_study.seams.repetition import tiles_in
+from dav_gswt_study.seams.placed_tiles import tiles_in
 
 MARGIN = 4  # cells shown beyond the walk, on all sides
 BEND = 3.0  # tiles between bends of the walk

@@ -22,11 +22,6 @@ def test_a_score_that_knows_the_errors_and_one_that_knows_nothing():
         # the mean over splits is 0.9 or, by the rank, up to 1 / 76 more; 200 splits scatter by 0.003
         assert one["coverage"] == pytest.approx(0.907, abs=0.02)
     assert found["oracle"]["width"] < 0.5 * found["nothing"]["width"]
-    # a judgement depends on its seed alone
-    scores, error = {"a": rng.normal(size=60)}, rng.exponential(1, 60)
-    one, same, other = (measures.evaluate_scores(scores, error, seed)["a"] for seed in (0, 0, 1))
-    assert one == same and one["width"] != other["width"] and one["spearman"] == other["spearman"]
-    assert measures.evaluate_scores(scores, error, 0, level=0.5)["a"]["width"] < one["width"]
 
 
 def test_nothing_is_said_of_too_few_poses_or_a_constant_and_what_is_not_a_number_is_refused():

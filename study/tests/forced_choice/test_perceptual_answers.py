@@ -99,8 +99,8 @@ def test_scripted_answers_give_the_shares_that_they_were_scripted_with(gather, k
     rules += [lambda item: item["check"] or item["scene"] == "desert"]
     people = gather(*(answer_files.answers(key, n, rule) for n, rule in enumerate(rules)))
     table = results.tabulate_choices(key, people.participants)
-    assert len(table) == 2 * 2 * 3  # observers, comparisons, every scene and each
-    at = {(row["second"], row["scene"]): row for row in table if row["observer"] == results.PEOPLE}
+    assert len(table) == 2 * 3  # comparisons, every scene and each
+    at = {(row["second"], row["scene"]): row for row in table}
     every = at["colour", "every"]
     assert (every["participants"], every["answers"]) == (4, 32)
     assert every["share"] == pytest.approx((1 + 1 + 0 + 0.5) / 4) and every["median_ms"] == 1200
@@ -108,15 +108,6 @@ def test_scripted_answers_give_the_shares_that_they_were_scripted_with(gather, k
     assert at["colour", "desert"]["share"] == pytest.approx(3 / 4)
 
 
-def test_without_answers_there_is_the_model_observer_alone_whose_ties_count_as_half(gather, key):
-    table = results.tabulate_choices(key, gather().participants)
-    assert {row["observer"] for row in table} == {"model observer (LPIPS)"}
-    assert all(row["participants"] == 0 and row["p"] is None for row in table)
-    share = {row["second"]: row["share"] for row in table if row["scene"] == "every"}
-    expected = [item["over"][0] < item["over"][1] for item in key["items"].values() if item["b"] == "colour"]
-    assert share == {"colour": sum(expected) / 8, "floor": 0} and 0 < sum(expected) < 8
-    items = {name: item | {"over": [0.1, 0.1]} for name, item in key["items"].items() if not item["check"]}
-    assert results._tabulate_model(items)["share"] == 0.5
-    items = {name: item | {"over": [None, None]} for name, item in key["items"].items()}
-    with pytest.raises(InputError, match="neither answers .* make the kit again"):
-        results.tabulate_choices(key | {"items": items}, [])
+def test_without_answers_one_message_says_where_they_belong(gather, key):
+    with pytest.raises(InputError, match="no answers that count; `answers`"):
+        results.tabulate_choices(key, gather().participants)

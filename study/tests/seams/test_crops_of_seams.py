@@ -104,19 +104,14 @@ def test_ceilings_lie_in_the_tile_of_their_cuts(placed, straight, rng):
         measure._sample_cuts(bare, placed.terrain, (straight, straight.terrain), TOP, rng)
 
 
-def test_the_same_crops_are_drawn_by_any_number_of_threads(placed, straight, monkeypatch):
+def test_crops_have_numbers_of_their_own_and_without_weights_no_seam_lpips(placed, straight, monkeypatch):
     monkeypatch.setattr(measure, "BORDERS", 2)
     monkeypatch.setattr(measure, "CUTS", 2)
     monkeypatch.setattr(crops, "VIEWS", [TOP])
-    found = []
-    for threads in ("1", "2"):
-        monkeypatch.setenv("DAV_GSWT_THREADS", threads)
-        found.append(measure.measure_crops(placed, straight, None, 0))
-    assert found[0] == found[1]
-    assert [row["seam_lpips"] for row in found[0]] == [None] * len(found[0])  # no weights: absent, never made up
-    numbers = {name: {r["crop"] for r in found[0] if r["place"] == name} for name in ("border", "cut", "ceiling")}
-    assert numbers == {"border": {0, 1}, "cut": {2, 3}, "ceiling": {4, 5}}
-    assert {row["crop"] for row in found[0] if row["place"] == "floor"} == set(range(6))
+    found = measure.measure_crops(placed, straight, None, 0)
+    assert [row["seam_lpips"] for row in found] == [None] * len(found)  # absent, never made up
+    numbers = {name: {r["crop"] for r in found if r["place"] == name} for name in ("border", "cut", "ceiling", "floor")}
+    assert numbers == {"border": {0, 1}, "cut": {2, 3}, "ceiling": {4, 5}, "floor": set(range(6))}
 
 
 def test_the_few_gaussians_of_the_exemplar_that_may_show_are_found_among_all(source, rng):

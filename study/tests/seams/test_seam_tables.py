@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dav_gswt_study import experiments
-from dav_gswt_study.seams import repetition, summary
+from dav_gswt_study.seams import summary
 
 ABOUT = {"scene": "desert", "seed": 0, "preset": "draft", "version": "1", "weights": "", "tiles": ""}
 ABOUT |= {"view": "top", "ground": "flat"}
@@ -36,26 +36,6 @@ def test_a_variant_is_compared_with_the_baseline_in_the_same_clusters():
     row = next(r for r in found if r["measure"] == "seam_lpips")
     assert row["variant"] == "none" and row["difference"] == pytest.approx(0.02, abs=1e-3)
     assert row["difference_low"] > 0.018
-
-
-def test_autocorrelation_is_that_of_the_slow_sum():
-    picture = np.random.default_rng(0).random((6, 5, 3))
-    found = repetition.autocorrelate(picture)
-    f = picture - picture.mean((0, 1))
-    for dy, dx in ((0, 0), (1, 2), (3, 0)):
-        slow = (f[: 6 - dy, : 5 - dx] * f[dy:, dx:]).sum(-1).mean() / (f**2).sum(-1).mean()
-        assert found[6 + dy, 5 + dx] == pytest.approx(slow) == pytest.approx(found[6 - dy, 5 - dx])
-    assert not repetition.autocorrelate(np.full((4, 4, 3), 0.5)).any()
-
-
-def test_a_picture_that_repeats_stands_out_at_its_period_and_noise_does_not():
-    rng = np.random.default_rng(1)
-    tile = rng.random((32, 32, 3))
-    for picture, repeats in ((np.tile(tile, (6, 6, 1)), True), (rng.random((192, 192, 3)), False)):
-        r = repetition.autocorrelate(picture)
-        found = repetition.tabulate_repetition(repetition.Autocorrelations(r, r, 32))
-        assert all((row["terrain"] > 2 * row["around"]) == repeats for row in found)
-        assert found[0]["terrain"] == pytest.approx(1 if repeats else 0, abs=0.05)
 
 
 TILINGS = {"semantic": {"tile": 0.5, "strip": 0.06, "candidates": 9, "variants": 1}, "small": {"tile": 0.3}}

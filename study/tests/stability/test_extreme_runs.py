@@ -26,13 +26,6 @@ def test_what_is_laid_over_the_config_is_what_the_config_allows_or_says(root):
             assert extreme.error_pattern and running.has_failed_as_expected(extreme, said), extreme.name
 
 
-def test_worlds_differ_in_size_alone():
-    small, large = make_ground_field(12, 1e-2), make_ground_field(12, 1e7)
-    np.testing.assert_allclose(large.means, 1e9 * small.means.astype(float), rtol=1e-6)
-    np.testing.assert_allclose(large.log_scales - small.log_scales, np.log(1e9), rtol=1e-6)
-    np.testing.assert_array_equal(large.sh, small.sh)
-
-
 def test_a_run_ends_well_only_without_any_fault_and_fails_well_only_with_its_own_message():
     assert running.has_finished(EXTREMES["tau-0"], WELL)
     faults = dict(exit_code=1, traceback=True, not_finite=2, blank_stills=1, stills_psnr=20.0)

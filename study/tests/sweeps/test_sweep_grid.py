@@ -11,9 +11,6 @@ def test_every_combination_comes_once_and_says_what_was_varied():
     found = grid.list_combinations({"k": [2, 4], "tau": [0.3, 0.6]}, {"policy": "farthest"})
     assert [(f["k"], f["tau"]) for f in found] == [(2, 0.3), (2, 0.6), (4, 0.3), (4, 0.6)]
     assert all(f["policy"] == "farthest" and f["shown"] == {"k": f["k"], "tau": f["tau"]} for f in found)
-    own = [{"policy": "w2", "prior": "terrain-m2", "p_drop": 0}]  # settings of the policy's own
-    (found,) = grid.list_combinations({"policy": own}, {"p_drop": 0.3})
-    assert found == own[0] | {"shown": {"policy": "w2"}}
 
 
 def test_rounds_are_those_asked_for_or_as_many_as_photos_have_room_for():

@@ -56,6 +56,16 @@ def test_errors_are_those_of_the_tile_and_of_what_is_near_its_cut():
     assert worst[0] == 5 and errors[5, "oblique"]["cut_db"] < errors[5, "oblique"]["db"] - 1
 
 
+def test_autocorrelation_is_that_of_the_slow_sum():
+    picture = np.random.default_rng(0).random((6, 5, 3))
+    found = lattice.autocorrelate(picture)
+    f = picture - picture.mean((0, 1))
+    for dy, dx in ((0, 0), (1, 2), (3, 0)):
+        slow = (f[: 6 - dy, : 5 - dx] * f[dy:, dx:]).sum(-1).mean() / (f**2).sum(-1).mean()
+        assert found[6 + dy, 5 + dx] == pytest.approx(slow) == pytest.approx(found[6 - dy, 5 - dx])
+    assert not lattice.autocorrelate(np.full((4, 4, 3), 0.5)).any()
+
+
 PIXELS, TILES = 32, 12
 
 

@@ -48,7 +48,7 @@ EXPERIMENTS = {  # target: settings of the study, jobs
                 "compared_replicates": 1,
             }
         },
-        dict(make_levels=1, cut_tiles=2, measure_seams=2, render_grid=1, plot_cuts=1, gather_seams=1),
+        dict(make_levels=1, cut_tiles=2, measure_seams=2, plot_cuts=1, gather_seams=1),
     ),
     "perceptual_kit": (  # tiles that are in two pairs are cut once; `floor` cuts nothing
         {"forced_choice": {"scenes": ["desert"], "pairs": [["semantic", "colour"], ["semantic", "floor"]]}},

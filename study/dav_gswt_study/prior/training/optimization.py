@@ -10,11 +10,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import pandas as pd
 import torch
 from diffusers.models.autoencoders.vae import DiagonalGaussianDistribution
 from jaxtyping import Float, UInt8
-from safetensors.torch import load_file, save_file
+from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from dav_gswt.files import atomic_file
@@ -22,6 +21,7 @@ from dav_gswt.logs import progress
 from dav_gswt.prior import dropout, weights
 from dav_gswt.prior.networks import LATENT, TIMES, Network, make_schedule
 from dav_gswt.prior.terrain import average_opacity, pack_photo, pack_render, pack_truth
+from dav_gswt_study import csv_tables
 from dav_gswt_study.prior.training import example_files
 from dav_gswt_study.prior.training.example_files import Examples
 
@@ -192,32 +192,21 @@ def _rate_factor(step: int, steps: int) -> float:
 def _save_checkpoint(
     part: nn.Module, adam: torch.optim.Optimizer, mean: dict[str, Tensor], losses: list[float], path: Path
 ) -> None:
-    values = {f"part.{name}": v.detach() for name, v in part.named_parameters()}
-    values |= {f"mean.{name}": v for name, v in mean.items()}
-    for i, state in adam.state_dict()["state"].items():
-        values |= {f"adam.{i}.{name}": v for name, v in state.items()}
-    values["losses"] = torch.tensor(losses)
+    state = {"part": part.state_dict(), "mean": mean, "adam": adam.state_dict(), "losses": losses}
     with atomic_file(path) as temporary:
-        save_file({name: v.contiguous() for name, v in values.items()}, str(temporary))
+        torch.save(state, temporary)
 
 
 def _load_checkpoint(part: nn.Module, adam: torch.optim.Optimizer, mean: dict[str, Tensor], path: Path) -> list[float]:
     """Restore a checkpoint, if there is one, in place; returns the losses of the steps that are done."""
     if not path.exists():
         return []
-    values = load_file(str(path))
-    part.load_state_dict({name: values[f"part.{name}"] for name, _ in part.named_parameters()}, strict=False)
-    for name in mean:
-        mean[name].copy_(values[f"mean.{name}"])
-    state: dict[int, dict[str, Tensor]] = {}
-    for name, value in values.items():
-        if name.startswith("adam."):
-            _, i, key = name.split(".")
-            state.setdefault(int(i), {})[key] = value
-    adam.load_state_dict({"state": state, "param_groups": adam.state_dict()["param_groups"]})
-    losses = values["losses"].tolist()
-    _log.info("training resumes at step %d", len(losses))
-    return losses
+    state = torch.load(path, weights_only=True)
+    part.load_state_dict(state["part"])
+    adam.load_state_dict(state["adam"])
+    mean.update(state["mean"])
+    _log.info("training resumes at step %d", len(state["losses"]))
+    return state["losses"]
 
 
 def train_prior(
@@ -262,12 +251,12 @@ def save_weights(network: Network, path: Path | str, facts: dict[str, str], dtyp
 
 def write_losses(path: Path | str, losses: dict[str, list[float]]) -> None:
     """Write the loss of every step as CSV: what was trained, step, loss."""
-    tables = [
-        pd.DataFrame({"trained": name, "step": range(1, len(values) + 1), "loss": values})
+    rows = [
+        {"trained": name, "step": step, "loss": value}
         for name, values in losses.items()
+        for step, value in enumerate(values, 1)
     ]
-    with atomic_file(path) as part:
-        pd.concat(tables).to_csv(part, index=False, float_format="%.5g", lineterminator="\n")
+    csv_tables.write_table(path, rows)
 
 
 def load_pictures(files: Sequence[Path | str]) -> Pictures:

@@ -83,12 +83,3 @@ def test_examples_become_weights_and_an_interrupted_training_resumes(tmp_path, m
     for (name, a), b in zip(one.network.state_dict().items(), two.network.state_dict().values(), strict=True):
         np.testing.assert_array_equal(a.numpy(), b.numpy(), name)
     assert weights.load_weights(network(), tmp_path / "whole.safetensors") == {"examples": "12"}
-
-
-def test_pictures_are_stored_as_bytes_and_near_depths_are_clipped(tmp_path):
-    pictures = optimization.load_pictures([part(tmp_path / "0.npz", 0)])
-    made = example_files.read_examples(tmp_path / "0.npz")
-    assert pictures.truth.shape == (6, 5, SIZE, SIZE)
-    expected = np.clip(0.5 * made.condition.inverse_depth, 0, 1)
-    np.testing.assert_allclose(pictures.render[:, 4].numpy() / 255, expected, atol=0.5 / 255 + 1e-6)
-    assert (pictures.photo[:, 3] == 255).all() and (pictures.photo[:, 4] == 0).all()
