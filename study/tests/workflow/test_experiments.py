@@ -14,7 +14,7 @@ from dav_gswt.files import read_json
 from dav_gswt.images import image_files
 from dav_gswt_study.tables import spread
 
-CONFIGS = (USUAL, TINY)
+CONFIGS = (USUAL, TINY, "study/tests/config.yaml")
 CELL = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k2"
 
 
