@@ -27,12 +27,10 @@ from record import report_figures
 
 from dav_gswt.bundle import store
 from dav_gswt.field import concatenate_fields, write_field
-from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.raster import render
 from dav_gswt.terrain import endless, stills, visibility
 from dav_gswt.terrain.backdrop import Backdrop
-from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.page import write_page
 from dav_gswt.terrain.placement import group_by_cell, place_cell
 from dav_gswt_study.terrain.frames import VISIT
@@ -53,7 +51,6 @@ FIELD = 60.0  # degrees across
 BUDGETS = (50_000, 100_000, 200_000, 400_000) if GPU else (400_000,)
 SHOT = stills.Shot("walker", (0.5, 0.5), 1.0, 12.0, 60.0)
 ROUNDS, FRAMES, WARM_UP = 3, 9, 4
-MIN_FACTOR, BISECTIONS = 1e-5, 16  # of the search for a factor on level distances
 TURNS = [0.002 * (-1) ** k for k in range(FRAMES)]  # degrees: the same Gaussians stay in view
 OTHERS = ("spark", "playcanvas")
 PEER = """async ({ name, fov, width, height, ahead }) => {
@@ -114,7 +111,7 @@ def compare(bundle: store.Bundle, folder: Path, budget: int, names: tuple[str, .
 
     terrain, floor = endless.terrain_from_bundle(bundle, {"kind": "flat"}), bundle.manifest.eye_floor
     camera = stills.shot_camera(SHOT, terrain, floor, WIDTH, HEIGHT)
-    field = collect_view(coarsen_to_budget(terrain, camera, budget), camera, bundle.manifest)
+    field = collect_view(visibility.coarsen_to_budget(terrain, camera, budget), camera, bundle.manifest)
     still = np.clip(render(field, replace(camera, translation=np.zeros(3))).colour, 0, 1)
     x, y = (v * terrain.side for v in SHOT.at)
     place = {"x": x, "y": y, "eye": SHOT.height * floor, "yaw": SHOT.yaw, "pitch": -SHOT.pitch}
@@ -195,28 +192,6 @@ def read_picture(browser, address: str, name: str, place: dict) -> dict:
     seen = tab.evaluate(READ_PEER, {"ahead": look(place["yaw"], place["pitch"])})
     tab.close()
     return seen
-
-
-def coarsen_to_budget(terrain: EndlessTerrain, camera: Camera, budget: int) -> EndlessTerrain:
-    """Multiply all level distances by one factor, the largest with which a picture has at most `budget` Gaussians.
-
-    The viewer does the same and also moves the end of the ground nearer. Where the coarsest level alone exceeds the
-    budget, that level is used.
-    """
-    cells, low, high = visibility.visible_cells(terrain, camera), MIN_FACTOR, 1.0
-
-    def scale_distances(factor: float) -> EndlessTerrain:
-        return replace(
-            terrain, switches=[factor * s for s in terrain.switches], bands=[factor * b for b in terrain.bands]
-        )
-
-    if visibility.count_gaussians(terrain, cells).sum() <= budget:
-        return terrain
-    for _ in range(BISECTIONS):
-        middle = float(np.sqrt(low * high))
-        fits = visibility.count_gaussians(scale_distances(middle), cells).sum() <= budget
-        low, high = (middle, high) if fits else (low, middle)
-    return scale_distances(low)
 
 
 def collect_view(terrain: endless.EndlessTerrain, camera, manifest):

@@ -53,6 +53,17 @@ def test_too_many_gaussians_go_farthest_first(terrain):
     assert (np.diff(np.abs(few.i) + np.abs(few.j)) <= 0).all(), "and the order stays"
 
 
+def test_levels_come_nearer_until_a_picture_fits_its_budget(terrain):
+    camera = walking(terrain)
+    cells = visibility.visible_cells(terrain, camera)
+    whole = visibility.count_gaussians(terrain, cells).sum()
+    assert visibility.coarsen_to_budget(terrain, camera, whole) is terrain
+    coarser = visibility.coarsen_to_budget(terrain, camera, int(0.9 * whole))
+    count, factor = visibility.count_gaussians(coarser, cells).sum(), coarser.switches[0] / terrain.switches[0]
+    assert 0.8 * whole < count <= 0.9 * whole and 0 < factor < 1
+    np.testing.assert_allclose(coarser.bands, np.multiply(terrain.bands, factor))
+
+
 @pytest.mark.parametrize("shown, height, step", [("hilly", 3.0, 37), ("stony", 0.7, 5)])
 def test_distances_bound_those_of_the_gaussians(request, shown, height, step):
     """On hills, and of stones that stand on level ground."""

@@ -96,7 +96,7 @@ def render_view(
     """Render the terrain; pixels that no tile covers show the sky above the horizon and the far ground below it.
 
     Tiles are drawn back to front, each in a pre-sorted order; the 3 x 3 block about the eye is drawn last and sorted by
-    depth. Of cells with more than MAX_GAUSSIANS the farthest are left out.
+    depth.
 
     Args:   exact: sort all Gaussians together by depth, as a reference.
     Raises: ValueError: an orthographic camera, whose rays have no common origin.
@@ -106,7 +106,9 @@ def render_view(
     eye, here, surface = camera.centre, replace(camera, translation=np.zeros(3)), terrain.heights
     sphere = surface if isinstance(surface, Sphere) else None
     cells = visible_on_sphere(terrain, sphere, camera) if sphere else visibility.visible_cells(terrain, camera)
-    cells = visibility.drop_far_cells(terrain, cells, MAX_GAUSSIANS)
+    if visibility.count_gaussians(terrain, cells).sum() > MAX_GAUSSIANS:  # coarser levels first, then fewer cells
+        terrain = visibility.coarsen_to_budget(terrain, camera, MAX_GAUSSIANS, cells)
+        cells = visibility.drop_far_cells(terrain, cells, MAX_GAUSSIANS)
     things = group_by_cell(terrain, cells, eye)
     backdrop = Backdrop.for_eye(terrain, eye, sky, ground_colour)
 

@@ -1,6 +1,6 @@
 """Visible cells: which cells of the endless terrain a camera may see, at which levels, within a budget of Gaussians."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -13,6 +13,7 @@ from dav_gswt.terrain.choice import Floats, Ints, Vector, tiles_at
 from dav_gswt.terrain.endless import EndlessTerrain
 
 PAD = 2.0  # pixels, rounded up, by which the rasterizer's dilation of splats reaches into the picture
+MIN_FACTOR, BISECTIONS = 1e-5, 16  # of the search for a factor on level distances
 
 Points = Float[Array, "n 3"]
 
@@ -135,3 +136,27 @@ def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int) -> Gr
     nearest_first = np.argsort(cells.nearest, kind="stable")
     count = np.cumsum(count_gaussians(terrain, cells)[nearest_first])
     return cells[np.sort(nearest_first[count <= budget])]
+
+
+def coarsen_to_budget(
+    terrain: EndlessTerrain, camera: Camera, budget: int, cells: GridCells | None = None
+) -> EndlessTerrain:
+    """Multiply all level distances by one factor, the largest with which a picture has at most `budget` Gaussians.
+
+    The viewer does the same and also moves the end of the ground nearer. Where the coarsest level alone exceeds the
+    budget, that level is used. cells: those that the camera sees, if they are known.
+    """
+    cells, low, high = visible_cells(terrain, camera) if cells is None else cells, MIN_FACTOR, 1.0
+
+    def scale_distances(factor: float) -> EndlessTerrain:
+        return replace(
+            terrain, switches=[factor * s for s in terrain.switches], bands=[factor * b for b in terrain.bands]
+        )
+
+    if count_gaussians(terrain, cells).sum() <= budget:
+        return terrain
+    for _ in range(BISECTIONS):
+        middle = float(np.sqrt(low * high))
+        fits = count_gaussians(scale_distances(middle), cells).sum() <= budget
+        low, high = (middle, high) if fits else (low, middle)
+    return scale_distances(low)
