@@ -56,7 +56,7 @@ def test_too_many_gaussians_go_farthest_first(terrain):
 def test_levels_come_nearer_until_a_picture_fits_its_budget(terrain):
     camera = walking(terrain)
     cells = visibility.visible_cells(terrain, camera)
-    whole = visibility.count_gaussians(terrain, cells).sum()
+    whole = int(visibility.count_gaussians(terrain, cells).sum())
     assert visibility.coarsen_to_budget(terrain, camera, whole) is terrain
     coarser = visibility.coarsen_to_budget(terrain, camera, int(0.9 * whole))
     count, factor = visibility.count_gaussians(coarser, cells).sum(), coarser.switches[0] / terrain.switches[0]
