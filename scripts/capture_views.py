@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from dav_gswt.capture.capturing import Site, capture_views
+from dav_gswt.capture.capturing import capture_views
+from dav_gswt.capture.site import Site
 from dav_gswt.capture.store import PhotoStore
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to

@@ -6,7 +6,7 @@ import pytest
 from fixtures import ground as made
 
 from dav_gswt.capture import drop_folder, handheld
-from dav_gswt.capture.capturing import Site
+from dav_gswt.capture.site import Site
 from dav_gswt.capture.store import PhotoStore
 from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
