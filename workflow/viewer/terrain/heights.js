@@ -46,7 +46,8 @@ export function createHeights(entry = { kind: "flat" }, pixels = null) {
     if (!pixels) throw new TypeError("a height map needs its pixels");
     return createHeightMap(entry, pixels);
   }
-  return { kind: "flat", low: 0, high: 0, steepest: 0, at: () => [0, 0, 0] };
+  if (entry.kind === "flat") return { kind: "flat", low: 0, high: 0, steepest: 0, at: () => [0, 0, 0] };
+  throw new TypeError("no surface of this kind");
 }
 
 /** @param {HillsEntry} entry @returns {Hills} */

@@ -29,7 +29,7 @@ from dav_gswt.reconstruction.observation import mask_to_ground
 
 _log = logging.getLogger(__name__)
 
-MIN_CELLS = 32  # cells that the exemplar is wide at least at a level that is fitted: coarser ones are made tile by tile
+MIN_CELLS = 32  # cells across the exemplar, at least, of a level that is fitted; tiles merge coarser ones themselves
 COVERED = 0.9  # opacity of a pixel that a coarser level is fitted to
 MAX_SHARE = 0.5  # of a level's Gaussians that the next one may have at most
 ELEVATIONS = (90.0, 50.0, 20.0, 6.0)  # degrees: pictures the coarser level is fitted to, down to eye level
