@@ -60,14 +60,19 @@ def scenes_by(*agents):
     return "|".join(name for name, scene in config["scenes"].items() if scene.get("agent") in agents) or NEVER
 
 
-def existing(path, where, hint=""):
-    """A path that the config names (`locate_path`).
+TEMPLATE = re.compile(r"[{}<>]")  # Snakemake takes {name} and <name> in a path for a wildcard or a variable
 
-    Raises: WorkflowError: it is not there, or is a file from the future.
+
+def existing(path, where, hint="", escaped=True):
+    """A path that the config names (`locate_path`). escaped: it becomes an input of Snakemake.
+
+    Raises: WorkflowError: it is not there, cannot be an input, or is a file from the future.
     """
     found = locate_path(path, BASE)
     if not found.exists():
         raise WorkflowError(f"config: {where}: there is no {path}{hint}")
+    if escaped and TEMPLATE.search(str(found)):
+        raise WorkflowError(f"config: {where}: {found} has one of the letters {{ }} < >: rename the file or folder")
     return dated(found, where)
 
 
@@ -80,26 +85,16 @@ def dated(path, where):
     return str(path)
 
 
-def files_in(folder, where):
-    """The files of a folder, as inputs: one that is added, removed or changed is noticed.
-
-    Raises: WorkflowError: it is no folder, cannot be read, or a file in it is from the future.
-    """
-    found = Path(existing(folder, where))
-    try:
-        files = [found / name for name in sorted(os.listdir(found)) if not name.startswith(".")]
-    except OSError as error:
-        raise WorkflowError(f"config: {where}: {folder} is no folder that can be read ({error.strerror})") from None
-    return [dated(path, where) for path in files if path.is_file()]
-
-
 def files_of_model(path, where):
     """The files of another program's model, as inputs: of a folder its own and those of the folders in it."""
-    found = Path(existing(path, where))
+    found = Path(existing(path, where, escaped=False))
     if not found.is_dir():
         return [str(found)]
-    folders = [found, *found.glob("[!.]*"), *found.glob("[!.]*/[!.]*")]
-    return [file for folder in folders if folder.is_dir() for file in files_in(folder, where)]
+    try:
+        files = [file for depth in ("", "[!.]*/", "[!.]*/[!.]*/") for file in sorted(found.glob(f"{depth}[!.]*"))]
+    except OSError as error:
+        raise WorkflowError(f"config: {where}: {path} cannot be read ({error.strerror})") from None
+    return [dated(file, where) for file in files if file.is_file()]
 
 
 def lpips_weights(wildcards=None):
@@ -166,15 +161,34 @@ def branch(scene, policy=None, changes=None):
     return paths.encode_branch(config, scene, policy, changes)
 
 
-def source_photos(wildcards):
-    """A scene's photos and what its entry names beside them: masks, a model of another program."""
-    scene, where = config["scenes"][wildcards.scene], f"scenes.{wildcards.scene}"
-    found = {"photos": files_in(scene["folder"], f"{where}.folder")}
-    if "masks" in scene:
-        found["masks"] = files_in(scene["masks"], f"{where}.masks")
-    if "model" in scene:
-        found["model"] = files_of_model(scene["model"], f"{where}.model")
+def source_files(scene):
+    """The files that registration reads, by what they are: photos (or a video), masks, another program's model."""
+    given, where = config["scenes"][scene], f"scenes.{scene}"
+    for key in ("folder", "masks"):
+        for path in [given[key]] if isinstance(given.get(key, []), str) else given.get(key, []):
+            existing(path, f"{where}.{key}", escaped=False)
+    try:
+        listing = list_photos(locate_source(given["folder"]), locate_path(given["masks"]) if "masks" in given else None)
+    except (InputError, OSError) as error:
+        raise WorkflowError(f"config: {where}.folder: {error}") from None
+    photos = list(listing.photos.values()) or listing.files.get("video", [])
+    found = {"photos": [dated(path, f"{where}.folder") for path in photos]}
+    found["masks"] = [dated(path, f"{where}.masks") for path in listing.masks.values()]
+    found["model"] = files_of_model(given["model"], f"{where}.model") if "model" in given else []
     return found
+
+
+def source_photos(wildcards):
+    """A scene's photos and what belongs to them, as inputs."""
+    found = source_files(wildcards.scene)
+    return {key: [path for path in files if not TEMPLATE.search(path)] for key, files in found.items()}
+
+
+def unnameable_photos(wildcards):
+    """A params function: those of them that cannot be inputs, as Snakemake would take part of their path for a name of
+    its own; with what changes when they do."""
+    found = [Path(path) for files in source_files(wildcards.scene).values() for path in files if TEMPLATE.search(path)]
+    return [f"{path} {path.stat().st_size} {path.stat().st_mtime_ns}" for path in found]
 
 
 def source_field(wildcards):
@@ -293,8 +307,8 @@ def photo_targets(scene):
     """The photo report, the metrics of each round, those before the last of the preset that chose, and its scores."""
     if config["scenes"][scene]["kind"] == "field":
         return []
-    values, rounds = branch(scene), config["rounds"]
-    chosen = values_of_choice(values)
+    values = branch(scene)
+    chosen, rounds = values_of_choice(values), values["t"]
     scored = rules.score_round.output if rounds else rules.score_coarse.output
     return (
         expand(rules.report_photos.output.page, scene=scene)

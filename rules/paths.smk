@@ -16,6 +16,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import is_from_future, locate_path
 from dav_gswt.images.lpips_weights import locate_weights
 from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
+from dav_gswt.photos.photo_listing import list_photos, locate_source
 from dav_gswt.sweeps import CELL
 from dav_gswt.views.policies import NEEDS_PHOTOS, POLICY_NAMES, PRIOR_POLICIES
 from dav_gswt.workflow import NamedEntries, lift_job_rate_limit
@@ -25,7 +26,7 @@ VIEWER = sorted(
     str(path) for path in (BASE / "workflow/viewer").rglob("*") if path.suffix in (".js", ".ts", ".html", ".css")
 )
 NEVER = r"(?!)"  # a constraint that nothing meets
-PLAIN_TILING = r"[a-z][a-z0-9_-]*(?<!-expansion)"  # an entry of `tilings`
+PLAIN_TILING = r"[A-Za-z][A-Za-z0-9_-]*(?<!-expansion)"  # an entry of `tilings`
 CHOOSING = "|".join(map(paths.policy_pattern, POLICY_NAMES))  # policies, as a constraint
 
 # A workflow that includes this one may have top-level keys of its own. It names them here, each with a function that gets

@@ -26,6 +26,7 @@ rule register_photos:
         runtime=per_attempt("60m"),
     params:
         scene=scene_keys("register_photos"),
+        unnameable=unnameable_photos,
         source=code_of("register_photos"),
     script:
         "../scripts/register_photos.py"

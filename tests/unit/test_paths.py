@@ -66,6 +66,14 @@ def test_auto_is_a_policy_by_where_photos_come_from(agent, policy):
     assert encode_branch(CONFIG | {"scenes": scenes}, "sand")["policy"] == "w2-lpips"
 
 
+def test_where_all_photos_start_and_none_can_be_taken_there_are_no_rounds():
+    def rounds(**entry) -> int:
+        scenes = {"sand": CONFIG["scenes"]["sand"] | entry}
+        return encode_branch(CONFIG | {"scenes": scenes}, "sand", "farthest")["t"]
+
+    assert [rounds(agent="replay"), rounds(agent="replay", start=8), rounds(agent="plan")] == [0, 2, 2]
+
+
 def test_the_folders_of_a_run_are_found_from_any_of_its_files():
     scores = Path("/home/me/results/sand/seed0/draft/active_w2_terrain_pdrop0.15_lam0_k4/iter2/scores.csv")
     fit = Path("/home/me/results/sand/seed0/draft")

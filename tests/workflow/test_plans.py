@@ -59,6 +59,21 @@ def test_presets_share_the_rounds_of_the_preset_that_chooses_for_them(planned, t
     assert plan["fit_chosen_photos"] == 2 and plan["copy_chosen_photos"] == 4 and plan["make_levels"] == 3
 
 
+def test_a_folder_alone_is_a_scene_whose_photos_are_all_fitted_at_once(planned, tmp_path):
+    """With names that Snakemake takes for wildcards, in subfolders; presets share the photos' places."""
+    for name in ("{abc}.jpg", "<results>/2 b.jpg", "2.jpg", "2_mask.jpg", "masks/x.png"):
+        (tmp_path / "my {photos}" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "my {photos}" / name).write_bytes(b"\xff\xd8\xff")
+    (tmp_path / "mine.yaml").write_text("scene: Sand_Pit\nscenes: {Sand_Pit: {kind: photos, folder: 'my {photos}'}}\n")
+    configs = (USUAL, tmp_path / "mine.yaml")
+    plan = planned(tmp_path, configs=configs)
+    assert plan["register_photos"] == plan["fit_coarse"] == plan["make_page"] == 1
+    assert not any(plan[rule] for rule in ("score_round", "select_poses", "capture_views", "update_field"))
+    metrics = "results/Sand_Pit/seed0/{}/coarse/metrics.json"
+    plan = planned(tmp_path, metrics.format("draft"), metrics.format("standard"), configs=configs)
+    assert plan["register_photos"] == plan["split_views"] == 1 and plan["fit_coarse"] == 2
+
+
 def test_a_finished_field_goes_from_field_to_terrain(planned, tmp_path):
     (tmp_path / "finished.ply").touch()
     plan = planned(tmp_path, "--config", "scene=finished", configs=(USUAL, TINY))
@@ -77,7 +92,6 @@ def test_a_round_is_tiled_as_it_is_and_completed(planned, tmp_path):
     [
         pytest.param(BUNDLE.format(**(DEFAULT | {"tau": "0.60"})), id="a trailing zero"),
         pytest.param(ROUND.format(policy="w2-lpips", k=4, t=1) + "/field.ply", id="w2-lpips without a prior"),
-        pytest.param("results/Desert/seed0/views.json", id="a scene in capitals"),
     ],
 )
 def test_a_second_spelling_of_a_path_has_no_rule(snakemake, tmp_path, path):

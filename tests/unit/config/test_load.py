@@ -48,6 +48,15 @@ def test_native_photos_are_those_of_any_size(config):
     assert checked["scenes"]["copr_dunes"]["size"] == LARGEST_SIDE
 
 
+def test_a_folder_alone_is_a_scene(config):
+    checked = check_config(changed(config, ["scenes", "My_Sand"], {"kind": "photos", "folder": ["a", "b"]}))
+    scene = checked["scenes"]["My_Sand"]
+    assert "start" not in scene and "test" not in scene
+    assert {key: scene[key] for key in ("size", "agent", "preset", "tiling", "materials")} == {
+        **{"size": 1024, "agent": "replay", "preset": "standard", "tiling": "auto", "materials": "auto"}
+    }
+
+
 RIG = {"port": "p", "inbox": "in", "millimetres": 250, "limits": {"pan": [0, 1], "tilt": [0, 1], "radius": [0, 1]}}
 
 

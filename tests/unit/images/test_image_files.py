@@ -94,18 +94,6 @@ def test_a_float_image_with_nan_is_refused(tmp_path):
         image_files.read_photo(stored(tmp_path / "a.tif", np.full((4, 4, 3), np.nan, np.float32)))
 
 
-def test_photos_are_listed_by_name_without_hidden_and_other_files(tmp_path):
-    for name in ("b.JPG", "a.png", ".c.jpg", "notes.txt", "raw.dng"):
-        (tmp_path / name).write_bytes(b"x")
-    assert [p.name for p in image_files.list_photos(tmp_path)] == ["a.png", "b.JPG"]
-    (tmp_path / "raw").mkdir()
-    (tmp_path / "raw/raw.heic").write_bytes(b"x")
-    with pytest.raises(InputError, match="no photos.*raw.heic.*JPEG"):
-        image_files.list_photos(tmp_path / "raw")
-    with pytest.raises(InputError, match="no such folder"):
-        image_files.list_photos(tmp_path / "nowhere")
-
-
 def test_shrinking_averages_areas():
     row = np.array([[0.0, 3.0, 6.0]], np.float32)[..., None]
     # two pixels of 1.5 old ones each: (0 + 3/2) / 1.5 = 1 and (3/2 + 6) / 1.5 = 5

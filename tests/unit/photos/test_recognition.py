@@ -43,7 +43,14 @@ def test_a_folder_of_photos_with_subfolders_and_masks(tmp_path):
     )
     found = recognize_input([folder])
     assert found.name == "Sand_pit" and found.about == "4 photos (HEIC among them) and masks"
-    assert found.entry == {"kind": "photos", "folder": str(folder), "masks": str(folder / "masks")}
+    assert found.entry == {"kind": "photos", "folder": str(folder)}
+
+
+def test_videos_of_live_photos_belong_to_their_photos(tmp_path):
+    folder = write(photos(tmp_path), **{f"{i}_dot_mov": MP4 for i in range(3)})
+    assert recognize_input([folder]).about == "3 photos"
+    with pytest.raises(InputError, match="several things at once, photos .* and a video"):
+        recognize_input([write(folder, other_dot_mov=MP4)])
 
 
 @pytest.mark.parametrize(

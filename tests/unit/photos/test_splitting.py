@@ -10,6 +10,7 @@ from fixtures.frames import scene_frame
 from dav_gswt.errors import InputError
 from dav_gswt.photos import view_split
 from dav_gswt.photos.view_split import (
+    SplitOptions,
     find_aim_point,
     measure_picture_share,
     measure_visible_share,
@@ -31,19 +32,27 @@ def first(model, count):
     return synth.model(list(model.cameras[:count]), model.points) if keep.any() else model
 
 
-def split(model, seed=0, start=8, frame=FRAME):
-    return split_views(model, frame, start, np.random.default_rng(seed))
+def split(model, seed=0, start=8, frame=FRAME, test=None):
+    return split_views(model, frame, SplitOptions(start, test), np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize(
     "photos, start, pool, test",
-    [(3, 3, 0, 0), (5, 5, 0, 0), (6, 4, 0, 2), (10, 8, 0, 2), (12, 8, 2, 2), (30, 8, 19, 3)],
+    [(3, 3, 0, 0), (6, 6, 0, 0), (11, 8, 3, 0), (12, 8, 3, 1), (20, 8, 10, 2), (30, 8, 19, 3)],
 )
 def test_every_photo_has_one_part_of_its_size(flown, photos, start, pool, test):
     model = first(flown, photos)
     parts = split(model)
     assert (len(parts.start), len(parts.pool), len(parts.test)) == (start, pool, test)
     assert sorted(parts.start + parts.pool + parts.test) == sorted(model.names)
+
+
+def test_all_photos_start_and_as_many_test_as_are_asked_for(flown):
+    parts = split(first(flown, 8), start=None, test=2)
+    assert (len(parts.start), len(parts.pool), len(parts.test)) == (6, 0, 2)
+    assert len(split(flown, start=None, test=0).start) == 30
+    with pytest.raises(InputError, match="test: 7 of 8 photos.*2 must be left"):
+        split(first(flown, 8), test=7)
 
 
 def test_test_views_are_the_same_for_every_seed_and_start_views_are_not(flown):

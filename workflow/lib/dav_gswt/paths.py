@@ -36,19 +36,19 @@ TREE = {
     "seams": "<bundle>/seams",
 }
 
-NAME = rf"(?!(?:{'|'.join(RESERVED)})(?:/|$))[a-z][a-z0-9_-]*"
+NAME = rf"(?!(?:{'|'.join(RESERVED)})(?:/|$))[A-Za-z][A-Za-z0-9_-]*"
 NATURAL = r"0|[1-9]\d*"
 POSITIVE = r"[1-9]\d*"
 FRACTION = r"0|1|0\.\d*[1-9]"
 SHARE = r"0|0\.\d*[1-9]"
 NUMBER = r"0|[1-9]\d*|(?:0|[1-9]\d*)\.\d*[1-9]"
-INPAINTED = r"(?:/inpainted_[a-z][a-z0-9_-]*)?"  # or nothing
+INPAINTED = r"(?:/inpainted_[A-Za-z][A-Za-z0-9_-]*)?"  # or nothing
 WILDCARDS = {
     "scene": NAME,
     "seed": NATURAL,
     "preset": NAME,
     "policy": POLICY_NAME,
-    "prior": r"[a-z][a-z0-9_-]*?",
+    "prior": r"[A-Za-z][A-Za-z0-9_-]*?",
     "p_drop": SHARE,
     "lam": NUMBER,
     "k": NATURAL,
@@ -69,7 +69,8 @@ def encode_number(value: int | float | str) -> str:
 def encode_branch(config: Mapping, scene: str, policy: str | None = None, changes: Mapping | None = None) -> dict:
     """The wildcards of what is made of a scene, by the config or by settings that replace some of the config's.
 
-    Settings that a policy does not read are always encoded as prior `none`, `p_drop` and `lam` 0.
+    Settings that a policy does not read are always encoded as prior `none`, `p_drop` and `lam` 0. Where all photos
+    start and no others can be taken (`agent: replay` without `start`), there are no rounds.
     """
     settings = {**config, **(changes or {})}
     entry = config["scenes"][scene]
@@ -84,7 +85,8 @@ def encode_branch(config: Mapping, scene: str, policy: str | None = None, change
     policy = resolve_policy(policy or settings["policy"], entry.get("agent"))
     unread = ZERO_SETTINGS.get(policy, ()) if policy in PRIOR_POLICIES else ("p_drop", "lam")
     numbers = {key: "0" if key in unread else encode_number(settings[key]) for key in ("p_drop", "lam")}
-    rounds = {"k": settings["k"], "t": settings["rounds"]}
+    all_start = entry.get("agent") == "replay" and "start" not in entry
+    rounds = {"k": settings["k"], "t": 0 if all_start else settings["rounds"]}
     rounds["inpainted"] = f"/inpainted_{config['prior']}" if config["inpaint"] else ""  # a level below the round
     prior = settings["prior"] if policy in PRIOR_POLICIES else "none"
     return fit | {"policy": policy, "prior": prior} | numbers | rounds | tiles
@@ -147,4 +149,4 @@ def policy_pattern(policy: str) -> str:
         return f"{policy}(?=_none_pdrop0_lam0_)"
     zeros = ZERO_SETTINGS.get(policy, ())
     p_drop, lam = ("0" if key in zeros else "[^_]+" for key in ("p_drop", "lam"))
-    return f"{policy}(?!_none_)(?=_[a-z0-9_-]+_pdrop{p_drop}_lam{lam}_)"
+    return f"{policy}(?!_none_)(?=_[A-Za-z0-9_-]+_pdrop{p_drop}_lam{lam}_)"

@@ -1,5 +1,6 @@
 """Camera models of other programs: one made-up scene in three formats, the same cameras, pictures and points."""
 
+import unicodedata
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,6 +128,8 @@ def test_names_are_found_by_path_then_by_stem(tmp_path):
     assert [found.find(n) for n in ("a/1.jpg", "x/2.png", "2.JPG", "3.v2")] == [
         *("a/1.jpg", "b/2.png", "b/2.png", "c/3.v2.jpg")
     ]
+    image_files.write_png(tmp_path / unicodedata.normalize("NFD", "düne.png"), np.zeros((4, 4, 3)))
+    assert PhotoFolder(tmp_path).find("düne.png") == "düne.png"  # composed in the model, not on the disk
     assert found.find("1.jpg") is None and found.find("4") is None  # of two photos, of none
 
 

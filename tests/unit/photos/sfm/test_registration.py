@@ -1,5 +1,6 @@
 """Structure from motion on small made-up photos, and what it says about photos it cannot use."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -97,6 +98,25 @@ def test_all_photos_find_the_places_they_were_taken_from(registered, photos):
     assert registered.model.cameras[0].fx == pytest.approx(synth.FOCAL * round(FILM) / FILM, rel=1e-4)
 
 
+def test_copies_count_once_and_damaged_photos_are_left_out_by_name(photos, tmp_path, caplog, monkeypatch):
+    """Also of photos in a subfolder; the good ones then go the way that they go without the others."""
+    given = []
+    monkeypatch.setattr(registration, "find_solution", lambda scene, seed: given.extend(scene.photos) or 1 / 0)
+    for path in photos.iterdir():
+        folder = tmp_path / ("day2" if path.stem > "003" else ".")
+        folder.mkdir(exist_ok=True)
+        shutil.copy(path, folder)
+        shutil.copy(path, tmp_path / f"{path.stem} (1).jpg")
+    (tmp_path / "text.jpg").write_text("no photo")
+    whole = (photos / "000.jpg").read_bytes()
+    (tmp_path / "cut.jpg").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(ZeroDivisionError):
+        register_photos(tmp_path, replace(OPTIONS, features=64))
+    assert tuple(sorted(photo.key for photo in given)) == NAMES
+    assert "8 of 18 photos are copies (000 (1).jpg of 000.jpg): each counts once" in caplog.text
+    assert "left out: " in caplog.text and "text.jpg: not readable" in caplog.text and "cut.jpg: damaged" in caplog.text
+
+
 @pytest.mark.slow
 def test_a_run_repeats_to_the_bit_whatever_the_threads(photos, registered):
     again = register_photos(photos, replace(OPTIONS, threads=2))
@@ -189,8 +209,11 @@ def test_an_undistorted_picture_is_what_a_pinhole_camera_sees(tmp_path):
 
 def test_photos_that_cannot_be_used_are_refused(tmp_path):
     for i in range(2):
-        image_files.write_png(tmp_path / f"{i}.png", np.full((60, 80, 3), 0.5))
+        image_files.write_png(tmp_path / f"{i}.png", np.full((60, 80, 3), 0.3 + 0.1 * i))
     with pytest.raises(InputError, match="0.png and 1.png.*at least 3"):
+        register_photos(tmp_path, OPTIONS)
+    (tmp_path / "2.jpg").write_text("no photo")
+    with pytest.raises(InputError, match="2.jpg: not readable.*at least 3"):
         register_photos(tmp_path, OPTIONS)
     image_files.write_png(tmp_path / "2.png", np.full((60, 80, 3), 0.5))
     with pytest.raises(InputError, match="0 of 3 photos.*texture"):

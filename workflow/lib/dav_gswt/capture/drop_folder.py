@@ -10,8 +10,8 @@ from pathlib import Path
 
 from dav_gswt.capture.site import RequestedPose, Site, view_distance
 from dav_gswt.files import digest_files
-from dav_gswt.images import image_files
 from dav_gswt.photos.photo_files import read_capture_time
+from dav_gswt.photos.photo_listing import list_photos
 from dav_gswt.photos.sfm.localization import localize_photos
 
 _log = logging.getLogger(__name__)
@@ -59,7 +59,7 @@ def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str
 def _list_new_photos(site: Site, requested: list[RequestedPose]) -> list[Path]:
     """The dropped photos that no pose of the run has yet, each once: by content, as cameras use names again."""
     folder = make_drop_folder(site)
-    here = image_files.list_photos(folder) if any(not p.name.startswith(".") for p in folder.iterdir()) else []
+    here = list(list_photos(folder).photos.values())
     used, new = site.store.list_digests([*site.requested, *(camera for _, camera in requested)]), {}
     for path in here:
         digest = digest_files(path)

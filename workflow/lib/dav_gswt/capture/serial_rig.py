@@ -27,6 +27,7 @@ from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
+from dav_gswt.images.file_kinds import SUFFIXES
 from dav_gswt.logs import progress
 from dav_gswt.photos.lenses import undistort_scene_photo
 
@@ -233,7 +234,7 @@ def list_photos(folder: Path) -> Listing:
         raise InputError(f"{folder}: there is no such folder; rig.inbox is where the camera's software saves photos")
     found = {}
     for path in folder.iterdir():
-        if path.suffix.lower() in image_files.SUFFIXES and not path.name.startswith("."):
+        if path.suffix.lower() in SUFFIXES and not path.name.startswith("."):
             try:
                 stat = path.stat()
             except FileNotFoundError:  # renamed meanwhile

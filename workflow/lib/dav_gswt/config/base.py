@@ -22,7 +22,7 @@ class ConfigModel(BaseModel):
 def _require_name(name: str) -> str:
     if not re.fullmatch(NAME, name):
         raise ValueError(
-            f"{name!r} is no name: small letters, digits, - and _, from a letter, and none of {', '.join(RESERVED)}"
+            f"{name!r} is no name: letters of ASCII, digits, - and _, from a letter, and none of {', '.join(RESERVED)}"
         )
     return name
 

@@ -69,8 +69,8 @@ class Route(ConfigModel):
 
 
 class _Scene(ConfigModel):
-    preset: Name = key("an entry of `presets`")
-    tiling: Name = key("an entry of `tilings`")
+    preset: Name = key("an entry of `presets`", "standard")
+    tiling: Name = key("an entry of `tilings`", "auto")
 
 
 class _PhotographedScene(_Scene):
@@ -110,7 +110,7 @@ class SyntheticScene(_PhotographedScene):
     start: int | None = key(
         "photos to start from, with `agent: replay`; all if left out", None, read_by=("split_views",), ge=2, le=200
     )
-    test: int = key("views that only test", read_by=RENDERED, ge=0, le=200)
+    test: int = key("views that only test", read_by=(*RENDERED, "split_views"), ge=0, le=200)
     layout: Literal["ring", "cap", "paper"] = key(
         "how photos are placed: `ring`, one from above and the others around it at 65 degrees; `cap`, evenly over the "
         "hemisphere above `min_elevation`; `paper`, 36 on a circle at 45 degrees and the others as `cap`",
@@ -153,8 +153,8 @@ class PhotoScene(_PhotographedScene):
     """A folder of photos."""
 
     kind: Literal["photos"]
-    folder: Text = key(
-        "a folder of photos and nothing else, relative to the working directory or to the repository",
+    folder: Text | Annotated[list[Text], Field(min_length=1)] = key(
+        "a folder of photos with its subfolders, or several, relative to the working directory or to the repository",
         read_by=REGISTERED,
     )
     model: Text | None = key(
@@ -163,13 +163,24 @@ class PhotoScene(_PhotographedScene):
         read_by=REGISTERED,
     )
     size: PhotoSize = key(
-        "longer side of undistorted photos, or `native`: their own; none is enlarged", unit="pixels", read_by=REGISTERED
+        "longer side of undistorted photos, or `native`: their own; none is enlarged",
+        1024,
+        unit="pixels",
+        read_by=REGISTERED,
     )
-    start: int = key(
-        "photos to start from, or all that are left: test photos are set aside first, one in ten of all and at least "
-        "two (none of fewer than six). With `agent: replay` the remaining photos are the pool that rounds choose from",
+    start: int | None = key(
+        "photos to start from, after test photos were set aside; all if left out, and `agent: replay` then has no "
+        "rounds. Else the remaining photos are the pool that its rounds choose from",
+        None,
         read_by=("split_views",),
         ge=2,
+        le=1000,
+    )
+    test: int | None = key(
+        "photos that are set aside to judge the result; if left out one in ten, and none of fewer than twelve",
+        None,
+        read_by=("split_views",),
+        ge=0,
         le=1000,
     )
     whole: bool = key(
@@ -182,11 +193,15 @@ class PhotoScene(_PhotographedScene):
     )
     materials: Materials = _materials("auto")
     masks: Text | None = key(
-        "a folder of masks named as the photos: black pixels are not ground", None, read_by=REGISTERED
+        "a folder of masks named as the photos: black pixels are not ground. Left out: NAME_mask.* beside a photo, and "
+        "a folder `masks` in the photos' folder or beside one called `images`",
+        None,
+        read_by=REGISTERED,
     )
     agent: PhotoAgent = key(
         "who takes further photos: `replay` takes them from the photos of the folder that are left; `serial` is a "
         "camera rig, `plan` a drone, `handheld` a person",
+        "replay",
         read_by=POSE_READERS,
     )
     rig: SerialRig | None = key("the camera rig of `agent: serial`", None, read_by=CAPTURING, agents=("serial",))

@@ -6,6 +6,8 @@ from typing import Literal
 
 Kind = Literal["photo", "heif", "raw", "video", "ply", "spz", "splat", "ksplat", "sog", "other"]
 
+SUFFIXES = {".jpg", ".jpeg", ".jpe", ".jfif", ".png", ".tif", ".tiff", ".webp", ".jp2", ".jxl", ".bmp", ".ppm", ".tga"}
+HEIF_SUFFIXES = {".heic", ".heif", ".hif", ".avif"}
 HEAD = 32  # bytes that tell
 STILL_BRANDS = {b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1", b"avif", b"avis"}
 PHOTO_MAGIC = (b"\xff\xd8\xff", b"\x89PNG", b"II*\0", b"MM\0*", b"BM", b"P5", b"P6", b"\xff\x0a", b"\0\0\0\x0cJXL ")

@@ -1,6 +1,5 @@
 """Image files: photos of any format by OpenImageIO, float maps with named channels as OpenEXR."""
 
-import logging
 import struct
 from pathlib import Path
 
@@ -15,8 +14,8 @@ from scipy.sparse import csr_array
 
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import UNREADABLE, atomic_file
-
-_log = logging.getLogger(__name__)
+from dav_gswt.images.camera_formats import DECODERS, Decoder
+from dav_gswt.images.file_kinds import detect_kind
 
 AT_ONCE = 2_000_000  # values that are averaged at a time
 MAX_PIXELS = 200_000_000  # of a photo: more is a broken header, or more than two cores should work on
@@ -30,29 +29,7 @@ RAMP = (  # colours of a preview from low to high, linear light: as viridis of M
     (0.984, 0.799, 0.019),
 )
 PNG_END = b"\0\0\0\0IEND\xaeB`\x82"  # its last chunk
-SUFFIXES = {".jpg", ".jpeg", ".jpe", ".jfif", ".png", ".tif", ".tiff", ".webp", ".jp2", ".jxl", ".bmp", ".ppm", ".tga"}
 IF_FULL = "if the disk is full, free some space, then run the same again"
-UNSUPPORTED = {".heic", ".heif", ".avif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".raw"}
-
-
-def list_photos(folder: Path | str) -> list[Path]:
-    """Photos that lie directly in a folder, sorted by name; hidden and other files are skipped.
-
-    Raises: InputError: the folder is missing, or has no photo.
-    """
-    folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError(f"{folder}: there is no such folder of photos")
-    found = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
-    photos = [p for p in found if p.suffix.lower() in SUFFIXES]
-    unsupported = [p for p in found if p.suffix.lower() in UNSUPPORTED]
-    if not photos:
-        hint = f" ({unsupported[0].name} is of a kind that is not read: convert it to JPEG)" if unsupported else ""
-        raise InputError(f"{folder}: no photos in this folder{hint}; put .jpg, .png or .tif files directly into it")
-    if unsupported:
-        example = unsupported[0].name
-        _log.warning("%s: %d files like %s are not read; convert them to JPEG", folder, len(unsupported), example)
-    return photos
 
 
 def read_size(path: Path | str) -> tuple[int, int]:
@@ -62,7 +39,9 @@ def read_size(path: Path | str) -> tuple[int, int]:
 
 
 def read_stored_size(path: Path | str) -> tuple[int, int, int]:
-    """Width and height as stored, and EXIF's orientation, from the header alone."""
+    """Width and height as stored, and EXIF's orientation, from the header alone; HEIC and raw count as upright."""
+    if decoder := _find_decoder(path):
+        return *_check_size(path, *decoder.read_size(Path(path))), 1
     file, spec = _open_image(path)
     file.close()
     return spec.width, spec.height, _read_orientation(spec)
@@ -84,6 +63,10 @@ def read_photo_and_alpha(path: Path | str) -> tuple[Float32[Array, "h w 3"], Flo
 
 def _read_colours(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w"] | None]:
     """Colours, and alpha where the file has one. Photos may have 50 million pixels: what can be done in place is."""
+    if decoder := _find_decoder(path):
+        _check_size(path, *decoder.read_size(Path(path)))
+        pixels = decoder.read_pixels(Path(path))
+        return np.ascontiguousarray(pixels[..., :3]), pixels[..., 3].copy() if pixels.shape[2] == 4 else None
     file, spec = _open_image(path)
     # alpha is read along: reading only some of the channels is slower in many formats
     pixels = _read_pixels(file, path, min(spec.nchannels, 4))
@@ -281,10 +264,20 @@ def _open_image(path: Path | str):
     spec = file.spec()
     if spec.width < 1 or spec.height < 1 or spec.nchannels < 1 or spec.depth > 1 or spec.deep:
         raise InputError(f"{path}: holds no flat picture; remove or replace it")
-    if spec.width * spec.height > MAX_PIXELS:
-        most = MAX_PIXELS // 10**6
-        raise InputError(f"{path}: {spec.width} x {spec.height} pixels; at most {most} megapixels are read: shrink it")
+    _check_size(path, spec.width, spec.height)
     return file, spec
+
+
+def _find_decoder(path: Path | str) -> Decoder | None:
+    """What reads the photo, where OpenImageIO does not."""
+    return DECODERS.get(detect_kind(Path(path)))
+
+
+def _check_size(path: Path | str, width: int, height: int) -> tuple[int, int]:
+    if width * height > MAX_PIXELS:
+        most = MAX_PIXELS // 10**6
+        raise InputError(f"{path}: {width} x {height} pixels; at most {most} megapixels are read: shrink it")
+    return width, height
 
 
 def _read_pixels(file, path: Path | str, channels: int) -> Float32[Array, "h w c"]:

@@ -5,6 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from datetime import datetime
+from io import BytesIO
 from pathlib import Path, PurePosixPath
 
 import exifread
@@ -12,6 +13,8 @@ import numpy as np
 from exifread.utils import Ratio
 
 from dav_gswt.images import image_files
+from dav_gswt.images.camera_formats import read_heif_exif
+from dav_gswt.images.file_kinds import HEIF_SUFFIXES, RAW_SUFFIXES, SUFFIXES, detect_kind
 
 FILM_DIAGONAL = 43.2666  # mm, of a 36 x 24 mm frame: "35 mm equivalent" compares diagonals
 WIDEST = 1.55  # photos wider than a 3:2 sensor are cropped from a 4:3 sensor, whose diagonal the equivalent refers to
@@ -91,7 +94,8 @@ def read_capture_time(path: Path | str) -> str | None:
 def _read_tags(path: Path | str) -> dict:
     """The tags of a photo's EXIF; empty where there is none."""
     try:
-        with Path(path).open("rb") as file:
+        heif = detect_kind(Path(path)) == "heif"  # the parser finds EXIF in some of them only
+        with BytesIO(read_heif_exif(Path(path))) if heif else Path(path).open("rb") as file:
             return exifread.process_file(file, details=False, extract_thumbnail=False)
     except OSError:
         raise
@@ -116,7 +120,7 @@ def _read_numbers(tags: dict, name: str) -> list[float]:
 def split_stem(name: str) -> str:
     """The file name without its suffix. Only suffixes of pictures count, as names may have other dots."""
     path = PurePosixPath(name)
-    return path.stem if path.suffix.lower() in image_files.SUFFIXES and path.stem else path.name
+    return path.stem if path.suffix.lower() in SUFFIXES | HEIF_SUFFIXES | RAW_SUFFIXES and path.stem else path.name
 
 
 def name_pictures(names: Sequence[str]) -> list[str]:

@@ -2,15 +2,14 @@
 
 import logging
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float
 from numpy import ndarray as Array
-from scipy.ndimage import minimum_filter
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import read_field, write_field
@@ -21,18 +20,17 @@ from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model, splat
-from dav_gswt.photos.lenses import ASPECT, Lens, pinhole_parameters, undistort_photo, write_lenses
-from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_image
+from dav_gswt.photos.lenses import Lens, pinhole_parameters, write_lenses
+from dav_gswt.photos.masks import PhotoMasks, find_borders, read_picture
+from dav_gswt.photos.photo_listing import Source, list_photos
+from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos
 from dav_gswt.threads import map_ahead
 
 _log = logging.getLogger(__name__)
 
-HALF = 0.5  # brightness from which a mask's pixel counts
-MARGIN = 2  # pixels around what is masked that do not count either: its blurred edge
-
 
 def prepare_photos(
-    source: Path | str,
+    source: Source,
     out: Path | str,
     options: SfmOptions,
     given: Path | str | None = None,
@@ -40,10 +38,15 @@ def prepare_photos(
 ) -> SceneFrame:
     """Register the photos in `source`, and write undistorted pictures, model and ground.json into the folder `out`.
 
-    given: a camera model of another program, used as it is. masks: a folder, see `undistort_masks`.
-    Returns what ground.json holds.
-    Raises: InputError: see `register_photos`, `import_model`, `undistort_masks` and `fit_ground_frame`.
+    given: a camera model of another program, used as it is. masks: a folder of them, black where a photo must not
+    become ground, such as on cars, people or the photographer's shadow; else those that `list_photos` finds.
+    Masks become the pictures' alpha. Returns what ground.json holds.
+    Raises: InputError: see `list_photos`, `register_photos`, `import_model`, `read_picture` and `fit_ground_frame`, or
+    a folder of masks has none that belongs to a photo.
     """
+    covers = list_photos(source, masks).masks
+    if masks and not covers:
+        raise InputError(f"{masks}: no mask is named like a photo; name each as its photo, as IMG_1.png for IMG_1.jpg")
     found = import_model(given, source, options) if given else register_photos(source, options)
     about = found.positions.about if found.positions else None
     model, frame = fit_ground_frame(found.model, np.random.default_rng(options.seed), about)
@@ -58,66 +61,42 @@ def prepare_photos(
         points=len(model.points),
         verdict=found.verdict,
     )
-    numbers = progress(range(len(model.names)), "undistort photos")
-    pictures = zip(model.names, map_ahead(partial(undistort_image, found), numbers, options.threads), strict=True)
-    covers = undistort_masks(found, masks) if masks else {}
-    write_photo_folder(out, model, pictures, frame, _list_lenses(found), covers)
+    known = PhotoMasks(covers, find_borders(found.sources))
+    numbers, masked = progress(range(len(model.names)), "undistort photos"), Counter[str]()
+
+    def read_pictures() -> Iterator[tuple[str, Float[Array, "h w c"]]]:
+        read = map_ahead(partial(read_picture, found, known), numbers, options.threads)
+        for name, (picture, masked_by) in zip(model.names, read, strict=True):
+            masked.update(masked_by)
+            yield name, picture
+
+    write_photo_folder(out, model, read_pictures(), frame, _list_lenses(found))
+    if masked:
+        ways = ", ".join(f"{by} ({count} of {len(model.names)} photos)" for by, count in masked.items())
+        _log.info("masks: %s; what they hide is no ground", ways)
     return frame
 
 
 def write_photo_folder(
     path: Path | str,
     model: ColmapModel,
-    pictures: Iterable[tuple[str, Float[Array, "h w 3"]]],
+    pictures: Iterable[tuple[str, Float[Array, "h w c"]]],
     frame: SceneFrame,
     lenses: Sequence[Lens] = (),
-    covers: Mapping[str, Float32[Array, "h w"]] | None = None,
 ) -> None:
     """Write images/, sparse/, lenses.json and ground.json into the folder `path`, which is replaced.
 
-    pictures: by file name. covers: masks by the pictures' names, 0 where a pixel does not count;
-    they become alpha.
+    pictures: by file name; a fourth channel is their mask, 0 where a pixel does not count.
     """
     with atomic_folder(path) as part:
         (part / "images").mkdir()
         for name, image in pictures:
-            cover = covers.get(name) if covers else None
-            image_files.write_png(part / "images" / name, image if cover is None else np.dstack([image, cover]))
+            image_files.write_png(part / "images" / name, image)
         (part / "sparse").mkdir()
         write_colmap_model(model, part / "sparse")
         if lenses:
             write_lenses(part, lenses)
         write_scene_frame(part / "ground.json", frame)
-
-
-def undistort_masks(found: Registration, folder: Path | str) -> dict[str, Float32[Array, "h w"]]:
-    """Masks of a registration's pictures, by name: 1 where a picture counts, 0 where it does not.
-
-    Masks are pictures named as their photos, black where the photo must not become ground, such as
-    on cars, people or the photographer's shadow. The fit finds objects that move between photos
-    without masks.
-    Raises: InputError: no folder, a mask of another shape than its photo, or none that belongs to a
-    photo.
-    """
-    listed = {path.stem: path for path in image_files.list_photos(folder)}
-    covers = {}
-    for i, (name, source) in enumerate(zip(found.model.names, found.sources, strict=True)):
-        path = listed.get(source.stem) or listed.get(source.name)  # as COLMAP names them: photo.jpg.png
-        if path is None:
-            continue
-        mask, (width, height) = image_files.read_photo(path), image_files.read_size(source)
-        if abs(mask.shape[1] * height / (mask.shape[0] * width) - 1) > ASPECT:
-            raise InputError(f"{path}: is {mask.shape[1]} x {mask.shape[0]}, its photo {width} x {height}; same shape")
-        lens = found.lenses[i]
-        rows = (np.arange(lens.height) + 0.5) * mask.shape[0] // lens.height
-        columns = (np.arange(lens.width) + 0.5) * mask.shape[1] // lens.width
-        there = mask[rows.astype(int)][:, columns.astype(int)].mean(-1, keepdims=True) >= HALF
-        seen = undistort_photo(np.repeat(there.astype(np.float32), 3, axis=2), lens, found.model.cameras[i])[..., 0]
-        covers[name] = minimum_filter((seen > HALF).astype(np.float32), 2 * MARGIN + 1)
-    if not covers:
-        raise InputError(f"{folder}: no mask is named like a photo; name each as its photo, as IMG_1.png for IMG_1.jpg")
-    _log.info("masks: %d of %d photos have one", len(covers), len(found.model.names))
-    return covers
 
 
 def _list_lenses(found: Registration) -> list[Lens]:

@@ -1,17 +1,16 @@
 """What somebody brings, recognised by what is in it: photos, a video, a splat, or another program's project."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dav_gswt.errors import InputError
 from dav_gswt.images.file_kinds import Kind, detect_kind
+from dav_gswt.photos.photo_listing import PICTURES, PhotoListing, list_photos
 
 LEAST_PHOTOS = 3
-PICTURES: tuple[Kind, ...] = ("photo", "heif", "raw")
 SPLATS: tuple[Kind, ...] = ("ply", "spz", "splat", "ksplat", "sog")
-MASK_FOLDERS = {"masks", "mask"}
 COLMAP_FILES = ("cameras.bin", "cameras.txt")
 OPENSFM_FILES = ("opensfm/reconstruction.json", "reconstruction.json")
 SPLAT_PROPERTY = b"property float f_dc_0"  # in the head of a .ply: it holds Gaussians
@@ -28,18 +27,6 @@ class Recognised:
     name: str
 
 
-@dataclass
-class _Found:
-    """The files of a folder and its subfolders, by kind. Hidden files and folders of masks are left out."""
-
-    files: dict[Kind, list[Path]] = field(default_factory=dict)
-    models: list[tuple[str, Path]] = field(default_factory=list)  # program, and what it wrote
-    masks: Path | None = None
-
-    def list(self, *kinds: Kind) -> list[Path]:
-        return [path for kind in kinds for path in self.files.get(kind, [])]
-
-
 def recognize_input(paths: Sequence[Path], model: Path | None = None) -> Recognised:
     """What the paths are. model: a camera model that lies elsewhere.
 
@@ -51,13 +38,12 @@ def recognize_input(paths: Sequence[Path], model: Path | None = None) -> Recogni
     if len(paths) == 1:
         name = name_scene(paths[0])
         return _recognize_folder(paths[0], name, model) if paths[0].is_dir() else _recognize_file(paths[0], name)
-    kinds = {detect_kind(path) for path in paths if path.is_file()}
     if other := [path for path in paths if path.is_file() and detect_kind(path) not in PICTURES]:
         raise InputError(f"{other[0]}: is no photo; several inputs must be photos or folders of photos")
-    photos = [file for path in paths for file in (_search(path).list(*PICTURES) if path.is_dir() else [path])]
+    listing = list_photos([path.resolve() for path in paths])
+    _require_photos(listing)
     entry = {"kind": "photos", "folder": [str(path.resolve()) for path in paths]}
-    _require_photos(photos, ", ".join(path.name for path in paths))
-    return Recognised(entry | _name_model(model), _describe_photos(photos, kinds), name_scene(paths[0]))
+    return Recognised(entry | _name_model(model), _describe_photos(listing), name_scene(paths[0]))
 
 
 def name_scene(path: Path) -> str:
@@ -92,10 +78,13 @@ def holds_gaussians(path: Path) -> bool:
 
 
 def _recognize_folder(folder: Path, name: str, model: Path | None) -> Recognised:
-    found = _search(folder)
-    photos, videos = found.list(*PICTURES), found.list("video")
-    splats = [path for path in found.list(*SPLATS) if path.suffix.lower() != ".ply" or holds_gaussians(path)]
-    models = [("the model", model)] if model else found.models
+    found_models = _find_models(folder)
+    listing = list_photos(folder / "images" if found_models and (folder / "images").is_dir() else folder)
+    photos, files = list(listing.photos.values()), listing.files
+    stills = {path.with_suffix("") for path in photos}
+    videos = [path for path in files.get("video", []) if path.with_suffix("") not in stills]  # no live photo
+    splats = [path for kind in SPLATS for path in files.get(kind, []) if kind != "ply" or holds_gaussians(path)]
+    models = [("the model", model)] if model else found_models
     if len(models) > 1:
         names = " and ".join(f"{program} ({path.relative_to(folder)})" for program, path in models)
         raise InputError(f"{folder}: has cameras of {names}; say which with --model PATH")
@@ -111,52 +100,47 @@ def _recognize_folder(folder: Path, name: str, model: Path | None) -> Recognised
         if len(videos or splats) > 1:
             raise InputError(f"{folder}: has several, {', '.join(p.name for p in (videos or splats)[:3])}; name one")
         return _recognize_file((videos or splats)[0], name)
-    _require_photos(photos, str(folder))
+    _require_photos(listing)
     entry = {"kind": "photos", "folder": str(folder.resolve())}
-    about = _describe_photos(photos, set(found.files))
+    about = _describe_photos(listing)
     if models:
         program, place = models[0]
         entry, about = entry | _name_model(place), f"{about} with cameras of {program}"
         images = folder / "images"
         entry["folder"] = str((images if images.is_dir() and program != "nerfstudio" else folder).resolve())
-    if found.masks:
-        entry, about = entry | {"masks": str(found.masks.resolve())}, f"{about} and masks"
+    if listing.masks:
+        about += " and masks"
     return Recognised(entry, about, name)
 
 
-def _search(folder: Path) -> _Found:
-    found = _Found()
+def _find_models(folder: Path) -> list[tuple[str, Path]]:
+    """The camera models in a folder: the program, and what it wrote."""
+    models = []
     if any((folder / name).is_file() for name in COLMAP_FILES):
-        found.models.append(("COLMAP", folder))
+        models.append(("COLMAP", folder))
     else:
         sparse = [folder / "sparse", *sorted((folder / "sparse").glob("[0-9]*"))]
-        models = [place for place in sparse if any((place / name).is_file() for name in COLMAP_FILES)]
-        found.models += [("COLMAP", place) for place in models[:1]]
-    found.models += [("nerfstudio", folder / "transforms.json")] * (folder / "transforms.json").is_file()
+        found = [place for place in sparse if any((place / name).is_file() for name in COLMAP_FILES)]
+        models += [("COLMAP", place) for place in found[:1]]
+    models += [("nerfstudio", folder / "transforms.json")] * (folder / "transforms.json").is_file()
     opensfm = [folder / name for name in OPENSFM_FILES if (folder / name).is_file()]
-    found.models += [("OpenSfM", place) for place in opensfm[:1]]
-    inside = folder / "images" if found.models and (folder / "images").is_dir() else folder
-    for path in sorted(inside.rglob("*")):
-        parts = path.relative_to(inside).parts
-        if any(part.startswith(".") for part in parts) or not path.is_file():
-            continue
-        if MASK_FOLDERS & {part.lower() for part in parts[:-1]}:
-            continue
-        found.files.setdefault(detect_kind(path), []).append(path)
-    found.masks = next((folder / name for name in sorted(MASK_FOLDERS) if (folder / name).is_dir()), None)
-    return found
+    return models + [("OpenSfM", place) for place in opensfm[:1]]
 
 
 def _name_model(model: Path | None) -> dict[str, str]:
     return {"model": str(model.resolve())} if model else {}
 
 
-def _require_photos(photos: list[Path], where: str) -> None:
-    if len(photos) < LEAST_PHOTOS:
-        had = f"only {len(photos)} photos" if photos else "no photos"
-        raise InputError(f"{where}: {had}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20")
+def _require_photos(listing: PhotoListing) -> None:
+    count = len(listing.photos)
+    if count < LEAST_PHOTOS:
+        had = f"only {count} photos" if count else "no photos"
+        notes = "".join(f" ({note})" for note in listing.notes)
+        raise InputError(
+            f"{listing.where}: {had}{notes}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20"
+        )
 
 
-def _describe_photos(photos: list[Path], kinds: set[Kind]) -> str:
-    extra = [name for kind, name in (("heif", "HEIC"), ("raw", "raw")) if kind in kinds]
-    return f"{len(photos)} photos" + (f" ({' and '.join(extra)} among them)" if extra else "")
+def _describe_photos(listing: PhotoListing) -> str:
+    extra = ["HEIC"] * ("heif" in listing.files) + ["raw"] * ("raw" in listing.files)
+    return f"{len(listing.photos)} photos" + (f" ({' and '.join(extra)} among them)" if extra else "")

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 
 TEST_SHARE = 0.1  # of the photos
-LEAST_TEST = 2
-LEAST_WITH_TEST = 6  # photos, below which none can be spared for testing
+LEAST_WITH_TEST = 12  # photos, below which none is spared for testing unless asked for
+ENOUGH = 10  # photos that show the exemplar: with fewer, the others take part, too
+LEAST_START = 2  # photos that must be left beside those that test
 MIN_VISIBLE_SHARE = 0.05  # of the ground that an image must see, or
 MIN_PICTURE_SHARE = 0.5  # so much of its picture must show that ground, which may be wider than many pictures
 LINK = 30  # points that a start view shares with one chosen before: enough to fix its place among them
@@ -38,6 +39,16 @@ class ViewSplit:
     test: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class SplitOptions:
+    """start: photos of the first fit; None: all that are left. test: photos to set aside; None: one in ten, and none
+    of fewer than LEAST_WITH_TEST. whole: all ground counts, not only the exemplar."""
+
+    start: int | None = None
+    test: int | None = None
+    whole: bool = False
+
+
 def write_view_split(path: Path | str, split: ViewSplit) -> None:
     """Write views.json."""
     write_json(path, asdict(split))
@@ -48,25 +59,23 @@ def read_view_split(path: Path | str) -> ViewSplit:
     return read_record(path, ViewSplit, "make it again")
 
 
-def split_views(
-    model: "ColmapModel", frame: SceneFrame, start: int, rng: np.random.Generator, whole: bool = False
-) -> ViewSplit:
+def split_views(model: "ColmapModel", frame: SceneFrame, options: SplitOptions, rng: np.random.Generator) -> ViewSplit:
     """Names of the start views, the pool and the test views.
 
     Images that show too little of the exemplar, or with `whole` of all ground, take no part unless
     too few would remain. Test views are those that ground.json names, else the same for every seed.
     `start` of the others start, if there are so many.
-    Raises: InputError: ground.json names a test view that is no image, or no view is left to start from.
+    Raises: InputError: ground.json names a test view that is no image, or too few are left to start from.
     """
     if unknown := [name for name in frame.test or () if name not in model.names]:
         raise InputError(f"ground.json: test view {unknown[0]} is not among the images")
-    part = frame.extent if whole else frame.exemplar
+    part = frame.extent if options.whole else frame.exemplar
     ground = (part.west, part.south, part.east, part.north)
     sees = [i for i, camera in enumerate(model.cameras) if shows_enough(camera, ground)]
-    enough = len(sees) >= min(start, LEAST_WITH_TEST + LEAST_TEST) + LEAST_TEST
+    enough = len(sees) >= min((options.start or ENOUGH) + 2, ENOUGH)
     among = sees if enough else list(range(len(model.names)))
     if frame.test is None:
-        test = choose_test_views(model, ground, among)
+        test = choose_test_views(model, ground, among, options.test)
     else:
         test = [model.names.index(name) for name in frame.test]
     others = [i for i in among if i not in test]
@@ -74,21 +83,26 @@ def split_views(
         raise InputError("every image is a test view; leave some to start from")
     if len(among) < len(model.names):
         _log.info("%d of %d images show enough of the ground to take part", len(among), len(model.names))
-    first = choose_start_views(model, others, start, rng)
+    first = choose_start_views(model, others, options.start or len(others), rng)
     pool = [i for i in others if i not in first]
     return ViewSplit(*(tuple(model.names[i] for i in part) for part in (first, pool, test)))
 
 
-def choose_test_views(model: "ColmapModel", ground: Bounds, among: list[int]) -> list[int]:
-    """Test views that are spread over the inner half of the ground (by area), if enough images look
-    there: about one image in ten, at least two, none of few.
+def choose_test_views(model: "ColmapModel", ground: Bounds, among: list[int], count: int | None = None) -> list[int]:
+    """Test views that are spread over the inner half of the ground (by area), if enough images look there.
+
+    count: of them; None: one image in ten, none of fewer than LEAST_WITH_TEST.
 
     At the border few other images see the same ground, so a test there would measure the border.
     The first view looks nearest to the middle, each next one is the farthest from those before.
+    Raises: InputError: more than can be spared.
     """
-    if len(among) < LEAST_WITH_TEST:
+    if count is None:
+        count = round(TEST_SHARE * len(among)) if len(among) >= LEAST_WITH_TEST else 0
+    if not count:
         return []
-    count = max(LEAST_TEST, round(TEST_SHARE * len(among)))
+    if count > len(among) - LEAST_START:
+        raise InputError(f"test: {count} of {len(among)} photos cannot be set aside: {LEAST_START} must be left to fit")
     low, high = np.reshape(ground, (2, 2))
     aims = np.stack([find_aim_point(camera) for camera in model.cameras])
     off = (np.abs(aims - (low + high) / 2) / (high - low)).max(1)

@@ -23,6 +23,7 @@ from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.opensfm import import_opensfm
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder, match_photos_to_images
 from dav_gswt.photos.importers.points import triangulate_features
+from dav_gswt.photos.photo_listing import Source
 from dav_gswt.photos.sfm.gps import GpsPositions
 from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions, replace_lenses
@@ -32,7 +33,7 @@ __all__ = ["import_model"]
 _log = logging.getLogger(__name__)
 
 
-def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> Registration:
+def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Registration:
     """The photos of a folder with the cameras of a model.
 
     A photo belongs to the image of the same name: the path below the folder, else the stem. It may
@@ -40,12 +41,12 @@ def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> R
     sees them. Otherwise they are triangulated from features under the given cameras.
     Raises: InputError: not a model, damaged, one that is not read, or fewer than three photos have a camera in it.
     """
-    path, photos = Path(path), PhotoFolder(Path(folder))
+    path, photos = Path(path), PhotoFolder(folder)
     given = _read_model(path, photos)
     placed, left_out = match_photos_to_images(given, photos, path)
     if len(placed) < LEAST_PHOTOS:
         raise InputError(
-            f"{path}: {len(placed)} of its {len(given.images)} images have a photo in {folder}; at least "
+            f"{path}: {len(placed)} of its {len(given.images)} images have a photo in {photos.folder}; at least "
             f"{LEAST_PHOTOS} are needed: give the folder of the photos that the model was made of, under the same names"
         )
     for name, reason in left_out:

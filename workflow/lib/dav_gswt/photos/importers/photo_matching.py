@@ -1,6 +1,7 @@
 """Matching of the photos in a folder with the images of an imported model, by their names."""
 
-import re
+import logging
+import unicodedata
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -12,6 +13,9 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel
 from dav_gswt.photos.importers.lens_models import fit_camera_to_photo
 from dav_gswt.photos.photo_files import name_pictures, split_stem
+from dav_gswt.photos.photo_listing import Source, drop_twins, list_photos
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -29,24 +33,23 @@ class MatchedPhoto:
 
 
 class PhotoFolder:
-    """The photos below a folder, by their path relative to it."""
+    """The photos below a folder (`list_photos`), by their path relative to it with composed letters (NFC)."""
 
-    def __init__(self, folder: Path):
-        if not folder.is_dir():
-            raise InputError(f"{folder}: there is no such folder of photos")
-        self.folder = folder
-        files = (path for path in sorted(folder.rglob("*")) if path.is_file())
-        found = (path for path in files if path.suffix.lower() in image_files.SUFFIXES)
-        names = {path.relative_to(folder).as_posix(): path for path in found}
-        self.photos = {name: path for name, path in names.items() if not re.search(r"(^|/)\.", name)}
+    def __init__(self, source: Source):
+        listing = list_photos(source)
+        self.folder = Path(source if isinstance(source, Path | str) else source[0])
+        for note in listing.notes:
+            _log.warning("%s", note)
+        self.photos = listing.photos
         if not self.photos:
-            raise InputError(f"{folder}: no photos in this folder; put .jpg, .png or .tif files into it")
+            raise InputError(f"{listing.where}: no photos in this folder; put .jpg, .png or .tif files into it")
         self._stems: dict[str, list[str]] = defaultdict(list)
         for name in self.photos:
             self._stems[split_stem(name)].append(name)
 
     def find(self, name: str) -> str | None:
         """The photo of that name: the same path, else the only one with that stem."""
+        name = unicodedata.normalize("NFC", name)
         if name in self.photos:
             return name
         found = self._stems.get(split_stem(name), [])
@@ -81,7 +84,9 @@ def match_photos_to_images(
         if name not in owners and PurePosixPath(name).parent in homes:
             left_out.append((name, "the model has no camera for it"))
     out = []
-    names = sorted(owners)
+    kept, twins = drop_twins({name: folder.photos[name] for name in owners})
+    left_out += [(name, f"a copy of {twin}, which counts once") for name, twin in twins.items()]
+    names = sorted(kept)
     for name, key in zip(names, name_pictures(names), strict=True):
         image, path = owners[name], folder.photos[name]
         width, height, orientation = image_files.read_stored_size(path)

@@ -7,7 +7,7 @@ and its random numbers start from the seed. Mapping uses one thread. So a run re
 
 import logging
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +24,7 @@ from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import ColmapModel, intersect_rays, model_from_reconstruction
 from dav_gswt.photos.lenses import undistort_photo
 from dav_gswt.photos.photo_files import convert_equivalent, name_pictures, read_focal_length
+from dav_gswt.photos.photo_listing import PhotoListing, Source, drop_twins, list_photos
 from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
 from dav_gswt.photos.sfm.gps import GpsPositions, align_to_gps, read_gps_positions
 from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS, SfmPhoto, SfmScene, find_solution
@@ -74,30 +75,31 @@ class Registration:
     verdict: SfmVerdict | None = None
 
 
-def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
-    """Register the photos that lie in a folder.
+def register_photos(source: Source, options: SfmOptions) -> Registration:
+    """Register the photos of a folder and its subfolders (`list_photos`), each content once.
 
-    One radial distortion term a camera. Where EXIF has a focal length it is held, unless the photos fix it (see
-    `focal`). GPS positions give metres and north, where the photos have them and agree (see `gps`).
-    Raises: InputError: no folder or no photos, fewer than three, one that cannot be read, they do not overlap, or a
+    Photos that cannot be read are left out, with the reason. One radial distortion term a camera. Where EXIF has a
+    focal length it is held, unless the photos fix it (see `focal`). GPS positions give metres and north, where the
+    photos have them and agree (see `gps`).
+    Raises: InputError: no folder or no photos, fewer than three that can be read, they do not overlap, or a
     model that the verdict refuses or that is degenerate, with the reason.
     """
-    paths = image_files.list_photos(folder)
-    if len(paths) < LEAST_PHOTOS:
-        names = " and ".join(p.name for p in paths)
-        raise InputError(f"{folder}: only {names}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20")
-    keys = name_pictures([path.name for path in paths])
-    photos = [_describe_photo(path, key, options) for path, key in zip(paths, keys, strict=True)]
-    positions = read_gps_positions(paths)
+    listing = list_photos(source)
+    unreadable: dict[str, str] = {}
     with tempfile.TemporaryDirectory(prefix="sfm-") as scratch:
         database = Path(scratch) / "database.db"
-        _write_shrunk_photos(photos, Path(scratch), options.threads)
+        photos = _describe_photos(select_photos(listing), options, unreadable)
+        photos = _write_shrunk_photos(photos, Path(scratch), options.threads, unreadable)
+        for reason in unreadable.values():
+            _log.warning("left out: %s", reason)
+        require_photos(listing, [photo.path.name for photo in photos], unreadable)
+        keys, positions = [p.key for p in photos], read_gps_positions([photo.path for photo in photos])
         with closing(pycolmap.Database.open(database)) as store:
             held = _enter_images(photos, store)
         extract_features(Path(scratch), database, options.size, options.features, options.threads)
         match_photos(len(photos), database, NEIGHBOURS, options.threads, options.seed)
         gps = dict(zip(keys, positions.at, strict=True)) if positions else {}
-        solution = find_solution(SfmScene(folder, photos, held, gps, database), options.seed)
+        solution = find_solution(SfmScene(listing.where, photos, held, gps, database), options.seed)
     for name, reason in solution.left_out:
         _log.warning("%s is left out: %s", name, reason)
     _log.info("focal length: %s", solution.focal.decision)
@@ -116,7 +118,7 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
         model,
         tuple(by_key[name] for name in model.names),
         lenses,
-        solution.left_out,
+        (*unreadable.items(), *solution.left_out),
         solution.focal,
         float(solution.best.compute_mean_reprojection_error()),
         positions,
@@ -134,20 +136,60 @@ def require_parallax(spread: Float[Array, "n"]) -> None:
 
 
 def undistort_image(registered: Registration, index: int) -> Float32[Array, "h w 3"]:
-    """The picture of the model's image `index`: the photo as a pinhole camera would have taken it.
+    """The picture of the model's image `index`: the photo as a pinhole camera would have taken it."""
+    return undistort_pixels(registered, index, image_files.read_photo(registered.sources[index]))
+
+
+def undistort_pixels(registered: Registration, index: int, photo: Float32[Array, "m n 3"]) -> Float32[Array, "h w 3"]:
+    """The picture of the model's image `index`, of its photo.
 
     The photo is shrunk by area means to the picture's resolution, then sampled (`undistort_photo`).
     """
     lens, camera = registered.lenses[index], registered.model.cameras[index]
-    photo = image_files.shrink_image(image_files.read_photo(registered.sources[index]), lens.width, lens.height)
-    return undistort_photo(photo, lens, camera)
+    return undistort_photo(image_files.shrink_image(photo, lens.width, lens.height), lens, camera)
 
 
-def _describe_photo(path: Path, key: str, options: SfmOptions) -> SfmPhoto:
-    full = image_files.read_size(path)
-    width, height = image_files.fit_size(*full, options.size)
-    pixels = convert_equivalent(options.focal, *full) if options.focal else read_focal_length(path)
-    return SfmPhoto(path, key, full, width, height, pixels and pixels * width / full[0])
+def select_photos(listing: PhotoListing) -> dict[str, Path]:
+    """The photos of a listing by name, each content once. What is skipped is said in the log."""
+    for note in listing.notes:
+        _log.warning("%s", note)
+    photos, twins = drop_twins(listing.photos)
+    if twins:
+        copy, kept = next(iter(twins.items()))
+        _log.warning(
+            "%d of %d photos are copies (%s of %s): each counts once", len(twins), len(listing.photos), copy, kept
+        )
+    return photos
+
+
+def require_photos(listing: PhotoListing, names: Sequence[str], unreadable: Mapping[str, str]) -> None:
+    """Raises: InputError: fewer photos than structure from motion needs, with what became of the others."""
+    if len(names) >= LEAST_PHOTOS:
+        return
+    if unreadable:
+        raise InputError(f"{next(iter(unreadable.values()))} (at least {LEAST_PHOTOS} photos are needed, better 20)")
+    if names:
+        only = " and ".join(names)
+        raise InputError(
+            f"{listing.where}: only {only}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20"
+        )
+    hint = f" ({listing.notes[0]})" if listing.notes else ""
+    raise InputError(f"{listing.where}: no photos in this folder{hint}; put .jpg, .png, .tif or .heic files into it")
+
+
+def _describe_photos(paths: Mapping[str, Path], options: SfmOptions, unreadable: dict[str, str]) -> list[SfmPhoto]:
+    """The photos that can be read. unreadable: gets the others, with the reason."""
+    photos = []
+    for (name, path), key in zip(paths.items(), name_pictures(list(paths)), strict=True):
+        try:
+            full = image_files.read_size(path)
+        except InputError as error:
+            unreadable[name] = str(error)
+            continue
+        width, height = image_files.fit_size(*full, options.size)
+        pixels = convert_equivalent(options.focal, *full) if options.focal else read_focal_length(path)
+        photos.append(SfmPhoto(path, key, full, width, height, pixels and pixels * width / full[0]))
+    return photos
 
 
 def _enter_images(photos: list[SfmPhoto], store: pycolmap.Database) -> dict[int, float]:
@@ -169,16 +211,27 @@ def _enter_images(photos: list[SfmPhoto], store: pycolmap.Database) -> dict[int,
     return held
 
 
-def _write_shrunk_photos(photos: list[SfmPhoto], folder: Path, threads: int) -> None:
-    """Write what features are looked for in: the photos shrunk by area means, grey by Rec. 601."""
+def _write_shrunk_photos(
+    photos: list[SfmPhoto], folder: Path, threads: int, unreadable: dict[str, str]
+) -> list[SfmPhoto]:
+    """Write what features are looked for in: the photos shrunk by area means, grey by Rec. 601.
 
-    def write(photo: SfmPhoto) -> None:
-        image = image_files.shrink_image(image_files.read_photo(photo.path), photo.width, photo.height)
+    Returns the photos that can be read. unreadable: gets the others, with the reason.
+    """
+
+    def write(photo: SfmPhoto) -> str | None:
+        try:
+            image = image_files.shrink_image(image_files.read_photo(photo.path), photo.width, photo.height)
+        except InputError as error:
+            return str(error)
         grey = image @ np.array([0.299, 0.587, 0.114], np.float32)
         image_files.write_png(folder / photo.key, np.repeat(grey[..., None], 3, axis=2))
+        return None
 
-    for _ in map_ahead(write, progress(photos, "read photos"), threads):
-        pass
+    reasons = list(map_ahead(write, progress(photos, "read photos"), threads))
+    pairs = list(zip(photos, reasons, strict=True))
+    unreadable |= {photo.path.name: reason for photo, reason in pairs if reason}
+    return [photo for photo, reason in pairs if not reason]
 
 
 def replace_lenses(

@@ -1,0 +1,81 @@
+"""Which files are a scene's photos and masks, under whatever names and in whatever folders."""
+
+import os
+import unicodedata
+from pathlib import Path
+
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.photos.photo_listing import drop_twins, list_photos
+
+JPEG, HEIC, TIFF = b"\xff\xd8\xff\xe0", b"\0\0\0\x18ftypheic" + b"0" * 40, b"II*\0"
+
+
+def write(folder, *names, content=JPEG):
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+
+
+def masks(listing) -> dict[str, str]:
+    return {photo.name: "/".join(mask.parts[-2:]) for photo, mask in listing.masks.items()}
+
+
+def test_photos_lie_in_subfolders_and_hidden_files_other_files_and_terrains_are_none(tmp_path):
+    write(tmp_path, "b.JPG", "101MEDIA/a.jpg", ".hidden.jpg", ".trash/c.jpg", "notes.txt", "old-terrain/page/d.jpg")
+    write(tmp_path, "notes.txt", "old-terrain/scene.yaml", "empty.jpg", content=b"")
+    listing = list_photos(tmp_path)
+    assert list(listing.photos) == ["101MEDIA/a.jpg", "b.JPG", "empty.jpg"]  # a damaged photo is reported, not hidden
+    assert [path.name for path in listing.files["other"]] == ["notes.txt"] and not listing.notes
+    with pytest.raises(InputError, match="nowhere: there is no such folder"):
+        list_photos(tmp_path / "nowhere")
+
+
+def test_several_folders_and_files_are_one_set(tmp_path):
+    write(tmp_path, "one/1.jpg", "two/1.jpg", "3.jpg")
+    listing = list_photos([tmp_path / "one", tmp_path / "two", tmp_path / "3.jpg"])
+    assert list(listing.photos) == ["one/1.jpg", "two/1.jpg", "3.jpg"]
+
+
+def test_a_raw_photo_or_heic_beside_its_jpeg_is_the_same_picture(tmp_path):
+    write(tmp_path, "1.jpg", "2.jpg", "day2/3.jpg")
+    write(tmp_path, "1.dng", "3.dng", content=TIFF)
+    write(tmp_path, "2.heic", content=HEIC)
+    listing = list_photos(tmp_path)
+    assert list(listing.photos) == ["1.jpg", "2.jpg", "3.dng", "day2/3.jpg"]
+    assert "2 HEIC or raw photos lie beside" in listing.notes[0]
+
+
+def test_masks_beside_photos_in_a_folder_in_it_and_in_one_beside_images(tmp_path):
+    write(tmp_path, "a/1.JPG", "a/1_mask.JPG", "a/old_mask.jpg", "b/masks/1.png", "b/1.jpg")
+    write(tmp_path, "c/images/s/1.jpg", "c/images/t/1.jpg", "c/masks/s/1.jpg.png", "c/masks/t/1.jpg.png")
+    one = list_photos(tmp_path / "a")
+    assert list(one.photos) == ["1.JPG", "old_mask.jpg"] and masks(one) == {"1.JPG": "a/1_mask.JPG"}
+    assert masks(list_photos(tmp_path / "b")) == {"1.jpg": "masks/1.png"}
+    pairs = list_photos(tmp_path / "c/images").masks.items()
+    assert [(photo.parent.name, mask.parent.name) for photo, mask in pairs] == [("s", "s"), ("t", "t")]
+    assert masks(list_photos(tmp_path / "a", tmp_path / "b/masks")) == {"1.JPG": "masks/1.png"}
+    write(tmp_path, "b/masks/1.png", "d/masks/other.png", "d/1.jpg")
+    assert "belongs to no photo" in list_photos(tmp_path / "d").notes[0]
+
+
+def test_a_name_that_is_no_utf8_is_named_and_skipped_and_letters_are_composed(tmp_path):
+    decomposed = unicodedata.normalize("NFD", "düne.jpg")
+    write(tmp_path, decomposed, "{a} b.jpg")
+    try:
+        Path(os.fsdecode(bytes(tmp_path) + b"/d\xfcne.jpg")).write_bytes(JPEG)
+    except OSError:
+        pytest.skip("this file system takes no such name")
+    listing = list_photos(tmp_path)
+    assert set(listing.photos) == {"düne.jpg", "{a} b.jpg"}
+    assert listing.photos["düne.jpg"].name == decomposed
+    assert r"1 files are skipped: their names are no UTF-8, such as d\xfcne.jpg" in listing.notes[0]
+
+
+def test_each_content_counts_once_under_the_shortest_name(tmp_path):
+    write(tmp_path, "IMG_1 (1).jpg", "IMG_1.jpg", "b/IMG_1.jpg")
+    write(tmp_path, "IMG_2.jpg", content=JPEG + b"2")
+    kept, twins = drop_twins(list_photos(tmp_path).photos)
+    assert list(kept) == ["IMG_1.jpg", "IMG_2.jpg"]
+    assert twins == {"IMG_1 (1).jpg": "IMG_1.jpg", "b/IMG_1.jpg": "IMG_1.jpg"}
