@@ -19,7 +19,9 @@ from dav_gswt.images.file_kinds import HEIF_SUFFIXES, RAW_SUFFIXES, SUFFIXES, de
 FILM_DIAGONAL = 43.2666  # mm, of a 36 x 24 mm frame: "35 mm equivalent" compares diagonals
 WIDEST = 1.55  # photos wider than a 3:2 sensor are cropped from a 4:3 sensor, whose diagonal the equivalent refers to
 UNITS = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # FocalPlaneResolutionUnit in millimetres
-UNSAFE = re.compile(r"[\s#]+")  # COLMAP's lists of images end a name at a blank and skip lines that begin with #
+UNSAFE = re.compile(
+    r"[\s#{}<>]+"
+)  # COLMAP's lists end a name at a blank and skip lines with #; Snakemake has {} and <>
 
 
 def read_focal_length(path: Path | str) -> float | None:
@@ -127,7 +129,7 @@ def name_pictures(names: Sequence[str]) -> list[str]:
     """The PNG that is made of each photo: its stem, or its whole path if stems are equal, and a
     number if need be.
 
-    Blanks and # become _, so that a name is one word in every list of images.
+    Blanks, #, braces and < > become _, so that a name is one word in every list of images.
     """
     safe = [UNSAFE.sub("_", name) for name in names]
     stems = Counter(split_stem(name) for name in safe)

@@ -58,35 +58,38 @@ def list_photos(source: Source, masks: Path | str | None = None) -> PhotoListing
     """
     places = [Path(each) for each in ([source] if isinstance(source, Path | str) else source)]
     given = _list_files(Path(masks)) if masks else None
-    photos, covers, files, notes = {}, {}, defaultdict(list), []
+    groups, shared = defaultdict[Path, list[_File]](list), list[_File]()
     for place in places:
-        found, unnamed = [], []
-        for file in _list_files(place):
-            (found if _is_utf8(file.name) else unnamed).append(file)
-        pictures, own_masks = _part_masks([file for file in found if file.kind in PICTURES])
-        own_masks += _list_masks_beside(place)
+        files = _list_files(place)
+        if len(places) > 1 and place.is_dir() and place.name.lower() in MASK_FOLDERS:
+            shared += files
+        else:
+            groups[place if place.is_dir() else place.parent] += files
+    photos, covers, kinds, notes = {}, {}, defaultdict(list), []
+    for top, files in groups.items():
+        named = [file for file in files if _is_utf8(file.name)]
+        pictures, own_masks = _part_masks([file for file in named if file.kind in PICTURES])
+        own_masks += shared + _list_masks_beside(top)
         kept = _drop_other_copies(pictures)
         matched = match_masks(kept, own_masks if given is None else given)
         if own_masks and not matched and given is None:
             notes.append(f"{own_masks[0].path}: a mask that belongs to no photo; name each as its photo")
         covers |= matched
         for file in kept:
-            name = f"{place.name}/{file.name}" if len(places) > 1 and place.is_dir() else str(file.name)
+            name = f"{top.name}/{file.name}" if len(groups) > 1 else str(file.name)
             while name in photos:
                 name = f"_/{name}"
             photos[name] = file.path
-        for file in kept + [file for file in found if file.kind not in PICTURES]:
-            files[file.kind].append(file.path)
+        for file in kept + [file for file in named if file.kind not in PICTURES]:
+            kinds[file.kind].append(file.path)
         if skipped := len(pictures) - len(kept):
             notes.append(
-                f"{place}: {skipped} HEIC or raw photos lie beside a JPEG or PNG of the same name: that is read"
+                f"HEIC and raw photos beside a JPEG or PNG of the same name, which is read, are skipped: {skipped}"
             )
-        if unnamed:
+        if unnamed := [file for file in files if not _is_utf8(file.name)]:
             name = os.fsencode(unnamed[0].name).decode(errors="backslashreplace")
-            notes.append(
-                f"{place}: {len(unnamed)} files are skipped: their names are no UTF-8, such as {name}; rename them"
-            )
-    return PhotoListing(", ".join(map(str, places)), photos, covers, dict(files), tuple(notes))
+            notes.append(f"files whose names are no UTF-8 are skipped: {len(unnamed)}, such as {name}; rename them")
+    return PhotoListing(", ".join(map(str, places)), photos, covers, dict(kinds), tuple(notes))
 
 
 def locate_source(folder: str | Sequence[str]) -> list[Path]:
