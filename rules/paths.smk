@@ -1,6 +1,5 @@
 """Shared by all stages: the checked config, the result tree (dav_gswt.paths), and what a scene's targets are."""
 
-import os
 import re
 from pathlib import Path
 
