@@ -41,20 +41,23 @@ def find_borders(sources: Sequence[Path]) -> dict[Size, Bool[Array, "_ _"]]:
     """False where all photos of a size are black from the border inwards, as undistorted photos are beside their
     picture; True elsewhere. Sizes whose photos fill their frame are left out.
     """
-    sizes = defaultdict(list)
+    sizes = defaultdict[Size, list[Path]](list)
     for path in sources:
         sizes[image_files.read_size(path)].append(path)
     out = {}
-    for size, paths in sizes.items():
+    for (width, height), paths in sizes.items():
         if len(paths) < FEWEST:
             continue
-        empty, step = np.ones(image_files.fit_size(*size, BORDER_SIDE)[::-1], bool), max(1, len(paths) // LOOKED_AT)
+        empty, step = (
+            np.ones(image_files.fit_size(width, height, BORDER_SIDE)[::-1], bool),
+            max(1, len(paths) // LOOKED_AT),
+        )
         for path in paths[::step][:LOOKED_AT]:
             empty &= find_black_border(image_files.shrink_to(image_files.read_photo(path), BORDER_SIDE))
             if empty.mean() < LEAST_BORDER:  # nearly always after the first photo
                 break
         else:
-            out[size] = ndimage.minimum_filter(~empty, 3)
+            out[width, height] = ndimage.minimum_filter(~empty, 3)
     return out
 
 
