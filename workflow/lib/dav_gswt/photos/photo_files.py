@@ -1,5 +1,6 @@
 """The files of photos: what their EXIF says (focal length, position, time), and names for the pictures made of them."""
 
+import logging
 import math
 import re
 from collections import Counter
@@ -15,6 +16,8 @@ from exifread.utils import Ratio
 from dav_gswt.images import image_files
 from dav_gswt.images.camera_formats import read_heif_exif
 from dav_gswt.images.file_kinds import HEIF_SUFFIXES, RAW_SUFFIXES, SUFFIXES, detect_kind
+
+logging.getLogger("exifread").setLevel(logging.ERROR)  # it warns of every picture without EXIF
 
 FILM_DIAGONAL = 43.2666  # mm, of a 36 x 24 mm frame: "35 mm equivalent" compares diagonals
 WIDEST = 1.55  # photos wider than a 3:2 sensor are cropped from a 4:3 sensor, whose diagonal the equivalent refers to
