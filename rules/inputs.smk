@@ -169,12 +169,20 @@ def branch(scene, policy=None, changes=None):
 def source_photos(wildcards):
     """A scene's photos and what its entry names beside them: masks, a model of another program."""
     scene, where = config["scenes"][wildcards.scene], f"scenes.{wildcards.scene}"
-    found = {"photos": files_in(scene["folder"], f"{where}.folder")}
+    if locate_path(scene["folder"], BASE).is_file():
+        found = {"frames": "<results>/<frames>"}
+    else:
+        found = {"photos": files_in(scene["folder"], f"{where}.folder")}
     if "masks" in scene:
         found["masks"] = files_in(scene["masks"], f"{where}.masks")
     if "model" in scene:
         found["model"] = files_of_model(scene["model"], f"{where}.model")
     return found
+
+
+def source_video(wildcards):
+    """The video that a scene names in place of a folder of photos."""
+    return existing(config["scenes"][wildcards.scene]["folder"], f"scenes.{wildcards.scene}.folder")
 
 
 def source_field(wildcards):
