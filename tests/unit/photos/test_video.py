@@ -158,6 +158,15 @@ def test_ten_bits_give_the_colours_of_eight(filmed, tmp_path):
     assert len(ten) == len(eight) and a == pytest.approx(b, abs=2)
 
 
+def test_hdr_is_shown_as_bright_as_it_was(filmed, tmp_path):
+    """HLG's middle is .598 of sRGB's white, and not .5."""
+    plain = write_frames(filmed(name="8.mp4"), tmp_path / "8")
+    hlg = write_frames(filmed(name="h.mp4", codec="libx265", pixels="yuv420p10le", hlg=True), tmp_path / "h")
+    a, b = (np.asarray(Image.open(paths[0])) for paths in (plain, hlg))
+    middle = np.abs(a.astype(int) - 128) < 2
+    assert b[middle].mean() == pytest.approx(0.598 * 255, abs=4)
+
+
 def test_frames_at_a_variable_rate_are_told_apart_by_the_way_not_by_time(filmed, tmp_path):
     """Half of the frames are shown for a second each."""
     times = np.cumsum([67] * 30 + [1000] * 30).tolist()

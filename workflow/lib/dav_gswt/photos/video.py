@@ -13,13 +13,16 @@ from pathlib import Path
 import av
 import numpy as np
 from av.container import InputContainer
+from av.video.reformatter import ColorTrc
 from jaxtyping import Complex64, Float, Float32, Int, UInt8
 from numpy import ndarray as Array
+from PIL import Image
 from scipy import fft
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder
 from dav_gswt.images import image_files
+from dav_gswt.images.hdr import Curve, convert_hdr
 from dav_gswt.logs import progress
 
 _log = logging.getLogger(__name__)
@@ -41,6 +44,7 @@ BLUR = 0.25  # a frame with less than this share of the usual fine detail is blu
 USUAL = 80  # percentile of all frames that is usual
 HOP = 0.1  # of a picture that the view moves on until frames are compared with a new one
 LONGEST = 3600.0  # seconds
+HDR: dict[int, Curve] = {ColorTrc.ARIB_STD_B67: "hlg", ColorTrc.SMPTE2084: "pq"}
 FORMATS = "mov,mp4,m4a,3gp,3g2,mj2"  # no playlist, whose entries may be files anywhere
 
 
@@ -72,8 +76,7 @@ def write_frames(video: Path | str, out: Path | str, threads: int = 1, most: int
     with atomic_folder(out) as part:
         for number, frame in _decode(video, threads):
             if number in numbers:
-                image = frame.to_image(threads=threads)
-                image.rotate(frame.rotation, expand=True).save(part / f"frame_{number:06d}.jpg", quality=95)
+                _develop(frame, threads).save(part / f"frame_{number:06d}.jpg", quality=95)
             if number == max(numbers):
                 break
     return sorted(out.glob("*.jpg"))
@@ -167,6 +170,15 @@ def find_shift(a: Complex64[Array, "h k"], b: Complex64[Array, "h k"], shape: tu
 
 def _wrap(index: int, size: int) -> float:
     return float(index - size if index > size / 2 else index)
+
+
+def _develop(frame: av.VideoFrame, threads: int) -> Image.Image:
+    """A frame as a picture, upright; HDR as a usual one."""
+    if curve := HDR.get(frame.color_trc):
+        image = Image.fromarray(convert_hdr(frame.to_ndarray(format="rgb48le", threads=threads), curve))
+    else:
+        image = frame.to_image(threads=threads)
+    return image.rotate(frame.rotation, expand=True)
 
 
 def _report_choice(video: Path | str, measures: FrameMeasures, chosen: Int[Array, "k"]) -> None:
