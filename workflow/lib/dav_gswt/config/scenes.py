@@ -154,7 +154,7 @@ class PhotoScene(_PhotographedScene):
 
     kind: Literal["photos"]
     folder: Text = key(
-        "a folder of photos and nothing else, or a video (MP4, MOV); relative to the working directory or the repository",
+        "a folder of photos and nothing else, or a video (MP4, MOV); from the working directory or the repository",
         read_by=REGISTERED,
     )
     model: Text | None = key(

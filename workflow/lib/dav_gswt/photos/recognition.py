@@ -93,7 +93,9 @@ def holds_gaussians(path: Path) -> bool:
 
 def _recognize_folder(folder: Path, name: str, model: Path | None) -> Recognised:
     found = _search(folder)
-    photos, videos = found.list(*PICTURES), found.list("video")
+    photos = found.list(*PICTURES)
+    pictures = {path.with_suffix("") for path in photos}  # a Live Photo is a picture and a video of its name
+    videos = [path for path in found.list("video") if path.with_suffix("") not in pictures]
     splats = [path for path in found.list(*SPLATS) if path.suffix.lower() != ".ply" or holds_gaussians(path)]
     models = [("the model", model)] if model else found.models
     if len(models) > 1:

@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import av
+import av.error
 import numpy as np
 from av.container import InputContainer
+from av.stream import Disposition
 from av.video.reformatter import ColorTrc
 from jaxtyping import Complex64, Float, Float32, Int, UInt8
 from numpy import ndarray as Array
@@ -45,6 +47,7 @@ USUAL = 80  # percentile of all frames that is usual
 HOP = 0.1  # of a picture that the view moves on until frames are compared with a new one
 LONGEST = 3600.0  # seconds
 HDR: dict[int, Curve] = {ColorTrc.ARIB_STD_B67: "hlg", ColorTrc.SMPTE2084: "pq"}
+WHOLE = 0.98  # of the frames that the index lists: a video with fewer is cut short
 FORMATS = "mov,mp4,m4a,3gp,3g2,mj2"  # no playlist, whose entries may be files anywhere
 
 
@@ -71,7 +74,7 @@ def write_frames(video: Path | str, out: Path | str, threads: int = 1, most: int
         raise InputError(f"{video}: the camera stands still, which tells no distances; walk or fly along while filming")
     if len(chosen) < LEAST_FRAMES:
         raise InputError(f"{video}: only {len(chosen)} sharp frames; film in more light, or move more slowly")
-    _report_choice(video, measures, chosen)
+    _report_choice(video, measures, chosen, most)
     numbers = set(measures.number[chosen].tolist())
     with atomic_folder(out) as part:
         for number, frame in _decode(video, threads):
@@ -181,7 +184,7 @@ def _develop(frame: av.VideoFrame, threads: int) -> Image.Image:
     return image.rotate(frame.rotation, expand=True)
 
 
-def _report_choice(video: Path | str, measures: FrameMeasures, chosen: Int[Array, "k"]) -> None:
+def _report_choice(video: Path | str, measures: FrameMeasures, chosen: Int[Array, "k"], most: int) -> None:
     blurred = measures.detail < find_threshold(measures.detail)
     _log.info(
         "%s: %d frames chosen of %d that were measured, %d of which are blurred",
@@ -193,12 +196,10 @@ def _report_choice(video: Path | str, measures: FrameMeasures, chosen: Int[Array
         if step > LOOSE and dim:
             when = "from {:.0f} s to {:.0f} s".format(*measures.time[[first, last]])
             _log.warning("%s: is blurred %s, and what it shows there is missing", video, when)
-    if (overlap := 1 - float(measures.moved.max()) / len(chosen)) < 1 - LOOSE:
+    if (step := float(measures.moved.max()) / most) > LOOSE:
         _log.warning(
-            "%s: the way is long for %d frames, which overlap by %.0f %% only; cut it into parts",
-            video,
-            len(chosen),
-            100 * overlap,
+            "%s: the way is long: %d frames overlap by %.0f %% only; cut the video into parts",
+            *(video, most, 100 * max(0.0, 1 - step)),
         )
 
 
@@ -208,7 +209,7 @@ def _open(video: Path | str) -> Iterator[InputContainer]:
     try:
         options = {"format_whitelist": FORMATS}
         container = av.open(str(Path(video).resolve()), container_options=options, metadata_errors="replace")
-    except (av.FFmpegError, OSError) as error:
+    except (av.error.FFmpegError, OSError) as error:
         raise InputError(
             f"{video}: not a video that can be read ({error.strerror}); if it was cut short its index is lost: copy it "
             "again, or have it repaired"
@@ -220,10 +221,21 @@ def _open(video: Path | str) -> Iterator[InputContainer]:
 def _decode(video: Path | str, threads: int, report: bool = False) -> Iterator[tuple[int, av.VideoFrame]]:
     """The frames of a video with their numbers, up to its end or to where it is damaged. report: say how far it is.
 
+    The decoder stops at the first fault, and does not invent what is lost. If it then gives nothing, the fault is one
+    that cameras write, and it is told to be lenient.
     Raises: InputError: it cannot be read, is too large or too long.
     """
+    for faults in ("explode", "careful"):
+        number = -1
+        for number, frame in enumerate(_decode_until(faults, video, threads, report)):
+            yield number, frame
+        if number >= 0:
+            break
+
+
+def _decode_until(faults: str, video: Path | str, threads: int, report: bool) -> Iterator[av.VideoFrame]:
     with _open(video) as container:
-        streams = [s for s in container.streams.video if not s.disposition & av.stream.Disposition.attached_pic]
+        streams = [s for s in container.streams.video if not s.disposition & Disposition.attached_pic]
         if not streams:
             raise InputError(f"{video}: has no moving pictures, only sound")
         stream = streams[0]
@@ -231,21 +243,20 @@ def _decode(video: Path | str, threads: int, report: bool = False) -> Iterator[t
             raise InputError(f"{video}: {stream.width} x {stream.height} pixels are too many")
         context = stream.codec_context
         context.thread_type, context.thread_count = "FRAME", threads
-        context.options = {"err_detect": "explode", "max_pixels": str(image_files.MAX_PIXELS)}
-        lasts = float(stream.duration * stream.time_base) if stream.duration else 0.0
-        _require_short(video, max(lasts, (container.duration or 0) / av.time_base))
-        time, whole = 0.0, False
+        context.options = {"err_detect": faults, "max_pixels": str(image_files.MAX_PIXELS)}
+        _require_short(video, (container.duration or 0) / av.time_base)
+        time, count = 0.0, 0
         with progress(range(stream.frames if report else 0), "read frames") as bar:
             try:
-                for number, frame in enumerate(container.decode(stream)):
-                    time = frame.time or time
+                for frame in container.decode(stream):
+                    time, count = frame.time or time, count + 1
                     _require_short(video, time)
-                    yield number, frame
+                    yield frame
                     bar.update(int(report))
-                whole = time > 0.98 * lasts - 1
-            except (av.FFmpegError, OSError):
-                pass
-        if report and not whole:
+                whole = count >= WHOLE * stream.frames
+            except (av.error.FFmpegError, OSError):
+                whole = False
+        if report and count and not whole:
             _log.warning("%s: is damaged or cut short after %.1f s; frames up to there are used", video, time)
 
 
