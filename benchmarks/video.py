@@ -1,7 +1,8 @@
 """A minute of video at 1080p, a third of it blurred: how long the choice of frames takes, and what finds its place.
 
-The video is a rendered flight in three legs over a finite synthetic field. In its middle third, or in every third
-stretch of two seconds (`bursts`), the camera shakes during each exposure. Every figure goes to results/bench.json.
+The video is a rendered flight in three legs over a finite synthetic field; rendering takes some minutes. In its middle
+third, or in every third stretch of two seconds (`bursts`), the camera shakes during each exposure. Every figure goes to
+results/bench.json.
 """
 
 import argparse
