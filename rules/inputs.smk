@@ -162,7 +162,7 @@ def branch(scene, policy=None, changes=None):
 
 
 def source_files(scene):
-    """The files that registration reads, by what they are: photos (or a video), masks, another program's model."""
+    """The files that registration reads, by what they are: photos, or a video; masks, another program's model."""
     given, where = config["scenes"][scene], f"scenes.{scene}"
     for key in ("folder", "masks"):
         for path in [given[key]] if isinstance(given.get(key, []), str) else given.get(key, []):
@@ -171,8 +171,9 @@ def source_files(scene):
         listing = list_photos(locate_source(given["folder"]), locate_path(given["masks"]) if "masks" in given else None)
     except (InputError, OSError) as error:
         raise WorkflowError(f"config: {where}.folder: {error}") from None
-    photos = list(listing.photos.values()) or listing.files.get("video", [])
-    found = {"photos": [dated(path, f"{where}.folder") for path in photos]}
+    videos = [] if listing.photos else listing.files.get("video", [])[:1]
+    found = {"photos": [dated(path, f"{where}.folder") for path in listing.photos.values()]}
+    found["video"] = [dated(path, f"{where}.folder") for path in videos]
     found["masks"] = [dated(path, f"{where}.masks") for path in listing.masks.values()]
     found["model"] = files_of_model(given["model"], f"{where}.model") if "model" in given else []
     return found
@@ -181,7 +182,8 @@ def source_files(scene):
 def source_photos(wildcards):
     """A scene's photos and what belongs to them, as inputs."""
     found = source_files(wildcards.scene)
-    return {key: [path for path in files if not TEMPLATE.search(path)] for key, files in found.items()}
+    frames = {"frames": "<results>/<frames>"} if found.pop("video") else {}
+    return frames | {key: [path for path in files if not TEMPLATE.search(path)] for key, files in found.items()}
 
 
 def unnameable_photos(wildcards):
@@ -189,6 +191,14 @@ def unnameable_photos(wildcards):
     its own; with what changes when they do."""
     found = [Path(path) for files in source_files(wildcards.scene).values() for path in files if TEMPLATE.search(path)]
     return [f"{path} {path.stat().st_size} {path.stat().st_mtime_ns}" for path in found]
+
+
+def source_video(wildcards):
+    """The video that a scene names in place of photos."""
+    video = source_files(wildcards.scene)["video"]
+    if not video:
+        raise WorkflowError(f"config: scenes.{wildcards.scene}.folder: has no video")
+    return existing(video[0], f"scenes.{wildcards.scene}.folder")
 
 
 def source_field(wildcards):

@@ -5,6 +5,28 @@ report.html, and per seed views.json: photos to start from, photos that may be a
 """
 
 
+rule choose_frames:
+    """Frames of a video: sharp ones, each a little farther along than the one before."""
+    input:
+        source_video,
+    output:
+        frames=directory("<results>/<frames>"),
+    log:
+        "<logs>/<frames>/choose_frames.log",
+    benchmark:
+        "<benchmarks>/<frames>/choose_frames.tsv"
+    wildcard_constraints:
+        scene=scenes_of("photos"),
+    threads: 2
+    resources:
+        mem_mb=per_attempt(1500),
+        runtime=per_attempt("60m"),
+    params:
+        source=code_of("choose_frames"),
+    script:
+        "../scripts/choose_frames.py"
+
+
 rule register_photos:
     """Structure from motion over a folder of photos; undistorted images and the ground frame."""
     input:

@@ -12,4 +12,5 @@ with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
     options = SfmOptions(scene["size"], scene.get("focal"), threads=snakemake.threads)
     model, masks = (locate_path(scene[key]) if key in scene else None for key in ("model", "masks"))
-    prepare_photos(locate_source(scene["folder"]), Path(snakemake.output.frame).parent, options, model, masks)
+    folder = snakemake.input.get("frames") or locate_source(scene["folder"])  # the frames of a video
+    prepare_photos(folder, Path(snakemake.output.frame).parent, options, model, masks)

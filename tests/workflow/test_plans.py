@@ -81,6 +81,14 @@ def test_a_finished_field_goes_from_field_to_terrain(planned, tmp_path):
     assert not plan["fit_coarse"] and not plan["copy_coarse_field"]
 
 
+def test_the_frames_of_a_video_are_chosen_before_they_are_registered(planned, tmp_path):
+    (tmp_path / "walk.mp4").touch()
+    entry = "{kind: photos, folder: walk.mp4, size: 256, start: 2, agent: replay, preset: draft, tiling: small}"
+    (tmp_path / "video.yaml").write_text(f"scene: walk\nscenes: {{walk: {entry}}}\n")
+    plan = planned(tmp_path, configs=(USUAL, TINY, tmp_path / "video.yaml"))
+    assert plan["choose_frames"] == plan["register_photos"] == plan["make_page"] == 1
+
+
 def test_a_round_is_tiled_as_it_is_and_completed(planned, tmp_path):
     tiles = FARTHEST + "{}/tiles_small/seams.json"
     plan = planned(tmp_path, tiles.format(""), tiles.format("/inpainted_terrain"))

@@ -121,3 +121,8 @@ def test_names_of_scenes(tmp_path):
         shutil.rmtree(tmp_path / given, ignore_errors=True)
         (tmp_path / given).mkdir()
         assert name_scene(tmp_path / given) == name
+
+
+def test_the_moving_half_of_a_live_photo_is_no_video_of_its_own(tmp_path):
+    folder = write(photos(tmp_path), IMG_1_dot_heic=HEIC, IMG_1_dot_mov=MP4)
+    assert recognize_input([folder]).about == "4 photos (HEIC among them)"

@@ -20,6 +20,7 @@ SNAPSHOTS = f"{RESULTS}/snapshots"  # photos on disk while a large set is fitted
 TREE = {
     "logs": "results/logs",
     "benchmarks": "results/benchmarks",
+    "frames": "{scene}/frames",
     "photos": "{scene}/photos",
     "start": "{scene}/seed{seed}",
     "fit": "{scene}/seed{seed}/{preset}",

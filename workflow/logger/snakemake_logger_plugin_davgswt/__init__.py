@@ -30,6 +30,7 @@ OWN_FILES = ("Traceback (most", "Error recording metadata")  # are in what Snake
 NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 RUNNING = " ..."  # ends the line of a job that begins; the line of one that has ended has its time
 STAGES = {  # rules in words
+    "choose_frames": "choose frames of the video",
     "register_photos": "place the photos",
     "render_photos": "render the photos",
     "import_field": "read the splat",

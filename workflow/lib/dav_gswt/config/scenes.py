@@ -154,7 +154,8 @@ class PhotoScene(_PhotographedScene):
 
     kind: Literal["photos"]
     folder: Text | Annotated[list[Text], Field(min_length=1)] = key(
-        "a folder of photos with its subfolders, or several, relative to the working directory or to the repository",
+        "a folder of photos with its subfolders, or several, or a video (MP4, MOV); from the working directory or the "
+        "repository",
         read_by=REGISTERED,
     )
     model: Text | None = key(

@@ -1,94 +1,149 @@
 """Frames of a video that structure from motion can use: sharp ones, each a little farther along than the one before.
 
-Two passes over the video. The first measures each frame, shrunk and grey: how sharp it is, and how far the picture has
-moved. The second writes the chosen frames at full size.
+Two passes over the video. The first measures frames, shrunk and grey: how sharp each is, and how far the picture has
+moved. The second writes the chosen frames at full size, upright.
 """
 
 import logging
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import av
+import av.error
 import numpy as np
-from jaxtyping import Float, Float32, Int
+from av.container import InputContainer
+from av.stream import Disposition
+from av.video.reformatter import ColorTrc
+from jaxtyping import Complex64, Float, Float32, Int, UInt8
 from numpy import ndarray as Array
+from PIL import Image
 from scipy import fft
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder
 from dav_gswt.images import image_files
+from dav_gswt.images.hdr import Curve, convert_hdr
 from dav_gswt.logs import progress
 
 _log = logging.getLogger(__name__)
 
-WIDTH = 480  # pixels of the shrunk frames
+SIDE = 640  # pixels of the longer side at which frames are measured
+FINE, COARSE = (
+    (0.15, 0.375),
+    (0.025, 0.075),
+)  # cycles a pixel there: waves of 4 to 10 pixels of a photo of 960, and of 20 to 60
+SECTORS = 8  # directions of waves
+SHRUNK = 4  # times coarser is the picture whose motion is measured
+MOST_A_SECOND = 15  # frames that are measured: more are hardly farther along
 MOST_FRAMES = 200
-STEP = 0.15  # of a picture's width that the view moves on between chosen frames: five in six parts overlap
-LEAST_MOTION = 0.5  # pictures' widths in all: less is a camera that stands still
-BLUR = 0.6  # a frame with less than this share of the usual fine detail is blurred
+STEP = 0.15  # of a picture that the view moves on between chosen frames: five in six parts overlap
+LOOSE = 0.4  # a step between chosen frames above which they may not hang together
+LEAST_MOTION = 0.5  # pictures in all: less is a camera that stands still
+LEAST_FRAMES = 3
+BLUR = 0.25  # a frame with less than this share of the usual fine detail is blurred
 USUAL = 80  # percentile of all frames that is usual
+HOP = 0.1  # of a picture that the view moves on until frames are compared with a new one
 LONGEST = 3600.0  # seconds
+HDR: dict[int, Curve] = {ColorTrc.ARIB_STD_B67: "hlg", ColorTrc.SMPTE2084: "pq"}
+WHOLE = 0.98  # of the frames that the index lists: a video with fewer is cut short
+FORMATS = "mov,mp4,m4a,3gp,3g2,mj2"  # no playlist, whose entries may be files anywhere
 
 
 @dataclass(frozen=True)
 class FrameMeasures:
-    """Of each frame: fine detail along the direction that has less of it, and how far the picture has moved so far.
+    """Of each measured frame: its number in the video, the time at which it is shown (seconds), its fine detail (see
+    `FrameMeter`), and how far the picture has moved so far, in pictures."""
 
-    moved: sum of shifts, in pictures' widths.
-    """
-
+    number: Int[Array, "n"]
+    time: Float[Array, "n"]
     detail: Float[Array, "n"]
     moved: Float[Array, "n"]
 
 
-def write_frames(video: Path | str, out: Path | str, most: int = MOST_FRAMES) -> list[Path]:
+def write_frames(video: Path | str, out: Path | str, threads: int = 1, most: int = MOST_FRAMES) -> list[Path]:
     """Write the chosen frames of a video as JPEGs into the folder `out`, which is replaced. Returns their paths.
 
-    Raises: InputError: no video, none that can be read, or the camera stands still.
+    Of a video that is damaged or cut short, the frames up to there count. threads: of the decoder; changes no result.
+    Raises: InputError: no video, none that can be read, too long, or the camera stands still.
     """
-    measures = measure_frames(video)
+    measures, out = measure_frames(video, threads), Path(out)
     chosen = choose_frames(measures, most)
-    if measures.moved[-1] < LEAST_MOTION or len(chosen) < 3:
-        raise InputError(
-            f"{video}: the camera hardly moves, so nothing can be said of distances; walk or fly along while filming"
-        )
-    blurred = int((measures.detail < find_threshold(measures.detail)).sum())
-    _log.info("video: %d of %d frames chosen; %d are blurred", len(chosen), len(measures.detail), blurred)
-    wanted, out = set(chosen.tolist()), Path(out)
+    if measures.moved.max() < LEAST_MOTION:
+        raise InputError(f"{video}: the camera stands still, which tells no distances; walk or fly along while filming")
+    if len(chosen) < LEAST_FRAMES:
+        raise InputError(f"{video}: only {len(chosen)} sharp frames; film in more light, or move more slowly")
+    _report_choice(video, measures, chosen, most)
+    numbers = set(measures.number[chosen].tolist())
     with atomic_folder(out) as part:
-        part.mkdir(exist_ok=True)
-        for number, frame in enumerate(_decode(video)):
-            if number in wanted:
-                frame.to_image().save(part / f"frame_{number:06d}.jpg", quality=95)
+        for number, frame in _decode(video, threads):
+            if number in numbers:
+                _develop(frame, threads).save(part / f"frame_{number:06d}.jpg", quality=95)
+            if number == max(numbers):
+                break
     return sorted(out.glob("*.jpg"))
 
 
-def measure_frames(video: Path | str) -> FrameMeasures:
-    """Detail and motion of every frame."""
-    detail, moved, before = [], [0.0], None
-    for frame in progress(_decode(video), "read frames"):
-        grey = _shrink(frame)
-        detail.append(measure_detail(grey))
-        spectrum = _transform(grey)
-        if before is not None:
-            moved.append(moved[-1] + float(np.hypot(*find_shift(before, spectrum, grey.shape))) / grey.shape[1])
-        before = spectrum
-    if not detail:
-        raise InputError(f"{video}: has no frames that can be read")
-    return FrameMeasures(np.array(detail), np.array(moved))
+def measure_frames(video: Path | str, threads: int = 1) -> FrameMeasures:
+    """Detail and motion of the frames, of at most MOST_A_SECOND a second. Raises: InputError: as `write_frames`."""
+    rows, meter = [], None
+    for number, frame in _decode(video, threads, report=True):
+        time = float(number if frame.time is None else frame.time)
+        if rows and 0 <= time - rows[-1][1] < 0.99 / MOST_A_SECOND:
+            continue
+        meter = meter or FrameMeter(image_files.fit_size(frame.width, frame.height, SIDE))
+        shrunk = frame.reformat(*meter.size, "gray", interpolation="AREA", threads=threads)
+        rows.append((number, time, *meter.measure(shrunk.to_ndarray())))
+    if not rows:
+        raise InputError(f"{video}: has no frame that can be read; copy it again, or export it as MP4")
+    number, time, detail, moved = zip(*rows, strict=True)
+    return FrameMeasures(np.array(number), np.array(time), np.array(detail), np.array(moved))
 
 
-def measure_detail(grey: Float32[Array, "h w"]) -> float:
-    """The least share, over four directions, of the contrast between neighbouring pixels in that of pixels four apart.
+class FrameMeter:
+    """Measures the frames of a video one after the other, by their spectra. size: width and height, pixels.
 
-    Motion blurs along one direction, and a lens out of focus along all; the ratio hardly depends on what is shown.
+    Detail is the power of fine waves over that of coarse ones, in the direction that has least: motion blurs along one
+    direction, a lens out of focus along all. The way is the sum of shifts, each against a frame some way back and not
+    the one before: so slow motion counts, and a hand that trembles on the spot does not.
     """
-    shares = []
-    for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
-        near, far = (_contrast(grey, dy * step, dx * step) for step in (1, 4))
-        shares.append(near / far if far > 0 else 0.0)
-    return min(shares)
+
+    def __init__(self, size: tuple[int, int]):
+        self.size = size
+        width, height = size
+        y, x = fft.fftfreq(height)[:, None], fft.rfftfreq(width)[None, :]
+        wave, angle = np.hypot(x, y), np.arctan2(y, x + 0 * y) % np.pi
+        self._fine, self._coarse = ((wave >= low) & (wave < high) for low, high in (FINE, COARSE))
+        self._sector = np.minimum((angle[self._fine] * SECTORS / np.pi).astype(int), SECTORS - 1)
+        self._count = np.maximum(np.bincount(self._sector, minlength=SECTORS), 1)
+        self._window = np.outer(np.hanning(height), np.hanning(width)).astype(np.float32)
+        self._shape = max(height // SHRUNK // 2 * 2, 2), max(width // SHRUNK // 2 * 2, 2)
+        self._behind, self._way = None, 0.0
+
+    def measure(self, grey: UInt8[Array, "h w"]) -> tuple[float, float]:
+        """The next frame's detail, and how far the picture has moved up to it, in pictures."""
+        values = grey.astype(np.float32)
+        spectrum = fft.rfft2((values - values.mean()) * self._window)
+        return self._measure_detail(np.abs(spectrum) ** 2), self._follow(spectrum)
+
+    def _measure_detail(self, power: Float32[Array, "h k"]) -> float:
+        fine = np.bincount(self._sector, power[self._fine], SECTORS) / self._count
+        coarse = float(power[self._coarse].mean()) if self._coarse.any() else 0.0
+        return float(fine.min()) / coarse if coarse > 0 else 0.0
+
+    def _follow(self, spectrum: Complex64[Array, "h k"]) -> float:
+        height, width = self._shape
+        rows = np.r_[: height // 2, -(height // 2) : 0]
+        shrunk = spectrum[rows, : width // 2 + 1]
+        if self._behind is None:
+            self._behind = shrunk
+        down, right = find_shift(self._behind, shrunk, self._shape)
+        shift = float(np.hypot(down / height, right / width))
+        if shift < HOP:
+            return self._way + shift
+        self._behind, self._way = shrunk, self._way + shift
+        return self._way
 
 
 def find_threshold(detail: Float[Array, "n"]) -> float:
@@ -98,57 +153,113 @@ def find_threshold(detail: Float[Array, "n"]) -> float:
 
 def choose_frames(measures: FrameMeasures, most: int = MOST_FRAMES) -> Int[Array, "k"]:
     """The sharpest frame of each stretch of the way, blurred ones left out; at most `most` stretches."""
-    step = max(STEP, measures.moved[-1] / most)
-    stretch = (measures.moved / step).astype(int)
+    step = max(STEP, float(measures.moved.max()) / most)
+    stretch = np.minimum((measures.moved / step).astype(int), most - 1)
     sharp = measures.detail >= find_threshold(measures.detail)
     chosen = []
     for number in np.unique(stretch[sharp]):
         among = np.flatnonzero(sharp & (stretch == number))
         chosen.append(among[measures.detail[among].argmax()])
-    return np.array(chosen[:most], int)
+    return np.array(sorted(chosen), int)
 
 
-def find_shift(a: Array, b: Array, shape: tuple[int, int]) -> tuple[float, float]:
-    """Rows and columns by which a picture has moved to another, from their spectra: the peak of phase correlation."""
-    cross = a * np.conj(b)
+def find_shift(a: Complex64[Array, "h k"], b: Complex64[Array, "h k"], shape: tuple[int, int]) -> tuple[float, float]:
+    """Rows and columns by which `b` has moved against `a`, from their spectra: the peak of phase correlation."""
+    cross = b * np.conj(a)
     peak = fft.irfft2(cross / np.maximum(np.abs(cross), 1e-12), shape)
     row, column = np.unravel_index(peak.argmax(), shape)
-    return _wrap(row, shape[0]), _wrap(column, shape[1])
+    return _wrap(int(row), shape[0]), _wrap(int(column), shape[1])
 
 
-def _wrap(index: np.intp, size: int) -> float:
+def _wrap(index: int, size: int) -> float:
     return float(index - size if index > size / 2 else index)
 
 
-def _transform(grey: Float32[Array, "h w"]) -> Array:
-    window = np.outer(np.hanning(grey.shape[0]), np.hanning(grey.shape[1])).astype(np.float32)
-    return fft.rfft2((grey - grey.mean()) * window)
+def _develop(frame: av.VideoFrame, threads: int) -> Image.Image:
+    """A frame as a picture, upright; HDR as a usual one."""
+    if curve := HDR.get(frame.color_trc):
+        image = Image.fromarray(convert_hdr(frame.to_ndarray(format="rgb48le", threads=threads), curve))
+    else:
+        image = frame.to_image(threads=threads)
+    return image.rotate(frame.rotation, expand=True)
 
 
-def _contrast(grey: Float32[Array, "h w"], dy: int, dx: int) -> float:
-    h, w = grey.shape
-    first = grey[: h - dy, max(0, -dx) : w - max(0, dx)]
-    second = grey[dy:, max(0, dx) : w + min(0, dx)]
-    return float(np.abs(second - first).mean())
+def _report_choice(video: Path | str, measures: FrameMeasures, chosen: Int[Array, "k"], most: int) -> None:
+    blurred = measures.detail < find_threshold(measures.detail)
+    _log.info(
+        "%s: %d frames chosen of %d that were measured, %d of which are blurred",
+        *(video, len(chosen), len(blurred), blurred.sum()),
+    )
+    ends = np.r_[0, chosen, len(blurred) - 1]
+    for first, last in zip(ends[:-1], ends[1:], strict=True):
+        step, dim = float(measures.moved[last] - measures.moved[first]), bool(blurred[first + 1 : last].any())
+        if step > LOOSE and dim:
+            when = "from {:.0f} s to {:.0f} s".format(*measures.time[[first, last]])
+            _log.warning("%s: is blurred %s, and what it shows there is missing", video, when)
+    if (step := float(measures.moved.max()) / most) > LOOSE:
+        _log.warning(
+            "%s: the way is long: %d frames overlap by %.0f %% only; cut the video into parts",
+            *(video, most, 100 * max(0.0, 1 - step)),
+        )
 
 
-def _shrink(frame: av.VideoFrame) -> Float32[Array, "h w"]:
-    height = max(2, round(WIDTH * frame.height / frame.width))
-    return frame.reformat(WIDTH, height, "gray", interpolation="AREA").to_ndarray().astype(np.float32) / 255
-
-
-def _decode(video: Path | str) -> Iterator[av.VideoFrame]:
-    """The frames of a video, in order. Raises: InputError: it cannot be read, is too large or too long."""
+@contextmanager
+def _open(video: Path | str) -> Iterator[InputContainer]:
+    """Raises: InputError: the file is no video, or its index is missing."""
     try:
-        with av.open(str(video)) as container:
-            if not container.streams.video:
-                raise InputError(f"{video}: has no pictures, only sound")
-            stream = container.streams.video[0]
-            stream.thread_type = "AUTO"
-            if stream.width * stream.height > image_files.MAX_PIXELS:
-                raise InputError(f"{video}: {stream.width} x {stream.height} pixels are too many")
-            if container.duration and container.duration / av.time_base > LONGEST:
-                raise InputError(f"{video}: longer than an hour; cut out the part that shows the ground")
-            yield from container.decode(stream)
-    except (av.FFmpegError, OSError) as error:
-        raise InputError(f"{video}: not a video that can be read ({error})") from error
+        options = {"format_whitelist": FORMATS}
+        container = av.open(str(Path(video).resolve()), container_options=options, metadata_errors="replace")
+    except (av.error.FFmpegError, OSError) as error:
+        raise InputError(
+            f"{video}: not a video that can be read ({error.strerror}); if it was cut short its index is lost: copy it "
+            "again, or have it repaired"
+        ) from error
+    with container:
+        yield container
+
+
+def _decode(video: Path | str, threads: int, report: bool = False) -> Iterator[tuple[int, av.VideoFrame]]:
+    """The frames of a video with their numbers, up to its end or to where it is damaged. report: say how far it is.
+
+    The decoder stops at the first fault, and does not invent what is lost. If it then gives nothing, the fault is one
+    that cameras write, and it is told to be lenient.
+    Raises: InputError: it cannot be read, is too large or too long.
+    """
+    for faults in ("explode", "careful"):
+        number = -1
+        for number, frame in enumerate(_decode_until(faults, video, threads, report)):
+            yield number, frame
+        if number >= 0:
+            break
+
+
+def _decode_until(faults: str, video: Path | str, threads: int, report: bool) -> Iterator[av.VideoFrame]:
+    with _open(video) as container:
+        streams = [s for s in container.streams.video if not s.disposition & Disposition.attached_pic]
+        if not streams:
+            raise InputError(f"{video}: has no moving pictures, only sound")
+        stream = streams[0]
+        if stream.width * stream.height > image_files.MAX_PIXELS:
+            raise InputError(f"{video}: {stream.width} x {stream.height} pixels are too many")
+        context = stream.codec_context
+        context.thread_type, context.thread_count = "FRAME", threads
+        context.options = {"err_detect": faults, "max_pixels": str(image_files.MAX_PIXELS)}
+        _require_short(video, (container.duration or 0) / av.time_base)
+        time, count = 0.0, 0
+        with progress(range(stream.frames if report else 0), "read frames") as bar:
+            try:
+                for frame in container.decode(stream):
+                    time, count = frame.time or time, count + 1
+                    _require_short(video, time)
+                    yield frame
+                    bar.update(int(report))
+                whole = count >= WHOLE * stream.frames
+            except (av.error.FFmpegError, OSError):
+                whole = False
+        if report and count and not whole:
+            _log.warning("%s: is damaged or cut short after %.1f s; frames up to there are used", video, time)
+
+
+def _require_short(video: Path | str, seconds: float) -> None:
+    if seconds > LONGEST:
+        raise InputError(f"{video}: longer than an hour; cut out the part that shows the ground")
