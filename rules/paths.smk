@@ -15,6 +15,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import is_from_future, locate_path
 from dav_gswt.images.lpips_weights import locate_weights
 from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
+from dav_gswt.photos.geo_file import list_geo_files
 from dav_gswt.photos.photo_listing import list_photos, locate_source
 from dav_gswt.sweeps import CELL
 from dav_gswt.views.policies import NEEDS_PHOTOS, POLICY_NAMES, PRIOR_POLICIES
@@ -36,7 +37,7 @@ try:
     # the keys of `--config` as Snakemake read them: numbers in lists and tables are text
     given = merge_tables(config, parse_command_line(dict(workflow.config_settings.config)))
     others = {key: given.pop(key, {}) for key in EXTENSIONS}
-    given = check_config(add_scene_files(given, BASE / "config/scenes"))
+    given = check_config(add_scene_files(given, BASE / "config/scenes", quietly=True))
     for key, extend in EXTENSIONS.items():
         given = extend(given, others[key])
 except InputError as error:

@@ -30,6 +30,14 @@ def explain_unsupported() -> str | None:
     return None
 
 
+def explain_unusable(folder: Path) -> str | None:
+    """Why nothing can run in a folder of this name; None if it can. Snakemake calls Python by its plain path."""
+    if odd := sorted(set(str(folder)) & set(" \t\n'\"\\$&;()<>|*?[]{}`!")):
+        letters = " ".join("blanks" if letter == " " else letter for letter in odd)
+        return f"{folder}: the path has {letters}, with which Snakemake starts no job: move or rename the folder"
+    return None
+
+
 def lacks_libatomic() -> bool:
     """Mitsuba, which renders the synthetic scenes, is the one wheel that needs a system library; g++ brings it."""
     try:
@@ -48,7 +56,7 @@ def for_the_core() -> list[str]:
 def main() -> None:
     if sys.argv[1:] == ["core"]:
         sys.exit(bool(for_the_core()))
-    if refusal := explain_unsupported():
+    if refusal := explain_unsupported() or explain_unusable(Path.cwd()):
         sys.exit(refusal)
     needed = ["libatomic1"] if lacks_libatomic() else []
     if not Path(".venv/bin/python").exists() and not all(map(importlib.util.find_spec, ("venv", "ensurepip"))):

@@ -302,7 +302,7 @@ def test_models_of_colmap(colmap, tmp_path, kind, random):
             assert np.abs(shot.rotation @ shot.rotation.T - np.eye(3)).max() < 1e-6
 
     size = sum(path.stat().st_size for path in folder.iterdir())
-    read_guarded(f"COLMAP ({kind})", lambda: import_colmap(folder, folder), check, size, f".{kind}")
+    read_guarded(f"COLMAP ({kind})", lambda: import_colmap(folder), check, size, f".{kind}")
 
 
 FRAGMENTS = [

@@ -29,6 +29,13 @@ def test_a_missing_compiler_is_named_with_its_package_and_what_it_costs(root, tm
     assert "g++" not in prepared(root, tmp_path).stdout
 
 
+def test_a_folder_from_which_snakemake_starts_no_job_is_named_before_the_set_up(root, tmp_path):
+    for name, said in (("My Projects", "the path has blanks,"), ("a$(b)", r"the path has \$ \( \),"), ("Düne-1", "")):
+        (tmp_path / name).mkdir()
+        done = prepared(root, tmp_path / name)
+        assert done.returncode == bool(said) and re.search(said, done.stderr) and (said or not done.stderr)
+
+
 WITHOUT_LIBRARIES = "def fail(name): raise OSError(name)\nctypes.CDLL = fail"
 
 

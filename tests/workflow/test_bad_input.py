@@ -72,7 +72,11 @@ PHOTOS = "{kind: photos, folder: photos, size: 320, start: 3, agent: replay, pre
     [
         pytest.param(one_that_is_text, "photos/3.jpg: ", id="not an image"),
         pytest.param(one_cut_short, "photos/1.png: damaged or cut short", id="cut short"),
-        pytest.param(lambda folder: noisy_photos(folder, 4), "photos: 0 of 4 photos could be placed", id="no overlap"),
+        pytest.param(
+            lambda folder: noisy_photos(folder, 4),
+            "photos: no two of the 4 photos show the same ground",
+            id="no overlap",
+        ),
     ],
 )
 def test_photos_that_cannot_be_used_are_named(refused, tmp_path, fill, said):

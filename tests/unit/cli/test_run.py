@@ -81,6 +81,27 @@ def test_a_lock_of_a_killed_run_is_removed_and_that_of_a_living_one_is_not(tmp_p
     assert commands[0][-1] == "--unlock" and "cut short" in capsys.readouterr().out
 
 
+def test_a_user_without_name_and_home_gets_both_in_the_folder(tmp_path, monkeypatch):
+    """As in a container: no entry in /etc/passwd, and a home that is nobody's."""
+    monkeypatch.setattr(run.getpass, "getuser", lambda: {}["uid not found"])
+    monkeypatch.setattr(run.os, "access", lambda path, mode: path != tmp_path)
+    for name in ("XDG_CACHE_HOME", "XDG_CONFIG_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    found = run.replace_missing_user(tmp_path / "run")
+    assert found["USER"].startswith("user") and found["XDG_CACHE_HOME"].startswith(str(tmp_path / "run"))
+    monkeypatch.undo()
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USER", "me")
+    assert not run.replace_missing_user(tmp_path / "run")
+
+
+def test_a_python_that_snakemake_cannot_start_is_named_before_any_job(monkeypatch):
+    monkeypatch.setattr(run.sys, "executable", "/home/me/My Projects/.venv/bin/python")
+    with pytest.raises(InputError, match="My Projects.*without them"):
+        run.run_workflow("desert", 1, [])
+
+
 def test_what_a_job_does_now_is_written_over_on_a_terminal_and_seldom_elsewhere(monkeypatch, capsys):
     lines = ["[1 of 2] fit the ground ...", "  fit: 1/3, 00:01 gone, about 00:02 left", "  a warning"]
     monkeypatch.setattr(sys.stdout, "isatty", lambda: False)

@@ -1,5 +1,7 @@
 """The config is closed: what is misspelt or out of range is named before the first job."""
 
+import re
+import shutil
 from copy import deepcopy
 from pathlib import Path
 
@@ -121,25 +123,52 @@ def test_a_config_replaces_another_key_by_key(tmp_path):
     assert read_config(files, {"k": 2}) == {"k": 2, "export": {"rows": 8, "columns": 1}, "seeds": [5]}
 
 
+FIELD = {"kind": "field", "field": "a.ply", "preset": "draft", "tiling": "auto"}
+
+
 def test_a_scene_of_the_config_replaces_keys_of_its_file(tmp_path):
-    (tmp_path / "sand.yaml").write_text("{kind: synthetic, size: 128}")
-    assert add_scene_files({"scenes": None}, tmp_path)["scenes"] == {"sand": {"kind": "synthetic", "size": 128}}
-    scenes = add_scene_files({"scenes": {"sand": {"size": 64}, "other": {"kind": "field"}}}, tmp_path)["scenes"]
-    assert scenes == {"sand": {"kind": "synthetic", "size": 64}, "other": {"kind": "field"}}
+    (tmp_path / "sand.yaml").write_text(str(FIELD))
+    assert add_scene_files({"scenes": None}, tmp_path)["scenes"] == {"sand": FIELD}
+    scenes = add_scene_files({"scenes": {"sand": {"field": "b.ply"}, "other": {"kind": "field"}}}, tmp_path)["scenes"]
+    assert scenes == {"sand": FIELD | {"field": "b.ply"}, "other": {"kind": "field"}}
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("kind: field\npreset: draft\ntiling: auto\n", "scenes.halfdone.*is missing"),
+        ("kind: photos\nfolder: x\nprset: draft\n", "there is no key 'prset'"),
+        ("kind: field\nfield: x.ply\npreset: best\ntiling: auto\n", "preset: there is no 'best'"),
+        ("kind: [", "not YAML"),
+        ("{}", "scenes.halfdone"),
+    ],
+)
+def test_a_bad_file_stops_its_own_scene_only(root, tmp_path, text, reason, caplog):
+    (tmp_path / "halfdone.yaml").write_text(text)
+    shutil.copy(root / "config/scenes/desert.yaml", tmp_path)
+    usual = read_config([root / "config/config.yaml"])
+    assert "halfdone" not in check_config(add_scene_files(usual, tmp_path))["scenes"]
+    assert re.search(rf"halfdone.yaml: the scene is left out: .*{reason}", caplog.text)
+    caplog.clear()
+    assert list(add_scene_files(usual, tmp_path, quietly=True)["scenes"]) == ["desert"] and not caplog.text
+    with pytest.raises(InputError, match=reason):
+        check_config(add_scene_files(usual | {"scene": "halfdone"}, tmp_path))
+    with pytest.raises(InputError, match="config: k: "):  # which no scene can mend
+        check_config(add_scene_files(usual | {"k": 0}, tmp_path))
 
 
 def test_files_of_editors_and_file_systems_are_no_scenes(tmp_path):
-    (tmp_path / "sand.yml").write_text("{kind: synthetic}")
+    (tmp_path / "sand.yml").write_text(str(FIELD))
     (tmp_path / "._sand.yaml").write_bytes(b"\0\5\x16\7")
     (tmp_path / ".#sand.yaml").symlink_to(tmp_path / "gone")
-    assert add_scene_files({}, tmp_path)["scenes"] == {"sand": {"kind": "synthetic"}}
+    assert add_scene_files({}, tmp_path)["scenes"] == {"sand": FIELD}
 
 
 def test_two_scenes_of_one_name_are_named(tmp_path):
-    (tmp_path / "sand.yaml").write_text("{kind: photos}")
+    (tmp_path / "sand.yaml").write_text(str(FIELD))
     with pytest.raises(InputError, match=r"sand\.yaml: the config has a scene sand of kind synthetic, too"):
         add_scene_files({"scenes": {"sand": {"kind": "synthetic"}}}, tmp_path)
-    (tmp_path / "sand.yml").write_text("{kind: photos}")
+    (tmp_path / "sand.yml").write_text(str(FIELD))
     with pytest.raises(InputError, match=r"sand\.yml: there is a scene of this name in sand\.yaml"):
         add_scene_files({}, tmp_path)
 

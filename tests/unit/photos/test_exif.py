@@ -89,11 +89,14 @@ def test_a_position_has_degrees_minutes_and_seconds_and_signs(tmp_path):
     path = tmp_path / "a.jpg"
     assert read_gps_position(located(path)) == pytest.approx((-12.51, -151.25, 70.0), abs=1e-6)
     assert read_gps_position(located(path, refs="NE", below=1)) == pytest.approx((12.51, 151.25, -70.0), abs=1e-6)
+    for below, altitude in ((0, 70.0), (1, -70.0), (2, 70.0), (3, -70.0)):  # 2 and 3 are of EXIF 3.0
+        assert read_gps_position(located(path, below=below))[2] == altitude
+    for unknown in (None, 1e6):
+        place = read_gps_position(located(path, altitude=unknown))
+        assert place[:2] == pytest.approx((-12.51, -151.25), abs=1e-6) and np.isnan(place[2])
     for wrong in (
         {"latitude": (91.0, 0.0, 0.0)},
         {"longitude": (181.0, 0.0, 0.0)},
-        {"altitude": None},
-        {"altitude": 1e6},
         {"latitude": (0.0, 0.0, 0.0), "longitude": (0.0, 0.0, 0.0), "refs": "NE"},
     ):
         assert read_gps_position(located(path, **wrong)) is None, wrong

@@ -11,6 +11,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import (
     colour_points,
     count_shared_points,
+    group_images,
     read_colmap_model,
     triangulate_model,
     write_colmap_model,
@@ -73,6 +74,22 @@ def test_pairs_share_the_points_that_both_see(flown):
     shared = count_shared_points(flown)
     sees = [set(flown.point_of[flown.image_of == i]) for i in range(9)]
     assert shared.tolist() == [[len(a & b) for b in sees] for a in sees]
+
+
+def test_images_are_grouped_by_the_points_that_three_of_them_see(flown):
+    """Images 0 to 2 and 3 to 5; four points tie the groups, forty others are seen by one image of each."""
+    seen = [(range(3), 20), (range(3, 6), 20), ((0, 1, 3), 3), ((2, 4, 5), 1), ((2, 3), 40)]
+    rows = [(images, i) for images, count in seen for i in range(count)]
+    image_of = np.array([i for images, _ in rows for i in images])
+    point_of = np.repeat(np.arange(len(rows)), [len(images) for images, _ in rows])
+    n, m = len(rows), len(image_of)
+    points = {"points": np.zeros((n, 3)), "colours": np.zeros((n, 3), np.float32), "pixels": np.zeros((m, 2))}
+    images = {"names": flown.names[:6], "cameras": flown.cameras[:6]}
+    model = replace(flown, **images, **points, point_of=point_of, image_of=image_of)
+    group, ties = group_images(model, 5)
+    assert group.tolist() == [0, 0, 0, 1, 1, 1] and ties[0, 1] == 4
+    assert group_images(model, 4)[0].tolist() == [0] * 6  # no two images of the groups share four
+    assert group_images(model, 50)[0].tolist() == [*range(6)]
 
 
 def test_a_model_comes_back_from_disk_as_it_was(flown, tmp_path):

@@ -69,6 +69,13 @@ def test_projects_of_other_programs(tmp_path, mark, program, model):
     assert found.entry["folder"] == str(tmp_path / "images" if program != "nerfstudio" else tmp_path)
 
 
+def test_of_several_models_of_colmap_the_largest_is_taken_and_the_video_of_a_project_is_no_input(tmp_path):
+    photos(tmp_path / "images")
+    files = {f"sparse__{i}__{name}_dot_bin": b"x" * i for i in range(3) for name in ("cameras", "images")}
+    found = recognize_input([write(tmp_path, walk_dot_mp4=MP4, **files)])
+    assert found.entry["model"] == str(tmp_path / "sparse/2")
+
+
 def test_several_files_are_photos(tmp_path):
     folder = photos(tmp_path / "a", 2)
     more = photos(tmp_path / "b", 1)

@@ -25,11 +25,13 @@ from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos import importers
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
+from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model
 from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
-from dav_gswt.photos.importers.photo_matching import PhotoFolder
+from dav_gswt.photos.importers.photo_matching import PhotoFolder, match_photos_to_images
 from dav_gswt.photos.importers.points import triangulate_features
 from dav_gswt.photos.photo_set import prepare_photos
+from dav_gswt.photos.recognition import recognize_input
 from dav_gswt.photos.sfm.registration import undistort_image
 
 OPTIONS = replace(made.OPTIONS, features=500)
@@ -133,6 +135,68 @@ def test_names_are_found_by_path_then_by_stem(tmp_path):
     assert found.find("1.jpg") is None and found.find("4") is None  # of two photos, of none
 
 
+def test_of_photos_of_one_name_the_one_in_the_same_last_folders_is_found(tmp_path):
+    for name in ("day1/a.jpg", "day2/a.jpg", "day2/a.png"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        image_files.write_png(tmp_path / name, np.zeros((4, 4, 3)))
+    found = PhotoFolder(tmp_path)
+    assert found.find("home/me/day1/a.jpg") == "day1/a.jpg" and found.find("me/day2/a.png") == "day2/a.png"
+    assert found.find("day3/a.jpg") is None and found.find("day2/a.tif") is None
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["images/{}", "C:\\Users\\me\\site\\images\\{}", "/home/other/site/images/{}", "../site/images/{}"],
+    ids=["relative", "windows", "linux", "parent"],
+)
+def test_paths_of_another_machine_name_the_photos_of_the_folder(photos, tmp_path, path):
+    """No file outside the folder is read: the one that the path of frame 0 leads to is left alone."""
+    frames = [frame | {"file_path": path.format(frame["file_path"][2:])} for frame in transforms()["frames"]]
+    frames[0]["file_path"] = f"{tmp_path}/secret.png"
+    image_files.write_png(tmp_path / "secret.png", np.zeros((HEIGHT, WIDTH, 3)))
+    given = importers._read_model(
+        write_json(tmp_path / "t.json", transforms() | {"frames": frames}), PhotoFolder(photos)
+    )
+    placed, left_out = match_photos_to_images(given, PhotoFolder(photos), tmp_path)
+    assert [place.path for place in placed] == [photos / name for name in SCENE.names[1:]]
+    assert {name for name, _ in left_out} == {f"{tmp_path}/secret.png"[1:], "000.png"}
+
+
+def test_a_model_in_map_coordinates_gives_the_same_ground(photos, tmp_path):
+    """Eastings and northings of millions of metres, cameras 40 metres high."""
+    write_colmap(tmp_path / "plain", sees=True)
+    stored = pycolmap.Reconstruction(str(tmp_path / "plain"))
+    stored.transform(pycolmap.Sim3d(40.0, pycolmap.Rotation3d(), np.array([456789.25, 5234567.5, 420.0])))
+    (tmp_path / "utm").mkdir()
+    stored.write_binary(str(tmp_path / "utm"))
+    rng = np.random.default_rng
+    one, two = (fit_ground_frame(import_model(tmp_path / m, photos, OPTIONS).model, rng(0)) for m in ("plain", "utm"))
+    assert two[0].points == pytest.approx(one[0].points, abs=1e-6)
+    for a, b in zip(one[0].cameras, two[0].cameras, strict=True):
+        assert a.centre == pytest.approx(b.centre, abs=1e-6)
+    assert one[1].exemplar.side == pytest.approx(two[1].exemplar.side, abs=1e-6)
+
+
+@pytest.mark.parametrize("program", ["COLMAP", "nerfstudio", "OpenSfM"])
+def test_a_project_is_recognised_and_its_photos_have_cameras(tmp_path, program):
+    """As these programs lay them out: nerfstudio keeps smaller copies beside the images."""
+    shoot(tmp_path / "images")
+    if program == "COLMAP":
+        write_colmap(tmp_path / "sparse" / "0")
+    elif program == "nerfstudio":
+        shoot(tmp_path / "images_2", 0.5)
+        frames = [frame | {"file_path": f"images/{frame['file_path'][2:]}"} for frame in transforms()["frames"]]
+        write_json(tmp_path / "transforms.json", transforms() | {"frames": frames})
+    else:
+        (tmp_path / "opensfm").mkdir()
+        write_json(tmp_path / "opensfm/reconstruction.json", reconstruction())
+    found = recognize_input([tmp_path])
+    assert found.about == f"8 photos with cameras of {program}"
+    folder = PhotoFolder(Path(found.entry["folder"]))
+    placed, _ = match_photos_to_images(importers._read_model(Path(found.entry["model"]), folder), folder, tmp_path)
+    assert [place.path for place in placed] == [tmp_path / "images" / name for name in SCENE.names]
+
+
 def test_one_photo_of_two_images_and_fewer_than_three_photos_are_refused(tmp_path, photos):
     values = transforms()
     values["frames"][1]["file_path"] = "elsewhere/000.jpg"
@@ -187,7 +251,7 @@ def test_of_several_reconstructions_the_largest_is_taken_and_a_reference_makes_i
 
 
 def read_transforms(values, photos):
-    return import_nerfstudio(Path("t.json"), values, photos, PhotoFolder(photos).stored_size)
+    return import_nerfstudio(Path("t.json"), values, PhotoFolder(photos).stored_size)
 
 
 def test_frames_may_have_intrinsics_of_their_own_and_a_field_of_view_instead(photos):

@@ -49,7 +49,7 @@ SHEARED = (np.eye(4) + np.diag([0.01, 0, 0], 1)).tolist()
     [
         (["frames"], 7, "neither a transforms.json"),
         (["frames", 2], "x", "frame 2: Input should be an object"),
-        (["frames", 2, "file_path"], "../../secret.png", "secret.png' leads out"),
+        (["frames", 2, "file_path"], "../..", "'../..' is no name of a picture"),
         (["frames", 2, "file_path"], "./001.png", "001.png are one photo"),
         (["frames", 2, "transform_matrix"], [[1, 2], [3, 4]], "frame 2: transform_matrix.0.2: Field required"),
         (["frames", 2, "transform_matrix"], SHEARED, "frame 002.png: transform_matrix: its rotation is none"),
@@ -77,7 +77,7 @@ def test_transforms_that_cannot_be_are_refused_by_key(photos, tmp_path, where, v
         ([0, "shots", "002.png", "camera"], "v3", "shot 002.png: there is no camera 'v3'"),
         ([0, "shots", "002.png", "rotation"], [1, 2], "shot 002.png: rotation.2: Field required"),
         ([0, "shots", "002.png", "translation", 0], float("nan"), "NaN is no finite number"),
-        ([0, "shots", "C:\\photos\\1.png"], {}, "leads out of the photos' folder"),
+        ([0, "shots", "C:\\"], {}, "is no name of a picture"),
         ([0, "shots", "a\0b.png"], {}, "is no name of a picture"),
         ([0, "cameras", "v2 brown", "width"], 999999, "pixels; 1 pixel to"),
         ([0, "shots", "002.png", "rotation"], [1e6, 0, 0], "shot 002.png: rotation.0: Input should be less"),
@@ -121,7 +121,7 @@ def test_files_that_are_not_there_or_too_large_are_refused(photos, tmp_path):
     [
         ("cameras", "300.0 302.0", "-300.0 302.0", "camera 3: focal lengths -300"),
         ("images", " 3 000.png", " 4 000.png", "not readable as a COLMAP model"),
-        ("images", "001.png", "../001.png", "'../001.png' leads out"),
+        ("images", "001.png", "../", "'../' is no name of a picture"),
         ("images", "\n5 ", "\n5 2", "image 000.png: its rotation is none"),
         ("points3D", "\n100 ", "\nx ", "not readable as a COLMAP model"),
     ],

@@ -8,7 +8,12 @@ import pytest
 from fixtures import photos as synth
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos.colmap_model import intersect_rays, triangulate_model, write_colmap_model
+from dav_gswt.photos.colmap_model import (
+    intersect_rays,
+    transform_model,
+    triangulate_model,
+    write_colmap_model,
+)
 from dav_gswt.photos.sfm import gps
 from dav_gswt.photos.sfm.mapping import OBLIQUE, settle_focal_length
 from dav_gswt.photos.sfm.registration import require_parallax
@@ -66,6 +71,23 @@ def test_positions_over_an_area_place_the_photos_and_outliers_have_no_say(recons
     wild = {name: rng.normal(0, 60, 3) for name in model.names}
     assert not gps.align_to_gps(best, wild)
     assert not gps.align_to_gps(best, dict.fromkeys(model.names, np.full(3, np.nan)))
+
+
+def test_without_altitudes_the_model_gives_them_and_the_rest_stays_exact(reconstruct):
+    """A world upside down, so that up is found and not given; heights count from the ground."""
+    rng = np.random.default_rng(2)
+    model = synth.model(synth.flight(3, 4, step=0.4), synth.plain(500, 1.0, rng, relief=0.01))
+    true = place(model, rng, 0.0)
+    best = reconstruct(transform_model(model, 0.3, np.diag([1.0, -1.0, -1.0]), np.array([4.0, 5.0, 6.0])))
+    assert gps.align_to_gps(best, {name: at * [1, 1, np.nan] for name, at in true.items()})
+    off = [best.images[i].projection_center() - true[best.images[i].name] for i in best.reg_image_ids()]
+    assert np.abs(off).max() < 0.5  # metres, of 40: the plane of rough ground lies a hundredth off
+
+
+def test_positions_without_altitudes_count_from_the_ground(monkeypatch):
+    monkeypatch.setattr(gps, "read_gps_position", lambda path: (48.0 + 0.001 * int(path.name), 11.0, np.nan))
+    found = gps.read_gps_positions([Path(str(i)) for i in range(5)])
+    assert found.about.altitude == 0 and np.isnan(found.at[:, 2]).all() and np.isfinite(found.at[:, :2]).all()
 
 
 def test_a_similarity_in_the_plane_has_no_mirror():

@@ -8,6 +8,7 @@ import OpenImageIO as oiio
 import pycolmap
 import pytest
 from fixtures import photos as synth
+from fixtures import rooms
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
@@ -216,7 +217,16 @@ def test_photos_that_cannot_be_used_are_refused(tmp_path):
     with pytest.raises(InputError, match="2.jpg: not readable.*at least 3"):
         register_photos(tmp_path, OPTIONS)
     image_files.write_png(tmp_path / "2.png", np.full((60, 80, 3), 0.5))
-    with pytest.raises(InputError, match="0 of 3 photos.*texture"):
+    with pytest.raises(InputError, match="no two of the 3 photos show the same ground: .*texture"):
+        register_photos(tmp_path, OPTIONS)
+
+
+def test_a_camera_that_stands_still_is_told_to_move(tmp_path, ground):
+    rng = np.random.default_rng(0)
+    still = synth.photograph(synth.camera((0, 0, 1)), ground, HALF)
+    for i in range(4):
+        image_files.write_png(tmp_path / f"{i}.png", still + rng.normal(0, 0.01, still.shape))
+    with pytest.raises(InputError, match="stood still: the 4 photos .* Walk or fly"):
         register_photos(tmp_path, OPTIONS)
 
 
@@ -241,3 +251,32 @@ def test_without_exif_the_focal_length_is_found_and_a_photo_of_something_else_is
     assert name == "other.png" and "matches no photo" in reason and found.model.names == NAMES
     # The guess is 28 % long; heights that differ by a fifth fix it to about the noise of features.
     assert found.focal.ratio is None and found.model.cameras[0].fx == pytest.approx(synth.FOCAL, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("take", [rooms.photograph_room, rooms.photograph_table])
+def test_a_room_and_a_thing_on_a_table_are_no_ground(tmp_path, take):
+    for i, picture in enumerate(take(np.random.default_rng(3))):
+        image_files.write_png(tmp_path / f"{i:02d}.png", picture)
+    with pytest.raises(InputError, match="show no ground: photos look .* Photograph an open patch of ground"):
+        register_photos(tmp_path, replace(OPTIONS, features=2000))
+
+
+WEAK = ("IMG_0022.jpg", "IMG_0025.jpg", "IMG_0028.jpg")  # they hang on the other seven by three to seven points
+FIRM = tuple(f"IMG_{n:04d}.jpg" for n in (31, 34, 37, 43, 46, 49, 52))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mapper", ["incremental", "global"])
+def test_photos_that_hang_on_the_others_by_a_few_points_are_left_out_by_name(photo_sets, tmp_path, monkeypatch, mapper):
+    for name in (*WEAK, *FIRM):
+        (tmp_path / name).symlink_to(photo_sets / "copr_dunes/images" / name)
+    if mapper == "global":
+        monkeypatch.setattr(
+            registration, "find_solution", lambda scene, seed: mapping._solve(Approach("global"), scene, seed)
+        )
+    found = register_photos(tmp_path, SfmOptions(side=512))
+    assert {name for name, _ in found.left_out} == set(WEAK) and len(found.model.names) == len(FIRM)
+    assert {sign.name: sign.grade for sign in found.verdict.signs}["hangs together"] == "good"
+    if mapper == "global":
+        assert all("points tie it to the other photos" in reason for _, reason in found.left_out)

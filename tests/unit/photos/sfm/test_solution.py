@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
+import numpy as np
 import pycolmap
 import pytest
+from fixtures import photos as synth
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import FocalLength, SfmSign, SfmVerdict
+from dav_gswt.photos.colmap_model import select_points, write_colmap_model
 from dav_gswt.photos.sfm import mapping
 from dav_gswt.photos.sfm.mapping import Approach, SfmPhoto, SfmScene, SfmSolution
 
@@ -91,3 +94,18 @@ def test_photos_without_a_place_are_named_with_what_they_share():
     assert unsure == 1
     assert two[0] == "2.jpg" and "shares 50 points" in two[1]
     assert three[0] == "3.jpg" and "matches no photo" in three[1] and "shares 1 points" in four[1]
+
+
+def test_photos_that_hang_on_the_others_by_a_few_points_lose_their_place(tmp_path):
+    rng = np.random.default_rng(1)
+    whole = synth.model(synth.flight(3, 4), synth.plain(800, 0.9, rng, relief=0.02))
+    for ties, lost in ((7, {8: 7, 9: 7, 10: 7, 11: 7}), (60, {})):
+        loose = synth.loosen(whole, 4, ties)
+        write_colmap_model(select_points(loose, np.bincount(loose.point_of, minlength=800) >= 2), tmp_path)
+        best = pycolmap.Reconstruction(str(tmp_path))
+        assert mapping.remove_loose_photos(best) == lost
+        assert best.num_reg_images() == 12 - len(lost)
+        assert min(point.track.length() for point in best.points3D.values()) >= 2
+    photos = [SfmPhoto(Path(f"{i}.jpg"), f"{i}.png", (4, 3), 4, 3, None) for i in range(3)]
+    ((name, reason),), _ = mapping.explain_left_out(photos, {0, 1}, [(0, 1, 90), (0, 2, 40)], {2: 7})
+    assert name == "2.jpg" and reason.startswith("only 7 points tie it to the other photos")

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from fixtures import photos as synth
 
+from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import SfmSign, SfmVerdict
 from dav_gswt.photos.sfm.verdict import (
     THRESHOLDS,
     combine_grades,
     judge_model,
+    require_trust,
 )
 
 HEIGHT = 40.0  # metres in a unit of the made models
@@ -86,6 +88,13 @@ def test_points_that_two_photos_see_are_no_good_sign(model):
     assert grades(judge(short))["track length"] == "refused"
 
 
+@pytest.mark.parametrize(("ties", "grade"), [(7, "refused"), (30, "doubtful"), (60, "good")])
+def test_photos_that_hang_on_the_others_by_a_few_points_are_named(model, ties, grade):
+    (sign,) = (sign for sign in judge(synth.loosen(model, 5, ties)).signs if sign.name == "hangs together")
+    assert sign.grade == grade
+    assert grade == "good" or sign.reason.startswith(f"only {ties} points tie 015.png, 016.png, 017.png, ... to")
+
+
 def signs(*grades: tuple[str, str]) -> list[SfmSign]:
     return [SfmSign(name, grade, "a reason") for name, grade in grades]
 
@@ -104,3 +113,15 @@ def signs(*grades: tuple[str, str]) -> list[SfmSign]:
 )
 def test_signs_are_weighed_together(found, grade):
     assert combine_grades(signs(*found)) == grade
+
+
+@pytest.mark.parametrize(
+    ("found", "message"),
+    [
+        ([("tilt", "refused"), ("relief", "refused")], "show no ground: a reason; a reason. Photograph an open patch"),
+        ([("tilt", "refused"), ("reprojection error", "refused")], "do not fit together to one scene"),
+    ],
+)
+def test_a_refused_model_says_what_to_photograph_or_to_mend(found, message):
+    with pytest.raises(InputError, match=message):
+        require_trust(SfmVerdict("refused", tuple(signs(*found))))

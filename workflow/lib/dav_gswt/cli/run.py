@@ -1,6 +1,7 @@
 """What `make run` and `make view` do: run the workflow, say where the results are, and serve the page."""
 
 import argparse
+import getpass
 import os
 import re
 import shutil
@@ -27,6 +28,7 @@ LOGGER = Path("workflow/logger")  # a plugin of Snakemake, found by PYTHONPATH
 PROFILE_NOTE = "Using workflow specific profile"  # printed by Snakemake before its loggers begin
 JOB = re.compile(r"\[\d+ of \d+\] .* \.\.\.$")  # a line of the log at which a job begins
 PROGRESS = re.compile(r"  .* gone, about .* left")  # a line of a job that says how far it is
+ODD_LETTERS = re.compile(r"""[\s'"\\$&;()<>|*?\[\]{}`!]""")  # that a shell does not take as they are
 SELDOM = 30.0  # seconds between such lines where they are not written over each other
 GRACE = 5.0  # seconds that jobs have to end by themselves after a signal, and then Snakemake
 
@@ -86,8 +88,14 @@ def run_workflow(
     root: of the workflow. folder: gets `results`. Snakemake does not remove the lock of a run that was killed; this
     function does, unless a process still works in the folder.
 
-    Raises: InputError: another run works in the folder.
+    Raises: InputError: another run works in the folder, or Snakemake cannot start this Python.
     """
+    if ODD_LETTERS.search(sys.executable):
+        raise InputError(
+            f"{sys.executable}: Snakemake starts no job with a Python whose path has blanks or quotes; install the "
+            "program into a folder without them"
+        )
+    os.environ.update(replace_missing_user(folder))
     snakemake = [sys.executable, "-m", "snakemake", "--config", f"scene={scene}"]
     if root != Path():
         profile = root / "workflow/profiles/default"  # Snakemake finds it in a clone, beside the Snakefile
@@ -128,6 +136,25 @@ def short_log(root: Path) -> dict[str, str]:
     """The environment in which Snakemake finds the plugin `--logger davgswt` of a checkout."""
     places = [str(root / LOGGER), *filter(None, [os.environ.get("PYTHONPATH")])]
     return os.environ | {"PYTHONPATH": os.pathsep.join(places)}
+
+
+def replace_missing_user(folder: Path) -> dict[str, str]:
+    """The variables that take the place of what the system does not know of its user, as under `docker run --user`.
+
+    Without an entry in /etc/passwd there is no name; where the home cannot be written, caches and settings of
+    libraries go to `folder`.
+    """
+    missing = {}
+    try:
+        getpass.getuser()
+    except (KeyError, OSError):  # OSError from Python 3.13 on
+        missing["USER"] = f"user{os.getuid()}"
+    for name, usual in (("XDG_CACHE_HOME", ".cache"), ("XDG_CONFIG_HOME", ".config")):
+        place = Path(os.environ.get(name) or Path(os.environ.get("HOME", ""), usual))
+        there = next(part for part in (place, *place.parents) if part.exists())
+        if not place.is_absolute() or not os.access(there, os.W_OK):
+            missing[name] = str(folder.resolve() / ".snakemake" / name.lower())
+    return missing
 
 
 def follow(command: list[str], root: Path = Path()) -> tuple[int, int]:

@@ -1,5 +1,6 @@
 """Read config files, check them, and fill in the defaults; errors name the key and what it may be."""
 
+import logging
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
@@ -11,6 +12,8 @@ from pydantic import BaseModel, ValidationError
 from dav_gswt.config.base import ANY, iterate_tables, lower_first
 from dav_gswt.config.model import Config
 from dav_gswt.errors import InputError, summarize_error
+
+_log = logging.getLogger(__name__)
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -38,20 +41,42 @@ def merge_tables(below: dict, above: dict) -> dict:
     return below | both
 
 
-def add_scene_files(config: dict, folder: Path) -> dict:
+def add_scene_files(config: dict, folder: Path, quietly: bool = False) -> dict:
     """The config with the scenes of config/scenes/*.yaml (or .yml); keys of `scenes` replace those of a file.
 
-    Raises: InputError: a file is no YAML, two have one name, or the config has a scene of that name of another kind.
+    A file that is no scene is left out, with a warning unless `quietly`, if the config neither asks for its scene nor
+    has keys of it.
+    Raises: InputError: the file that is asked for is no YAML, two have one name, or the config has a scene of that name
+    of another kind.
     """
     scenes, own = {}, config.get("scenes") or {}
     for path in sorted(folder.glob("[!.]*.y*ml")):  # those with a dot are of an editor or a file system
         if path.stem in scenes:
             raise InputError(f"{path}: there is a scene of this name in {path.stem}.yaml, too; remove one of them")
-        scenes[path.stem] = scene = _read_yaml(path)
+        try:
+            scenes[path.stem] = scene = _read_yaml(path)
+            if path.stem not in (config.get("scene"), *own):
+                _require_scene(path.stem, scene, config)
+        except InputError as error:
+            if path.stem in (config.get("scene"), *own):
+                raise
+            scenes.pop(path.stem, None)
+            if not quietly:
+                _log.warning("%s: the scene is left out: %s", path, str(error).removeprefix(f"{path}: "))
+            continue
         kinds = [table.get("kind") for table in (scene, own.get(path.stem) or {}) if isinstance(table, dict)]
         if len(kinds) == 2 and all(kinds) and kinds[0] != kinds[1]:
             raise InputError(f"{path}: the config has a scene {path.stem} of kind {kinds[1]}, too; rename this file")
     return config | {"scenes": merge_tables(scenes, own)}
+
+
+def _require_scene(name: str, scene: dict, config: dict) -> None:
+    """Raises: InputError: the scene could not be made by this config, for a reason that lies in the scene."""
+    try:
+        check_config(config | {"scene": name, "scenes": {name: scene}})
+    except InputError as error:
+        if str(error).startswith(f"config: scenes.{name}"):
+            raise
 
 
 def parse_command_line(values: Mapping[str, Any]) -> dict[str, Any]:

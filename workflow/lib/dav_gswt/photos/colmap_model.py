@@ -9,6 +9,7 @@ import pycolmap
 from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
@@ -100,6 +101,25 @@ def count_shared_points(model: ColmapModel) -> Int[Array, "images images"]:
     sees = csr_array((np.ones(len(model.image_of), np.int64), (model.image_of, model.point_of)), shape=shape)
     sees.data[:] = 1  # a point may be seen twice in one image
     return (sees @ sees.T).toarray()
+
+
+def group_images(model: ColmapModel, least: int) -> tuple[Int[Array, "images"], Int[Array, "groups groups"]]:
+    """The groups of images that at least so many points tie together, and how many points tie each two groups.
+
+    A point ties two groups if both see it, and three images in all: of two images that share a point, neither is given
+    a scale by the other. Groups begin as single images and merge until no two have enough ties.
+    """
+    ties = (np.bincount(model.point_of, minlength=len(model.points)) >= 3)[model.point_of]
+    group, count = np.arange(len(model.names)), -1
+    while True:
+        at = group[model.image_of[ties]], model.point_of[ties]
+        sees = csr_array((np.ones(len(at[0]), np.int64), at), shape=(group.max(initial=0) + 1, len(model.points)))
+        sees.data[:] = 1
+        shared = (sees @ sees.T).toarray()
+        found, merged = connected_components(shared >= least, directed=False)
+        if found == count:
+            return group, shared
+        group, count = merged[group], found
 
 
 def triangulate_model(model: ColmapModel, names: Sequence[str]) -> ColmapModel:

@@ -23,6 +23,10 @@ COARSE_CELLS = 160  # while directions of the x axis are tried
 TURN = 5  # degrees between the directions tried for the x axis
 INSET = 0.02  # kept from the border of the well-seen ground, as a share of the exemplar's side
 NEAR = 0.25  # flying heights: ground farther than this from every point has no texture that photos agree on (water)
+PHOTOGRAPH_GROUND = (
+    "Photograph an open patch of ground (sand, grass, gravel) from above, looking down; leave out photos of rooms, "
+    "walls and single things"
+)
 
 
 @dataclass(frozen=True)
@@ -229,8 +233,8 @@ def _level_model(model: ColmapModel, rng: np.random.Generator) -> tuple[ColmapMo
     height = float(np.median(heights))
     if height < 3 * spread or np.mean(heights < 0) > 0.2:
         raise InputError(
-            "the photos do not look down on a ground: they were not taken above the plane that fits their points best; "
-            "use photos taken from above the ground, or leave out those of walls, rooms and single things"
+            "the photos show no ground: they were not taken above the plane that fits their points best. "
+            + PHOTOGRAPH_GROUND
         )
     # Around a circle the mean of the pictures' right is about zero, and the first picture's right is used.
     first, mean = model.cameras[0].rotation, np.mean([camera.rotation[0] for camera in model.cameras], axis=0)

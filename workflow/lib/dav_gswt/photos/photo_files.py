@@ -70,7 +70,7 @@ def convert_equivalent(film: float, width: int, height: int) -> float:
 
 
 def read_gps_position(path: Path | str) -> tuple[float, float, float] | None:
-    """Latitude and longitude in degrees and altitude in metres, or None where EXIF does not have all three."""
+    """Latitude and longitude in degrees and altitude in metres, NaN where EXIF has none; None without a place."""
     tags = _read_tags(path)
 
     def read(name: str) -> list[float]:
@@ -82,10 +82,13 @@ def read_gps_position(path: Path | str) -> tuple[float, float, float] | None:
         if len(parts) != 3 or not 0 <= (angle := parts[0] + parts[1] / 60 + parts[2] / 3600) <= most:
             return None
         angles.append(-angle if str(tags.get(f"GPS GPS{name}Ref")).startswith(negative) else angle)
-    altitude = read("Altitude")
-    if not altitude or not abs(altitude[0]) < 1e5 or angles == [0.0, 0.0]:
+    if angles == [0.0, 0.0]:
         return None
-    return angles[0], angles[1], -altitude[0] if read("AltitudeRef") == [1.0] else altitude[0]
+    altitude = read("Altitude")
+    if not altitude or not abs(altitude[0]) < 1e5:
+        return angles[0], angles[1], math.nan
+    below = read("AltitudeRef") in ([1.0], [3.0])  # 3 since EXIF 3.0: below the sea, no longer the ellipsoid
+    return angles[0], angles[1], -altitude[0] if below else altitude[0]
 
 
 def read_capture_time(path: Path | str) -> str | None:

@@ -89,9 +89,12 @@ def _recognize_folder(folder: Path, name: str, model: Path | None) -> Recognised
         names = " and ".join(f"{program} ({path.relative_to(folder)})" for program, path in models)
         raise InputError(f"{folder}: has cameras of {names}; say which with --model PATH")
     if models and not photos:
-        raise InputError(f"{folder}: has cameras of {models[0][0]}, but no photos; its photos belong in the folder too")
+        raise InputError(
+            f"{folder}: has cameras of {models[0][0]}, but no photos; put them into its folder images, or name their "
+            f"folder and the cameras: dav-gswt make PHOTOS --model {models[0][1]}"
+        )
     if models:
-        splats = []  # a project's own results
+        splats, videos = [], []  # a project's own results, and what its photos were taken from
     things = {"photos": photos, "a video": videos, "a splat": splats}
     there = [f"{what} ({paths[0].relative_to(folder)})" for what, paths in things.items() if paths]
     if len(there) > 1:
@@ -121,7 +124,8 @@ def _find_models(folder: Path) -> list[tuple[str, Path]]:
     else:
         sparse = [folder / "sparse", *sorted((folder / "sparse").glob("[0-9]*"))]
         found = [place for place in sparse if any((place / name).is_file() for name in COLMAP_FILES)]
-        models += [("COLMAP", place) for place in found[:1]]
+        sizes = [sum(path.stat().st_size for path in place.glob("images.*")) for place in found]
+        models += [("COLMAP", found[sizes.index(max(sizes))])] if found else []
     models += [("nerfstudio", folder / "transforms.json")] * (folder / "transforms.json").is_file()
     opensfm = [folder / name for name in OPENSFM_FILES if (folder / name).is_file()]
     return models + [("OpenSfM", place) for place in opensfm[:1]]

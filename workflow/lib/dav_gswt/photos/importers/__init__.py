@@ -36,9 +36,10 @@ _log = logging.getLogger(__name__)
 def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Registration:
     """The photos of a folder with the cameras of a model.
 
-    A photo belongs to the image of the same name: the path below the folder, else the stem. It may
-    be a scaled copy. The points are those of the model if it says which image
-    sees them. Otherwise they are triangulated from features under the given cameras.
+    A photo belongs to the image of the same name: the path below the folder, else the file name whose last folders
+    agree, whatever machine the path is of. No file outside the folder is read. A photo may be a scaled copy. The points
+    are those of the model if it says which image sees them. Otherwise they are triangulated from features under the
+    given cameras.
     Raises: InputError: not a model, damaged, one that is not read, or fewer than three photos have a camera in it.
     """
     path, photos = Path(path), PhotoFolder(folder)
@@ -79,7 +80,7 @@ def _read_model(path: Path, photos: PhotoFolder) -> ImportedModel:
     """What a file says, whichever kind it is of."""
     if path.is_dir():
         if model := find_colmap_folder(path):
-            return import_colmap(model, photos.folder)
+            return import_colmap(model)
         raise InputError(
             f"{path}: no COLMAP model in this folder (cameras and images, as .bin or .txt); of other programs name the "
             "file itself, transforms.json or reconstruction.json"
@@ -87,9 +88,9 @@ def _read_model(path: Path, photos: PhotoFolder) -> ImportedModel:
     check_size(path, LARGEST_JSON)
     values = read_json(path)
     if isinstance(values, dict) and isinstance(values.get("frames"), list):
-        return import_nerfstudio(path, values, photos.folder, photos.stored_size)
+        return import_nerfstudio(path, values, photos.stored_size)
     if isinstance(values, list) and values and isinstance(values[0], dict) and "shots" in values[0]:
-        return import_opensfm(path, values, photos.folder)
+        return import_opensfm(path, values)
     raise InputError(
         f"{path}: neither a transforms.json (an object with a list `frames`) nor a reconstruction.json (a list of "
         "objects with `shots`); name one of these, or a folder of COLMAP's"

@@ -1,6 +1,6 @@
 """Imported models, and checks of the untrusted files that they come from.
 
-Sizes, finite numbers, proper rotations, and names that stay in their folder are checked. Errors
+Sizes, finite numbers, proper rotations, and names of pictures are checked. Errors
 name the file, and the key or image within it.
 """
 
@@ -33,7 +33,7 @@ class ImportedImage:
     """One image of a model. A world point p has camera coordinates rotation @ p + translation (x
     right, y down).
 
-    name: relative to the photos' folder, with slashes. lens: at the size that the model gives, of the picture as it is
+    name: a path with slashes, whose end is a photo's. lens: at the size that the model gives, of the picture as it is
     stored. number: of the image among the model's points.
     """
 
@@ -91,23 +91,17 @@ def check_pose(pose: Float[Array, "3 4"], where: str) -> tuple[Float[Array, "3 3
     return u @ vt, pose[:, 3].copy()
 
 
-def check_image_name(value: str, folder: Path, where: str) -> str:
-    """The name of an image, relative to the photos' folder and with slashes.
+def check_image_name(value: str, where: str) -> str:
+    """The name of an image, with slashes: a path of whatever machine without its drive, root and steps upwards.
 
-    Raises: InputError: it leads out of the folder, or is no name.
+    Photos are found by such a name among those of the folder (`PhotoFolder.find`); it is never opened.
+    Raises: InputError: it is no name.
     """
-    plain = value.replace("\\", "/")
-    if not plain.strip("./ ") or len(plain) > LONGEST_NAME or not plain.isprintable():
+    plain = _DRIVE.sub("", value.replace("\\", "/"))
+    kept = [part for part in PurePosixPath(plain).parts if part not in ("/", "//", "..")]
+    if not "".join(kept).strip() or len(value) > LONGEST_NAME or not value.isprintable():
         raise InputError(f"{where}: {value[:80]!r} is no name of a picture; write its path below the photos' folder")
-    path = PurePosixPath(plain)
-    if ".." not in path.parts and path.is_absolute() and path.is_relative_to(folder.absolute().as_posix()):
-        path = path.relative_to(folder.absolute().as_posix())
-    if ".." in path.parts or path.is_absolute() or _DRIVE.match(plain):
-        raise InputError(
-            f"{where}: {value[:80]!r} leads out of the photos' folder {folder}; write the path below it, or the file "
-            "name alone"
-        )
-    return str(path)
+    return "/".join(kept)
 
 
 def check_count(images: int, where: str) -> None:

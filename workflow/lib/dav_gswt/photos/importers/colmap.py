@@ -33,7 +33,7 @@ def _has_both(folder: Path, kind: str) -> bool:
     return all((folder / f"{part}.{kind}").is_file() for part in _PARTS[:2])
 
 
-def import_colmap(folder: Path, photos: Path) -> ImportedModel:
+def import_colmap(folder: Path) -> ImportedModel:
     """Read a model. Raises: InputError: damaged, or what it says cannot be."""
     kind = "bin" if _has_both(folder, "bin") else "txt"
     files = {part: folder / f"{part}.{kind}" for part in _PARTS}
@@ -45,7 +45,7 @@ def import_colmap(folder: Path, photos: Path) -> ImportedModel:
     }
     images = []
     for number, image in sorted(stored.images.items()):
-        name = checks.check_image_name(image.name, photos, str(files["images"]))
+        name = checks.check_image_name(image.name, str(files["images"]))
         pose = checks.check_pose(image.cam_from_world().matrix(), f"{files['images']}: image {name}")
         images.append(ImportedImage(name, cameras[image.camera_id], *pose, number))
     return ImportedModel(tuple(images), stored)

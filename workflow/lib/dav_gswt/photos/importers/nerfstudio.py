@@ -64,9 +64,7 @@ class Intrinsics:
     is_fisheye: bool = False
 
 
-def import_nerfstudio(
-    path: Path, values: dict, photos: Path, size_of: Callable[[str], tuple[int, int] | None]
-) -> ImportedModel:
+def import_nerfstudio(path: Path, values: dict, size_of: Callable[[str], tuple[int, int] | None]) -> ImportedModel:
     """The frames of the file. Points of `ply_file_path` are not read, as photos under known cameras
     give points.
 
@@ -76,7 +74,7 @@ def import_nerfstudio(
     images, lens_of = [], {}
     for i, part in enumerate(values["frames"]):
         frame = parse_part(part, Frame, f"{path}: frame {i}")
-        name = check_image_name(frame.file_path, photos, f"{path}: frame {i}")
+        name = check_image_name(frame.file_path, f"{path}: frame {i}")
         where = f"{path}: frame {name}"
         if frame.transform_matrix[3:] not in ([], [(0, 0, 0, 1)]):
             raise InputError(f"{where}: transform_matrix: its last row is not 0 0 0 1; export the file again")

@@ -71,7 +71,7 @@ class Place:
     altitude: Annotated[float, Field(gt=-1e5, lt=1e5)]
 
 
-def import_opensfm(path: Path, values: list[dict], photos: Path) -> ImportedModel:
+def import_opensfm(path: Path, values: list[dict]) -> ImportedModel:
     """The largest of the file's reconstructions. Its points are not read, as the file does not say
     who sees them.
 
@@ -89,7 +89,7 @@ def import_opensfm(path: Path, values: list[dict], photos: Path) -> ImportedMode
             *(path, number, len(chosen["shots"])),
         )
     cameras = {key: _make_lens(said, f"{path}: camera {key[:80]!r}") for key, said in chosen["cameras"].items()}
-    images = (_read_shot(name, shot, cameras, photos, path) for name, shot in chosen["shots"].items())
+    images = (_read_shot(name, shot, cameras, path) for name, shot in chosen["shots"].items())
     return ImportedModel(tuple(images), about=_read_georeference(chosen.get("reference_lla"), path))
 
 
@@ -126,8 +126,8 @@ def _make_lens(values, where: str) -> pycolmap.Camera:
     return make_lens((width, height), pinhole, k, p, kind in FISHEYE, where)
 
 
-def _read_shot(label: str, values, cameras: dict[str, pycolmap.Camera], photos: Path, path: Path) -> ImportedImage:
-    name = check_image_name(label, photos, str(path))
+def _read_shot(label: str, values, cameras: dict[str, pycolmap.Camera], path: Path) -> ImportedImage:
+    name = check_image_name(label, str(path))
     where = f"{path}: shot {name}"
     shot = parse_part(values, Shot, where)
     if shot.camera not in cameras:

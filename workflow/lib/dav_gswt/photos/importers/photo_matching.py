@@ -4,6 +4,7 @@ import logging
 import unicodedata
 from collections import defaultdict
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path, PurePosixPath
 
 import pycolmap
@@ -48,17 +49,28 @@ class PhotoFolder:
             self._stems[split_stem(name)].append(name)
 
     def find(self, name: str) -> str | None:
-        """The photo of that name: the same path, else the only one with that stem."""
+        """The photo of that name: the same path, else the one of that stem whose last folders and suffix agree best.
+
+        None: there is none, or several agree equally.
+        """
         name = unicodedata.normalize("NFC", name)
         if name in self.photos:
             return name
         found = self._stems.get(split_stem(name), [])
-        return found[0] if len(found) == 1 else None
+        ranks = [_compare_paths(PurePosixPath(photo), PurePosixPath(name)) for photo in found]
+        best = [photo for photo, rank in zip(found, ranks, strict=True) if rank == max(ranks)]
+        return best[0] if len(best) == 1 else None
 
     def stored_size(self, name: str) -> tuple[int, int] | None:
         """Width and height of a photo as stored, without EXIF's orientation; None where there is no such photo."""
         found = self.find(name)
         return None if found is None else image_files.read_stored_size(self.photos[found])[:2]
+
+
+def _compare_paths(one: PurePosixPath, other: PurePosixPath) -> tuple[int, bool]:
+    """How many of the last folders are equal, and whether the file names are."""
+    pairs = zip(reversed(one.parent.parts), reversed(other.parent.parts), strict=False)
+    return len([*takewhile(lambda pair: pair[0] == pair[1], pairs)]), one.name == other.name
 
 
 def match_photos_to_images(

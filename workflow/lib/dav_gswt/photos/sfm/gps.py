@@ -2,6 +2,7 @@
 
 Receivers in cameras lag and drift. A robust similarity aligns the cameras with the positions; where the residuals
 exceed the error of receivers, the positions are not used. Otherwise they are priors of the last bundle adjustment.
+A geo.txt beside the photos, as OpenDroneMap reads it, counts before their EXIF.
 """
 
 import logging
@@ -14,7 +15,9 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.photos.colmap_model import bundle_adjust
+from dav_gswt.photos.colmap_model import ColmapModel, bundle_adjust, model_from_reconstruction
+from dav_gswt.photos.geo_file import read_geo_files
+from dav_gswt.photos.ground_frame import fit_plane, make_upright_rotation
 from dav_gswt.photos.photo_files import read_gps_position
 
 _log = logging.getLogger(__name__)
@@ -31,7 +34,8 @@ ROUNDS = 50  # of reweighting
 class GpsPositions:
     """Where photos were taken. about: the place of a frame of metres east, north and up; its own north is 0.
 
-    at: in that frame, by photo; NaN where a photo does not say.
+    at: in that frame, by photo; NaN where a photo does not say. Where altitudes are not known all of them are NaN, and
+    the altitude of `about` is 0: the ground's, as `fill_altitudes` has it.
     """
 
     about: Georeference
@@ -40,13 +44,18 @@ class GpsPositions:
 
 def read_gps_positions(paths: list[Path]) -> GpsPositions | None:
     """The positions of a set's photos; None, with the reason in the log, where they cannot place it."""
-    found = np.array([read_gps_position(path) or (np.nan,) * 3 for path in paths], float)
+    listed = read_geo_files(paths)
+    found = np.array([listed.get(path) or read_gps_position(path) or (np.nan,) * 3 for path in paths], float)
+    placed = np.isfinite(found[:, :2]).all(1)
+    if not placed.any():
+        return None
+    if placed.mean() < LEAST_SHARE:
+        _log.warning("only %d of %d photos have a GPS position: none is used", placed.sum(), len(paths))
+        return None
     known = np.isfinite(found).all(1)
-    if not known.any():
-        return None
-    if known.mean() < LEAST_SHARE:
-        _log.warning("only %d of %d photos have a GPS position: none is used", known.sum(), len(paths))
-        return None
+    if level := bool(known.mean() < LEAST_SHARE):
+        _log.info("GPS: %d of %d photos have no altitude: the model gives it", len(paths) - known.sum(), len(paths))
+        known, found[:, 2] = placed, 0.0
     about = Georeference(*map(float, np.median(found[known], axis=0)), north=0.0, metres_per_unit=1.0)
     at = np.full(found.shape, np.nan)
     at[known] = about.to_world(found[known])
@@ -54,6 +63,8 @@ def read_gps_positions(paths: list[Path]) -> GpsPositions | None:
     if spread < LEAST_SPREAD * ACROSS:
         _log.warning("the photos' GPS positions lie within %.0f m, which is within their error: none is used", spread)
         return None
+    if level:
+        at[:, 2] = np.nan
     return GpsPositions(about, at)
 
 
@@ -68,12 +79,34 @@ def measure_spread(at: Float[Array, "n 3"]) -> tuple[float, bool]:
     return float(np.linalg.norm(centred[:, :2])), bool(across >= LEAST_WIDTH * ACROSS)
 
 
-def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]) -> bool:
+def fill_altitudes(model: ColmapModel, at: Float[Array, "n 3"], rng: np.random.Generator) -> Float[Array, "n 3"]:
+    """The positions of a model's images with the model's own altitudes over its ground, where no altitude is known.
+
+    The model is levelled by the plane of its points; its scale and north are those that fit the positions in the plane.
+    """
+    known = np.isfinite(at[:, :2]).all(1)
+    if known.sum() < 3 or np.isfinite(at[:, 2]).any():
+        return at
+    normal, offset, _ = fit_plane(model.points, rng)
+    centres = np.stack([camera.centre for camera in model.cameras])
+    heights = centres @ normal - offset
+    if np.median(heights) < 0:
+        normal, heights = -normal, -heights
+    level = centres @ make_upright_rotation(normal, np.eye(3)[np.abs(normal).argmin()]).T
+    scale, _, _, _ = fit_similarity(level[known, :2], at[known, :2])
+    return np.c_[at[:, :2], scale * heights]
+
+
+def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]], seed: int = 0) -> bool:
     """Bring a reconstruction into the frame of the positions, in place, and adjust it with them as priors.
 
-    at: the positions by the images' names. Returns whether the positions agree with the photos; if not, or if they lie
-    on one line or within the error of receivers, nothing is changed.
+    at: the positions by the images' names; where they have no altitude the model's own is taken. Returns whether the
+    positions agree with the photos; if not, or if they lie on one line or within the error of receivers, nothing is
+    changed.
     """
+    model = model_from_reconstruction(best)
+    filled = fill_altitudes(model, np.stack([at[name] for name in model.names]), np.random.default_rng(seed))
+    at = dict(zip(model.names, filled, strict=True))
     numbers = [i for i in best.reg_image_ids() if np.isfinite(at[best.images[i].name]).all()]
     if len(numbers) < 3:
         return False

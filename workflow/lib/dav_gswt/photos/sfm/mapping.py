@@ -10,9 +10,11 @@ the adjusted one is used.
 
 import logging
 from collections import defaultdict
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -23,10 +25,11 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import FocalLength, SfmVerdict
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import bundle_adjust, model_from_reconstruction
+from dav_gswt.photos.colmap_model import bundle_adjust, group_images, model_from_reconstruction
 from dav_gswt.photos.ground_frame import fit_plane
 from dav_gswt.photos.sfm.features import run_cancellable
-from dav_gswt.photos.sfm.verdict import COVERAGE, LEAST_INLIERS, judge_model
+from dav_gswt.photos.sfm.gps import fill_altitudes
+from dav_gswt.photos.sfm.verdict import COVERAGE, LEAST_INLIERS, LEAST_TIES, judge_model
 
 _log = logging.getLogger(__name__)
 
@@ -36,6 +39,7 @@ LEAST_PLACED = 0.8  # of the photos that the first way of mapping places: as man
 OBLIQUE = 20.0  # degrees off the vertical from which a view helps to fix the focal length
 LEAST_OBLIQUE, LEAST_SHARE = 3, 0.15  # oblique views that fix it: a number, and a share of all
 HELD = 0.03  # an adjusted focal length this close to EXIF's confirms it
+STILL = 0.01  # of the longer side: pictures that move less, median over the pairs, are of a camera that stood still
 LENSES = 0.35, 6.0  # focal length in longer sides of the picture: a fisheye's to a long telescope's
 
 
@@ -153,41 +157,98 @@ def _solve(approach: Approach, scene: SfmScene, seed: int) -> SfmSolution:
     """Map in one way. Raises: InputError: too few photos found a place, or a focal length that no lens has."""
     photos, gps = scene.photos, scene.gps
     found = _run_mapping(approach, scene, seed)
-    best = max(found, key=lambda r: (r.num_reg_images(), r.num_points3D()), default=None)
+    loose = [remove_loose_photos(model) for model in found]
+    best, loose = max(
+        zip(found, loose, strict=True), key=lambda r: (r[0].num_reg_images(), r[0].num_points3D()), default=(None, {})
+    )
     pairs = _read_pairs(scene.database)
     placed = {number - 1 for number in best.reg_image_ids()} if best else set()
-    left_out, unsure = explain_left_out(photos, placed, pairs)
+    left_out, unsure = explain_left_out(photos, placed, pairs, loose)
     if best is None or len(placed) < LEAST_PHOTOS:
+        if not any(inliers >= LEAST_INLIERS for *_, inliers in pairs):
+            raise InputError(
+                f"{scene.folder}: no two of the {len(photos)} photos show the same ground: photograph one patch that "
+                "has texture, so that each photo overlaps the one before by two thirds"
+            )
         raise InputError(
             f"{scene.folder}: {len(placed)} of {len(photos)} photos could be placed relative to each other; they must "
             "overlap by more than half and show texture: take more from closer positions, or remove what shows "
             "something else"
         )
     best, settled = settle_focal_length(best, scene.held, np.random.default_rng(seed), approach.hold_focal)
-    model = model_from_reconstruction(best)
+    model, rng = model_from_reconstruction(best), np.random.default_rng(seed)
+    positions = fill_altitudes(model, np.stack([gps[name] for name in model.names]), rng) if gps else None
     verdict = judge_model(
         model,
         np.random.default_rng(seed),
         error=float(best.compute_mean_reprojection_error()),
         images=len(photos),
         focal_ratio=settled.free / settled.exif if settled.free and settled.exif else None,
-        positions=np.stack([gps[name] for name in model.names]) if gps else None,
+        positions=positions,
     )
     return SfmSolution(best, left_out, settled, verdict, unsure)
+
+
+def require_motion(scene: SfmScene) -> None:
+    """Raises: InputError: of most pairs of photos that match, the pictures are the same but for noise."""
+    moves = []
+    with closing(pycolmap.Database.open(scene.database)) as store:
+        places = [store.read_keypoints(i + 1)[:, :2].astype(float) for i in range(len(scene.photos))]
+        for one, two, inliers in _list_pairs(store):
+            if inliers >= LEAST_INLIERS:
+                matches = store.read_two_view_geometry(one + 1, two + 1).inlier_matches
+                off = places[one][matches[:, 0]] - places[two][matches[:, 1]]
+                side = max(scene.photos[one].width, scene.photos[one].height)
+                moves.append(float(np.median(np.linalg.norm(off, axis=1))) / side)
+    if moves and np.median(moves) < STILL:
+        raise InputError(
+            f"{scene.folder}: the camera stood still: the {len(scene.photos)} photos show the same picture, which says "
+            "nothing of heights and distances. Walk or fly over the ground, and take each photo a third of a picture "
+            "further on"
+        )
 
 
 def _read_pairs(database: Path) -> list[tuple[int, int, int]]:
     """The indices of the photos of each verified pair, and how many matches one rigid scene explains."""
     with closing(pycolmap.Database.open(database)) as store:
-        rows = list(zip(*store.read_two_view_geometry_num_inliers(), strict=True))
+        return _list_pairs(store)
+
+
+def _list_pairs(store: pycolmap.Database) -> list[tuple[int, int, int]]:
+    rows = list(zip(*store.read_two_view_geometry_num_inliers(), strict=True))
     pairs = ((*pycolmap.pair_id_to_image_pair(pair), inliers) for pair, inliers in rows)
     return [(one - 1, two - 1, inliers) for one, two, inliers in pairs]
 
 
+def remove_loose_photos(best: pycolmap.Reconstruction) -> dict[int, int]:
+    """Remove the photos that fewer than LEAST_TIES points tie to the largest group of photos, in place.
+
+    Such photos can lie anywhere: too little says how large and how far away their part is. Returns the index of each
+    and the number of points.
+    """
+    out: dict[int, int] = {}
+    while True:  # without some photos, others may hang by less
+        model = model_from_reconstruction(best)
+        group, ties = group_images(model, LEAST_TIES)
+        if not ties.size or len(ties) == 1:
+            return out
+        main = int(np.bincount(group).argmax())
+        loose = {name: int(ties[g, main]) for name, g in zip(model.names, group, strict=True) if g != main}
+        for number in [i for i in best.reg_image_ids() if best.images[i].name in loose]:
+            out[number - 1] = loose[best.images[number].name]
+            best.deregister_frame(best.images[number].frame_id)
+
+
 def explain_left_out(
-    photos: list[SfmPhoto], placed: set[int], pairs: list[tuple[int, int, int]]
+    photos: list[SfmPhoto],
+    placed: set[int],
+    pairs: list[tuple[int, int, int]],
+    loose: Mapping[int, int] = MappingProxyType({}),
 ) -> tuple[tuple[tuple[str, str], ...], int]:
-    """Names of the photos that found no place, with the reason; and how many of them match a placed photo well."""
+    """Names of the photos that found no place, with the reason; and how many of them match a placed photo well.
+
+    loose: of photos whose place was given up, the points that tie them to the others.
+    """
     most = defaultdict(int)  # points shared with a placed photo
     for one, two, inliers in pairs:
         for index, other in ((one, two), (two, one)):
@@ -197,7 +258,14 @@ def explain_left_out(
     for index, photo in enumerate(photos):
         if index not in placed:
             unsure = f"it shares {most[index]} points with a placed photo, but its position stays unsure"
-            out.append((photo.path.name, unsure if most[index] else "it matches no photo that could be placed"))
+            if index in loose:
+                unsure = f"only {loose[index]} points tie it to the other photos; take photos between them and it"
+            out.append(
+                (
+                    photo.path.name,
+                    unsure if most[index] or index in loose else "it matches no photo that could be placed",
+                )
+            )
     return tuple(out), sum(count >= LEAST_INLIERS for count in most.values())
 
 

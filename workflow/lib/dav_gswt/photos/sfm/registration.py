@@ -27,7 +27,7 @@ from dav_gswt.photos.photo_files import convert_equivalent, name_pictures, read_
 from dav_gswt.photos.photo_listing import PhotoListing, Source, drop_twins, list_photos
 from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
 from dav_gswt.photos.sfm.gps import GpsPositions, align_to_gps, read_gps_positions
-from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS, SfmPhoto, SfmScene, find_solution
+from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS, SfmPhoto, SfmScene, find_solution, require_motion
 from dav_gswt.photos.sfm.verdict import require_trust
 from dav_gswt.threads import map_ahead
 
@@ -99,7 +99,9 @@ def register_photos(source: Source, options: SfmOptions) -> Registration:
         extract_features(Path(scratch), database, options.size, options.features, options.threads)
         match_photos(len(photos), database, NEIGHBOURS, options.threads, options.seed)
         gps = dict(zip(keys, positions.at, strict=True)) if positions else {}
-        solution = find_solution(SfmScene(listing.where, photos, held, gps, database), options.seed)
+        scene = SfmScene(listing.where, photos, held, gps, database)
+        require_motion(scene)
+        solution = find_solution(scene, options.seed)
     for name, reason in solution.left_out:
         _log.warning("%s is left out: %s", name, reason)
     _log.info("focal length: %s", solution.focal.decision)
@@ -109,7 +111,7 @@ def register_photos(source: Source, options: SfmOptions) -> Registration:
     for sign in verdict.objections:
         _log.warning("structure from motion is %s: %s", sign.grade, sign.reason)
     require_trust(verdict)
-    if positions and not align_to_gps(solution.best, gps):
+    if positions and not align_to_gps(solution.best, gps, options.seed):
         positions = None
     model, lenses = replace_lenses(solution.best, {photo.key: photo.full for photo in photos}, options.side)
     require_parallax(intersect_rays(model)[1])

@@ -13,10 +13,12 @@ from scipy.spatial import cKDTree
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import Grade, SfmSign, SfmVerdict
-from dav_gswt.photos.colmap_model import ColmapModel
-from dav_gswt.photos.ground_frame import fit_plane, make_upright_rotation
+from dav_gswt.photos.colmap_model import ColmapModel, group_images
+from dav_gswt.photos.ground_frame import PHOTOGRAPH_GROUND, fit_plane, make_upright_rotation
 from dav_gswt.photos.sfm.gps import ACROSS, LEAST_SPREAD, WORST, fit_similarity, measure_spread
 
+LEAST_TIES = 15  # points that must tie photos to the others, or they are left out
+WELL_TIED = 40  # points; parts with fewer are named
 # Of each sign the values beyond which it is doubtful, and beyond which refused.
 THRESHOLDS = {
     "reprojection error": (0.9, 2.0),  # pixels; good sets have 0.18 to 0.57, one of fog had 1.39
@@ -27,10 +29,13 @@ THRESHOLDS = {
     "focal length": (1.25, 1.6),  # times EXIF's or its inverse; from above, free estimates end up to 1.15 off
     "roughness": (0.04, 0.1),  # of the distance, between points side by side in a photo; fog has no surface
     "relief": (0.2, 1 / 3),  # of the flying height; above a third no plane is a ground
+    "hangs together": (1 / WELL_TIED, 1 / LEAST_TIES),  # 1 / points that tie a part to the rest; good sets have 120
     "placed": (0.5, 0.9),  # of the photos that found no place; then the set is not what was meant
 }
+SIDEWAYS = (60.0, 60.0)  # degrees, of uneven points: things on a table and rooms, which are seen from the side
 ALONE = ("reprojection error",)  # refused, it refuses the model by itself
 FAR = 10 * ACROSS  # metres: no receiver is so wrong, however long the flight
+SHAPE = {"tilt", "relief", "roughness", "ground", "placed"}  # a model that fails by these alone is right, but no ground
 COVERAGE = ("placed",)  # signs about what is missing: they contradict nothing
 NEIGHBOURS = 6  # points beside a point in a photo
 LEAST_INLIERS = 30  # matches that hold two photos together; mapping needs as many
@@ -58,8 +63,12 @@ def judge_model(
         signs.append(_grade("track length", 1 / length, f"a point is seen by {length:.1f} photos on average"))
     turn, gps = _judge_gps(model, positions, normal)
     signs.append(gps)
+    heights = np.array([camera.centre @ normal for camera in model.cameras]) - offset
+    relief = spread / max(abs(float(np.median(heights))), 1e-12)
+    uneven = _grade("relief", relief, f"points lie {relief:.2f} flying heights off their plane")
     tilt = float(np.median([_measure_angle(camera.forward, normal) for camera in model.cameras]))
-    signs.append(_grade("tilt", tilt, f"photos look {tilt:.0f} degrees off the ground's vertical (median)"))
+    limits = SIDEWAYS if uneven.grade != "good" else THRESHOLDS["tilt"]
+    signs.append(_grade("tilt", tilt, f"photos look {tilt:.0f} degrees off the ground's vertical (median)", limits))
     if turn is not None:
         angle = _measure_angle(turn[2], normal)
         signs.append(_grade("ground", angle, f"the ground lies {angle:.0f} degrees from level, as GPS says it"))
@@ -67,9 +76,8 @@ def judge_model(
         reason = f"the photos alone say {focal_ratio:.2f} times the focal length of EXIF"
         signs.append(_grade("focal length", max(focal_ratio, 1 / focal_ratio), reason))
     signs.append(_judge_roughness(model))
-    heights = np.array([camera.centre @ normal for camera in model.cameras]) - offset
-    relief = spread / max(abs(float(np.median(heights))), 1e-12)
-    signs.append(_grade("relief", relief, f"points lie {relief:.2f} flying heights off their plane"))
+    signs.append(uneven)
+    signs.append(_judge_ties(model))
     placed = len(model.names)
     signs.append(_grade("placed", 1 - placed / images, f"{placed} of {images} photos found a place"))
     known = tuple(sign for sign in signs if sign)
@@ -86,8 +94,9 @@ def combine_grades(signs: Iterable[SfmSign]) -> Grade:
     return "doubtful" if bad else "good"
 
 
-def _grade(name: str, value: float, reason: str) -> SfmSign:
-    doubtful, refused = THRESHOLDS[name]
+def _grade(name: str, value: float, reason: str, limits: tuple[float, float] | None = None) -> SfmSign:
+    """limits: in place of those of THRESHOLDS."""
+    doubtful, refused = limits or THRESHOLDS[name]
     grade = "refused" if value > refused else "doubtful" if not value <= doubtful else "good"
     return SfmSign(name, grade, reason)
 
@@ -147,11 +156,32 @@ def _judge_roughness(model: ColmapModel) -> SfmSign | None:
     )
 
 
+def _judge_ties(model: ColmapModel) -> SfmSign:
+    """By how many points the part of the model hangs on the rest that is tied to it least."""
+    group, _ = group_images(model, WELL_TIED)
+    main, n = np.bincount(group).argmax(), len(model.points)
+    most = {}
+    for part in np.setdiff1d(group, main).tolist():
+        inside = group[model.image_of] == part
+        seen = [np.bincount(model.point_of[own], minlength=n) for own in (inside, ~inside)]
+        most[part] = int(((seen[0] > 0) & (seen[1] > 0) & (seen[0] + seen[1] >= 3)).sum())
+    if not most:
+        return _grade("hangs together", 1 / WELL_TIED, f"{WELL_TIED} points or more tie each photo to the others")
+    worst = min(most, key=lambda g: (most[g], g))
+    names = [name for name, g in zip(model.names, group, strict=True) if g == worst]
+    some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+    reason = f"only {most[worst]} points tie {some} to the other photos"
+    return _grade("hangs together", 1 / max(most[worst], 1e-12), reason)
+
+
 def require_trust(verdict: SfmVerdict) -> None:
     """Raises: InputError: the verdict is refused; the message has its reasons and what was tried."""
     if verdict.grade != "refused":
         return
     reasons = "; ".join(sign.reason for sign in verdict.objections)
+    names = {sign.name for sign in verdict.objections}
+    if names & {"tilt", "relief"} and names <= SHAPE:
+        raise InputError(f"the photos show no ground: {reasons}. {PHOTOGRAPH_GROUND}")
     tried = f" (tried: {'; '.join(verdict.tried)})" if len(verdict.tried) > 1 else ""
     raise InputError(
         f"the photos do not fit together to one scene: {reasons}{tried}. Take photos that overlap more and show "
