@@ -93,7 +93,7 @@ def test_a_value_that_makes_no_sense_is_refused_with_its_index(tmp_path, extra, 
 def test_a_missing_file_or_property_is_named(tmp_path):
     with pytest.raises(InputError, match="a.ply: there is no such file"):
         read_field(tmp_path / "a.ply")
-    for missing in ("x", "f_dc_1", "opacity", "scale_2", "rot_3"):
+    for missing in ("x", "f_dc_1", "opacity", "scale_1", "rot_3"):
         with pytest.raises(InputError, match=rf"a.ply: property {missing} is missing"):
             read_field(foreign(tmp_path / "a.ply", drop=[missing]))
 
