@@ -183,7 +183,9 @@ def read_ply(path: Path | str, harmonics: bool = True) -> Splats:
     k = 1 + rest // 3 if harmonics else 1
     if harmonics and (rest % 3 or k not in (1, 4, 9, 16)):
         raise InputError(f"{path}: {rest} f_rest properties; 0, 9, 24 or 45 make whole spherical harmonics")
-    names = _columns(k) | {name: [name] for name in ("filter_3D", "uncertainty", "ground", "imagined") if name in present}
+    names = _columns(k) | {
+        name: [name] for name in ("filter_3D", "uncertainty", "ground", "imagined") if name in present
+    }
     if "scale_2" not in present:
         names["log_scales"] = names["log_scales"][:2]
     columns = _gather(rows, names, path)
@@ -251,7 +253,9 @@ def _fuse_filter(columns: dict[str, Array]) -> None:
     scales, size = _thicken(columns["log_scales"]).astype(float), columns.pop("filter_3D").astype(float)
     with np.errstate(all="ignore"):  # what is not finite is refused with the rest
         wider = 0.5 * np.logaddexp(2 * scales, 2 * np.log(np.abs(size)))
-        log_opacity = -np.logaddexp(0, -columns["opacity_logits"].astype(float)) + (scales - wider).sum(1, keepdims=True)
+        log_opacity = -np.logaddexp(0, -columns["opacity_logits"].astype(float)) + (scales - wider).sum(
+            1, keepdims=True
+        )
         columns["opacity_logits"] = (log_opacity - np.log(-np.expm1(log_opacity))).astype(np.float32)
     columns["log_scales"] = wider.astype(np.float32)
 

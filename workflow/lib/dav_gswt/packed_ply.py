@@ -44,11 +44,13 @@ def _require(rows: Array, name: str, kind: str) -> Array:
 
 def _split(words: UInt32[Array, "n"], shifts: tuple[int, ...], bits: tuple[int, ...]) -> Float32[Array, "n k"]:
     """Parts of words, each from 0 to 1."""
-    parts = [(words >> shift & (1 << size) - 1) / np.float32((1 << size) - 1) for shift, size in zip(shifts, bits)]
-    return np.stack(parts, 1).astype(np.float32)
+    pairs = [(shift, (1 << size) - 1) for shift, size in zip(shifts, bits, strict=True)]
+    return np.stack([(words >> shift & most) / np.float32(most) for shift, most in pairs], 1).astype(np.float32)
 
 
-def _stretch(shares: Float32[Array, "n 3"], bounds: Array, axes: tuple[str, ...], group: Array) -> Float32[Array, "n 3"]:
+def _stretch(
+    shares: Float32[Array, "n 3"], bounds: Array, axes: tuple[str, ...], group: Array
+) -> Float32[Array, "n 3"]:
     """Values from shares of what lies between the bounds of each group."""
     low, high = (np.stack([_require(bounds, f"{end}_{axis}", "f4") for axis in axes], 1) for end in ("min", "max"))
     with np.errstate(all="ignore"):  # what is not finite is refused with the rest

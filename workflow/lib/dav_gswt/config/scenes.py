@@ -224,7 +224,7 @@ class FieldScene(_Scene):
     def _require_splat(cls, path: str) -> str:
         suffix = Path(path).suffix.lower()
         if suffix in (".ksplat", ".sog"):
-            raise ValueError(advise_conversion(Path(path), suffix[1:]))
+            raise ValueError(advise_conversion(Path(path), "sog" if suffix == ".sog" else "ksplat"))
         if suffix not in (".ply", ".spz", ".splat"):
             raise ValueError("a finished splat ends in .ply, .spz or .splat")
         return path

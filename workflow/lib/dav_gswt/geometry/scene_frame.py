@@ -118,8 +118,8 @@ class SceneFrame:
     all ground that photos see. test, test_groups: names of photos that only test; None where the scene names none.
     photos_per_cell: photos that must see ground of the exemplar. relief: spread of the points about the plane, in
     flying heights. focal_ratio: the used focal length over EXIF's. reprojection_error: mean, pixels. points: of the
-    sparse model. verdict: on structure from motion. gaussians, removed, source: of an imported field. renderer: versions of a
-    synthetic scene's renderer.
+    sparse model. verdict: on structure from motion. gaussians, removed, source: of an imported field. renderer:
+    versions of a synthetic scene's renderer.
     """
 
     kind: Literal["photos", "synthetic", "field"]

@@ -13,6 +13,7 @@ PHOTO_MAGIC = (b"\xff\xd8\xff", b"\x89PNG", b"II*\0", b"MM\0*", b"BM", b"P5", b"
 PHOTO_MAGIC = (*PHOTO_MAGIC, b"\0\0\0\x0cjP  ")
 RAW_SUFFIXES = {".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".raw"}  # most are TIFF by their bytes
 ATOMS = {b"moov", b"mdat", b"wide", b"free", b"skip"}  # a QuickTime file may begin with any of them
+BY_SUFFIX: dict[str, Kind] = {".splat": "splat", ".ksplat": "ksplat"}  # their first bytes tell nothing
 CONVERTER = "npx @playcanvas/splat-transform"  # Node.js
 
 
@@ -38,7 +39,7 @@ def detect_kind(path: Path) -> Kind:
         return "spz"
     if head.startswith(b"PK\3\4"):
         return "sog" if _has_member(path, "meta.json") else "other"
-    return {".splat": "splat", ".ksplat": "ksplat"}.get(suffix, "other")
+    return BY_SUFFIX.get(suffix, "other")
 
 
 def advise_conversion(path: Path, kind: Kind) -> str | None:

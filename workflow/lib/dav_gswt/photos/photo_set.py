@@ -147,9 +147,7 @@ def import_field(
         splat.report_dropped_harmonics(given.sh_degree)
     usual = splat.UP_OF_SPZ if detect_kind(Path(source)) == "spz" else splat.UP
     try:
-        entered, frame = splat.fit_field_frame(
-            given.field, np.random.default_rng(seed), up, crop, given.origin, usual
-        )
+        entered, frame = splat.fit_field_frame(given.field, np.random.default_rng(seed), up, crop, given.origin, usual)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     write_field(entered, out)

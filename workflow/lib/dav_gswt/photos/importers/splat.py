@@ -36,7 +36,7 @@ SPARSER = 0.75  # exponent: where Gaussians grow fewer than with this power of t
 COARSE = 2.0  # times the median size, from which a Gaussian counts less
 GRAIN = 10  # cubes in the median distance
 LEAST_SHARE = 0.1  # of what counts that the scene holds
-NOTED = 0.01  # share of dropped Gaussians from which a warning says so
+NOTED = 0.005  # share of dropped Gaussians from which a warning says so
 STANDS, TALL = 5.0, 0.2  # spreads of the ground above which a thing stands; share of the size at which it is capped
 SURE = 0.75  # share of what stands that must be on one side
 WALLS = 3.0  # times the spread of the best plane that a level one may have
@@ -118,35 +118,39 @@ def _center_on_exemplar(
 
 def _select_scene(field: GaussianField, origin: Float[Array, "3"], crop: Sequence | None) -> Bool[Array, "n"]:
     """Gaussians of the scene: those in the crop or the dense part, and not as large as it. Says what is dropped."""
-    opaque = _find_surface(field)
-    if crop is not None:
-        low, high = np.array(crop, float) - origin
-        opaque &= ((field.means >= low) & (field.means <= high)).all(1)
-    if (count := int(opaque.sum())) < LEAST:
-        where = " in the box `crop`" if crop is not None else ""
+    surface, where = _find_surface(field), ""
+    box = None if crop is None else np.array(crop, float) - origin
+    if box is not None:
+        surface, where = surface & _lies_in(field, box), " in the box `crop`"
+    if (count := int(surface.sum())) < LEAST:
         raise InputError(f"the field has {count} opaque Gaussians{where}; a surface of at least {LEAST} is needed")
-    surface = field.means[opaque]
-    if crop is None:
-        low, high = np.percentile(surface[_find_dense_part(surface, np.exp(field.log_scales[opaque].max(1)))], ROBUST, axis=0)
-        margin = MARGIN * float((high - low).max())
-        low, high = low - margin, high + margin
-    size = float((high - low).max()) / (1 if crop is not None else 1 + 2 * MARGIN)
-    step = float(np.spacing(np.abs([low, high]).max().astype(np.float32)))
-    if step > np.exp(np.median(field.log_scales[opaque].max(1))):
+    sizes = np.exp(field.log_scales[surface].max(1))
+    if box is None:
+        places = field.means[surface]
+        low, high = np.percentile(places[_find_dense_part(places, sizes)], ROBUST, axis=0)
+        size = float((high - low).max())
+        box = np.stack([low - MARGIN * size, high + MARGIN * size])
+    else:
+        size = float(np.ptp(box, axis=0).max())
+    step = float(np.spacing(np.abs(field.means[surface]).max()))
+    if step > np.median(sizes):
         raise InputError(
             f"its positions are 32-bit numbers so far from 0 that they are {step:g} apart, more than its Gaussians "
             "are wide; export it with double coordinates, or moved near 0"
         )
-    inside = ((field.means >= low) & (field.means <= high)).all(1) & (field.log_scales.max(1) <= np.log(LARGEST * size))
-    box = np.round([low + origin, high + origin], 2).tolist()
+    inside = _lies_in(field, box) & (field.log_scales.max(1) <= np.log(LARGEST * size))
     dropped = len(inside) - int(inside.sum())
     _log.log(
         logging.WARNING if crop is None and dropped > NOTED * len(inside) else logging.INFO,
         "%d of %d Gaussians (%.1f %%) surround the scene or are as large as it (sky, background, haze) and are "
         "dropped; kept is the box %s of the file (another: config, scenes, crop)",
-        *(dropped, len(inside), 100 * dropped / len(inside), box),
+        *(dropped, len(inside), 100 * dropped / len(inside), np.round(box + origin, 2).tolist()),
     )
     return inside
+
+
+def _lies_in(field: GaussianField, box: Float[Array, "2 3"]) -> Bool[Array, "n"]:
+    return ((field.means >= box[0]) & (field.means <= box[1])).all(1)
 
 
 def _find_dense_part(places: Float[Array, "n 3"], sizes: Float[Array, "n"]) -> Bool[Array, "n"]:

@@ -6,7 +6,6 @@ Gaussian (https://github.com/antimatter15/splat). Sizes are checked before anyth
 
 import gzip
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 from jaxtyping import Float32, UInt8
@@ -39,7 +38,9 @@ def read_splat(path: Path | str) -> Splats:
     try:
         return _read_spz(path) if kind == "spz" else _read_dot_splat(path)
     except UNREADABLE as error:
-        raise InputError(f"{path}: not a readable .{kind} ({summarize_error(error)}); copy or export it again") from error
+        raise InputError(
+            f"{path}: not a readable .{kind} ({summarize_error(error)}); copy or export it again"
+        ) from error
 
 
 def _read_dot_splat(path: Path) -> Splats:
@@ -86,14 +87,16 @@ def _read_spz(path: Path) -> Splats:
     return Splats(field, np.zeros(3), degree)
 
 
-def _read_exactly(file: IO[bytes], size: int) -> bytes:
+def _read_exactly(file: gzip.GzipFile, size: int) -> bytes:
     data = file.read(size)
     if len(data) != size:
         raise EOFError("it ends too early")
     return data
 
 
-def _unpack_colours(values: UInt8[Array, "n 3"], scale: float, shift: float, sh: bool = False) -> Float32[Array, "n 1 3"]:
+def _unpack_colours(
+    values: UInt8[Array, "n 3"], scale: float, shift: float, sh: bool = False
+) -> Float32[Array, "n 1 3"]:
     """Coefficients of degree 0, from bytes of colours or (sh) of coefficients."""
     colours = values * np.float32(scale) + np.float32(shift)
     return colours[:, None] if sh else rgb_to_sh(colours)
