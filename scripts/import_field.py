@@ -8,5 +8,6 @@ with logging_to(snakemake.log[0]):
         snakemake.input[0],
         snakemake.output.field,
         snakemake.output.frame,
-        up=snakemake.params.scene.get("up", (0.0, -1.0, 0.0)),
+        up=snakemake.params.scene.get("up"),
+        crop=snakemake.params.scene.get("crop"),
     )

@@ -1,5 +1,6 @@
 """Files from outside and between stages, mutated: splats, bundles, models, photos, weights, the config."""
 
+import gzip
 import hashlib
 import json
 import shutil
@@ -37,7 +38,9 @@ from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle, read_bundle
 from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.errors import InputError
-from dav_gswt.field import GaussianField, read_field, write_field
+from dav_gswt.export import splat_files
+from dav_gswt.export.spool import Spool
+from dav_gswt.field import GaussianField, Splats, read_field, write_field
 from dav_gswt.files import write_json
 from dav_gswt.geometry.camera_layouts import orbit
 from dav_gswt.geometry.poses import Pose
@@ -46,6 +49,7 @@ from dav_gswt.photos import importers, photo_files
 from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
 from dav_gswt.photos.importers.colmap import import_colmap
 from dav_gswt.photos.importers.photo_matching import PhotoFolder
+from dav_gswt.photos.importers.splat_files import RECORD, read_splat
 from dav_gswt.prior import weights
 
 pytestmark = pytest.mark.slow
@@ -53,6 +57,7 @@ ROOT = Path(__file__).parents[2]
 PHOTO = ROOT / "resources/photos/brighton_beach/images/DJI_0018.jpg"
 NETWORK = nn.Sequential(nn.Linear(3, 4), nn.Linear(4, 2))
 POSE = Pose("pose_0001", 60.0, 10.0, 4.0)
+PACKED = gzip.compress(np.array([0x5053474E, 3, 9], "<u4").tobytes() + bytes([0, 9, 0, 0]) + bytes(range(20)) * 9, 9)
 CAMERA = orbit(60.0, 10.0, 4.0, (0.0, 0.0, 0.0), 8, 6, 60.0)
 SHOTS = [CapturedPhoto("pose_0001.png", POSE, CAMERA, CAMERA, 0.0)]
 
@@ -74,6 +79,10 @@ def is_sound(field: GaussianField) -> bool:
     return all_finite(*parts) and bool((np.abs(field.quats).max(1, initial=0) > 0).all() if len(field) else True)
 
 
+def is_splat(splats: Splats) -> bool:
+    return is_sound(splats.field) and splats.sh_degree >= 0
+
+
 def write_fields(folder: Path) -> None:
     """Binary of two degrees, text, of another byte order, with a list and another element."""
     for degree in (0, 1):
@@ -83,6 +92,36 @@ def write_fields(folder: Path) -> None:
     faces = np.array([([0, 1, 2],)], [("vertex_indices", "i4", (3,))])
     parts = [PlyElement.describe(faces, "face"), PlyElement.describe(rows, "vertex")]
     PlyData(parts, byte_order=">").write(str(folder / "big.ply"))
+
+
+def write_spz_files(folder: Path) -> None:
+    """SPZ of versions 2 and 3, without compression: a change of deflated bytes only breaks their checksum."""
+    with Spool(folder / "spool") as spool:
+        spool.append(random_field(9))
+    for version in (2, 3):
+        splat_files.write_spz(spool, folder / f"{version}.spz", version)
+        data = gzip.decompress((folder / f"{version}.spz").read_bytes())
+        (folder / f"{version}.spz").write_bytes(data)
+    shutil.rmtree(folder / "spool")
+
+
+def read_packed(path: Path):
+    """An SPZ whose packed content the file has."""
+    path.write_bytes(gzip.compress(path.read_bytes(), 1))
+    return read_splat(path)
+
+
+def write_dot_splats(folder: Path) -> None:
+    rows = np.zeros(9, RECORD)
+    rows["place"], rows["scale"], rows["colour"], rows["turn"] = 1, 0.1, 200, 192
+    rows.tofile(folder / "a.splat")
+
+
+def write_compressed(folder: Path) -> None:
+    ends = [f"{end}_{kind}{axis}" for kind in ("", "scale_") for end in ("min", "max") for axis in "xyz"]
+    words = np.full(9, 1 << 30 | 77, [(f"packed_{name}", "<u4") for name in ("position", "rotation", "scale", "color")])
+    parts = [PlyElement.describe(np.ones(1, [(e, "<f4") for e in ends]), "chunk"), PlyElement.describe(words, "vertex")]
+    PlyData(parts, byte_order="<").write(str(folder / "a.ply"))
 
 
 def write_pictures(folder: Path) -> None:
@@ -155,6 +194,10 @@ def is_network(facts) -> bool:
 
 READERS = [
     Reader("fields (PLY)", write_fields, read_field, is_sound, 900),
+    Reader("fields (compressed PLY)", write_compressed, read_splat, is_splat, 900),
+    Reader("fields (SPZ)", write_spz_files, read_packed, is_splat, 20),
+    Reader("fields (SPZ, packed)", lambda folder: write_bytes(folder / "a.spz", PACKED), read_splat, is_splat, 20),
+    Reader("fields (.splat)", write_dot_splats, read_splat, is_splat, 64),
     Reader("EXIF", lambda folder: shutil.copy(PHOTO, folder / "a.jpg"), read_header, is_header, 3000),
     Reader(
         "photos",

@@ -116,6 +116,26 @@ def test_what_cannot_be_inpainted_is_refused_and_why(root, change, message):
         check_config(config | {"inpaint": True} | change)
 
 
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"field": "a b.ksplat"}, "finished.*a .ksplat .*npx @playcanvas/splat-transform 'a b.ksplat' 'a b.ply'"),
+        ({"field": "a.sog"}, "finished.*a SOG .*npx @playcanvas/splat-transform a.sog a.ply"),
+        ({"field": "a.obj"}, "finished.*ends in .ply, .spz or .splat"),
+        ({"crop": [[0, 0, 0], [1, 0, 1]]}, "finished.*crop: its first corner must be the lower one"),
+        ({"up": [0, float("inf"), 0]}, r"scenes.finished.up.1: .*finite"),
+    ],
+)
+def test_a_finished_field_that_cannot_be_meant_is_refused(root, change, message):
+    config = read(root)
+    entry = {"kind": "field", "field": "a.SPZ", "preset": "draft", "tiling": "auto", "crop": [[0, 0, 0], [1, 1, 1]]}
+    config["scenes"]["finished"] = entry
+    assert check_config(config)["scenes"]["finished"]["field"] == "a.SPZ"
+    config["scenes"]["finished"] = entry | change
+    with pytest.raises(InputError, match=message):
+        check_config(config)
+
+
 def test_a_config_replaces_another_key_by_key(tmp_path):
     (tmp_path / "below.yaml").write_text("{k: 4, export: {rows: 2, columns: 1}, seeds: [0, 1]}")
     (tmp_path / "above.yaml").write_text("{export: {rows: 8}, seeds: [5]}")

@@ -1,5 +1,6 @@
 """PLY files: a round trip is exact, files of other programs are read, broken ones raise errors that name the file."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -7,8 +8,18 @@ import pytest
 from fixtures.random_field import random_field
 from plyfile import PlyData, PlyElement
 
+from dav_gswt import field as field_files
 from dav_gswt.errors import InputError
-from dav_gswt.field import HEADER_BYTES, GaussianField, concatenate_fields, read_field, rgb_to_sh, write_field
+from dav_gswt.field import (
+    HEADER_BYTES,
+    THIN,
+    GaussianField,
+    concatenate_fields,
+    read_field,
+    read_ply,
+    rgb_to_sh,
+    write_field,
+)
 
 NAMES = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", *(f"scale_{i}" for i in range(3))]
 NAMES += [f"rot_{i}" for i in range(4)]
@@ -93,7 +104,7 @@ def test_a_value_that_makes_no_sense_is_refused_with_its_index(tmp_path, extra, 
 def test_a_missing_file_or_property_is_named(tmp_path):
     with pytest.raises(InputError, match="a.ply: there is no such file"):
         read_field(tmp_path / "a.ply")
-    for missing in ("x", "f_dc_1", "opacity", "scale_2", "rot_3"):
+    for missing in ("x", "f_dc_1", "opacity", "scale_1", "rot_3"):
         with pytest.raises(InputError, match=rf"a.ply: property {missing} is missing"):
             read_field(foreign(tmp_path / "a.ply", drop=[missing]))
 
@@ -185,3 +196,103 @@ def test_a_plain_file_has_floats_alone_and_the_same_gaussians(tmp_path):
     back = read_field(tmp_path / "a.ply")
     assert np.array_equal(back.means, field.means) and np.array_equal(back.sh, field.sh)
     assert not back.imagined.any() and not back.ground.any()
+
+
+def test_discs_of_two_deviations_and_flat_gaussians_get_a_thin_third_one(tmp_path):
+    """2D Gaussian splatting has no scale_2; other files have the logarithm of zero."""
+    two = read_field(foreign(tmp_path / "a.ply", drop=["scale_2"]))
+    three = read_field(foreign(tmp_path / "b.ply", change={(k, "scale_2"): -np.inf for k in range(3)}))
+    for field in (two, three):
+        larger = field.log_scales[:, :2].max(1)
+        assert field.log_scales[:, 2] == pytest.approx(larger + np.log(THIN), abs=1e-6)
+    with pytest.raises(InputError, match="scale_0 of Gaussian 1"):
+        read_field(foreign(tmp_path / "c.ply", change={(1, f"scale_{k}"): -np.inf for k in range(3)}))
+
+
+def test_a_3d_filter_is_fused(tmp_path):
+    """Deviations 3, 3, 3 and a filter of 4 give 5, 5, 5; opacity .5 becomes .5 (3/5)^3."""
+    change = {(0, f"scale_{k}"): np.log(3) for k in range(3)} | {(0, "opacity"): 0.0, (0, "filter_3D"): 4.0}
+    field = read_field(foreign(tmp_path / "a.ply", extra=["filter_3D"], rows=1, change=change))
+    assert np.exp(field.log_scales[0]) == pytest.approx([5, 5, 5], rel=1e-6)
+    assert 1 / (1 + np.exp(-field.opacity_logits[0])) == pytest.approx(0.5 * 0.6**3, rel=1e-5)
+    change[0, "filter_3D"] = np.nan
+    with pytest.raises(InputError, match="opacity of Gaussian 0"):
+        read_field(foreign(tmp_path / "a.ply", extra=["filter_3D"], rows=1, change=change))
+
+
+def test_an_infinite_opacity_is_the_most_opaque_one(tmp_path):
+    field = read_field(foreign(tmp_path / "a.ply", change={(0, "opacity"): np.inf, (1, "opacity"): -np.inf}))
+    assert field.opacity_logits[:2].tolist() == [16, -16] and field.opacity_logits[2] == 2 + 6 / 16
+
+
+def with_doubles(path, rows, places):
+    """A foreign field whose positions are doubles."""
+    table = PlyData.read(str(foreign(path, rows=rows)))["vertex"].data
+    wide = np.empty(rows, [(name, "<f8" if name in "xyz" else "<f4") for name in table.dtype.names])
+    for name in table.dtype.names:
+        wide[name] = places[:, "xyz".index(name)] if name in "xyz" else table[name]
+    PlyData([PlyElement.describe(wide, "vertex")], byte_order="<").write(str(path))
+    return path
+
+
+def test_doubles_far_from_0_are_counted_from_an_origin(tmp_path):
+    near = np.random.default_rng(0).uniform(-4, 4, (50, 3))
+    far = near + [456789.25, 5234567.5, 420.0]
+    splats = read_ply(with_doubles(tmp_path / "a.ply", 50, far))
+    assert splats.field.means + splats.origin == pytest.approx(far, abs=1e-6)  # float32 of 4: 2.4e-7
+    assert (splats.origin == np.round(splats.origin)).all() and np.abs(splats.field.means).max() < 10
+    here = read_ply(with_doubles(tmp_path / "b.ply", 50, near))
+    assert not here.origin.any() and here.field.means == pytest.approx(near, abs=1e-6)
+
+
+def test_harmonics_that_are_not_wanted_take_no_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr(field_files, "BLOCK", 1 << 16)
+    write_field(random_field(8000, degree=3), tmp_path / "a.ply", plain=True)
+    size = (tmp_path / "a.ply").stat().st_size
+    read_ply(tmp_path / "a.ply", harmonics=False)  # what is imported once
+    tracemalloc.start()
+    splats = read_ply(tmp_path / "a.ply", harmonics=False)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert splats.sh_degree == 3 and splats.field.sh.shape == (8000, 1, 3)
+    assert np.array_equal(splats.field.sh, read_field(tmp_path / "a.ply").sh[:, :1])
+    assert peak < 0.7 * size  # columns of 14 numbers of 62, and as much again on the way
+
+
+BOUNDS = [f"{end}_{part}{axis}" for part in ("", "scale_") for end in ("min", "max") for axis in "xyz"]
+BOUNDS += [f"{end}_{channel}" for end in ("min", "max") for channel in "rgb"]
+WORDS = ("packed_position", "packed_rotation", "packed_scale", "packed_color")
+
+
+def compressed(path, words, bounds, rows=1, kind="<u4"):
+    """A compressed PLY all of whose Gaussians have the same words."""
+    chunks, table = np.zeros(1, [(name, "<f4") for name in BOUNDS]), np.zeros(rows, [(name, kind) for name in WORDS])
+    for name, value in bounds.items():
+        chunks[name] = value
+    for name, value in zip(WORDS, words, strict=True):
+        table[name] = value
+    PlyData([PlyElement.describe(chunks, "chunk"), PlyElement.describe(table, "vertex")]).write(str(path))
+    return path
+
+
+def test_a_compressed_field_is_unpacked(tmp_path):
+    """x at its lower bound, y at its upper one, z at the middle; scales alike; w is the smaller half of a half turn."""
+    place = 0 << 21 | 1023 << 11 | 1023
+    bounds = {"min_x": -3, "max_x": 5, "min_y": 1, "max_y": 2, "min_z": 0, "max_z": 2047}
+    bounds |= {"min_scale_x": -4, "max_scale_y": -1, "max_scale_z": 2047, "max_r": 1, "max_g": 0.5, "min_b": 0.25}
+    words = (place, 1 << 30 | 512 << 20 | 512 << 10 | 512, place, 255 << 24 | 255 << 16 | 0 << 8 | 255)
+    field = read_field(compressed(tmp_path / "a.ply", words, bounds))
+    assert field.means[0] == pytest.approx([-3, 2, 1023], rel=1e-5)
+    assert field.log_scales[0] == pytest.approx([-4, -1, 1023], rel=1e-5)
+    assert field.quats[0] == pytest.approx([0, 1, 0, 0], abs=1e-3)  # the second of w, x, y, z is the largest
+    assert field.base_colours[0] == pytest.approx([1, 0.5, 0.25], abs=1e-6)
+    assert field.opacity_logits[0] == 16
+
+
+def test_a_compressed_field_that_lacks_bounds_or_has_other_words_is_refused(tmp_path):
+    with pytest.raises(InputError, match="a.ply: .*bounds of all"):
+        read_field(compressed(tmp_path / "a.ply", (0, 0, 0, 0), {}, rows=257))
+    with pytest.raises(InputError, match="b.ply: .*packed_position is missing or of another type"):
+        read_field(compressed(tmp_path / "b.ply", (0, 0, 0, 0), {}, kind="<f4"))
+    with pytest.raises(InputError, match="c.ply: x of Gaussian 0 is not finite"):
+        read_field(compressed(tmp_path / "c.ply", (0, 0, 0, 0), {"min_x": np.nan}))

@@ -133,3 +133,34 @@ def test_names_of_scenes(tmp_path):
 def test_the_moving_half_of_a_live_photo_is_no_video_of_its_own(tmp_path):
     folder = write(photos(tmp_path), IMG_1_dot_heic=HEIC, IMG_1_dot_mov=MP4)
     assert recognize_input([folder]).about == "4 photos (HEIC among them)"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "kind"),
+    [
+        ("a.spz", b"\x1f\x8b\x08" + b"0" * 40, ".spz"),
+        ("a.splat", b"0" * 32, ".splat"),
+        ("a.compressed.ply", b"ply\nelement vertex 1\nproperty uint packed_position\n", ".ply"),
+        ("a.ply", b"ply\nelement vertex 1\nproperty double f_dc_0\n", ".ply"),
+    ],
+)
+def test_splats_of_every_kind_that_is_read(tmp_path, name, content, kind):
+    (tmp_path / name).write_bytes(content)
+    found = recognize_input([tmp_path / name])
+    assert (
+        found.entry == {"kind": "field", "field": str(tmp_path / name)} and found.about == f"a finished splat ({kind})"
+    )
+
+
+def test_splats_that_are_not_read_are_named_with_what_converts_them(tmp_path):
+    command = "convert it: npx @playcanvas/splat-transform"
+    (tmp_path / "a.ksplat").write_bytes(bytes(99))
+    with pytest.raises(InputError, match=f"is a .ksplat .*{command} .*a.ksplat a.ply"):
+        recognize_input([tmp_path / "a.ksplat"])
+    with zipfile.ZipFile(tmp_path / "a.sog", "w") as archive:
+        archive.writestr("meta.json", "{}")
+    with pytest.raises(InputError, match=f"is a SOG .*{command} .*a.sog a.ply"):
+        recognize_input([tmp_path / "a.sog"])
+    folder = write(tmp_path / "open", meta_dot_json=b"{}", means_l_dot_webp=b"RIFF0000WEBP")
+    with pytest.raises(InputError, match=f"is a SOG .*{command} .*meta.json open.ply"):
+        recognize_input([folder])

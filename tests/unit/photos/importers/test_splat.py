@@ -102,3 +102,101 @@ def test_a_field_without_a_surface_is_refused_by_file_name(rng, tmp_path):
     with pytest.raises(InputError, match="haze.ply.*opaque"):
         import_field(tmp_path / "haze.ply", tmp_path / "out.ply", tmp_path / "ground.json")
     assert not (tmp_path / "out.ply").exists() and not (tmp_path / "ground.json").exists()
+
+
+TURNS = {"z up": np.eye(3), "y down": [[1, 0, 0], [0, 0, -1], [0, 1, 0]], "y up": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]}
+
+
+@pytest.mark.parametrize("axes", TURNS)
+def test_up_is_the_side_on_which_things_stand(rng, caplog, axes):
+    turn = np.array(TURNS[axes], float)
+    lying = splat._transform_field(ground_field(rng), turn, 1.0, np.zeros(3))
+    field, frame = fit_field_frame(lying, rng)
+    assert field.means[:, 2].max() > 0.05 > 0.02 > -field.means[:, 2].min()
+    assert frame.source is not None and frame.source.axes[2] == pytest.approx(turn[:, 2], abs=0.01)
+    assert "upside down" not in caplog.text
+
+
+def test_ground_on_which_nothing_stands_is_turned_as_usual_and_the_key_is_named(rng, caplog):
+    flat = ground_field(rng)[1000:5900]
+    lying = splat._transform_field(flat, np.array(TURNS["y up"], float), 1.0, np.zeros(3))
+    _, frame = fit_field_frame(lying, rng)
+    assert frame.source is not None and frame.source.axes[2] == pytest.approx([0, -1, 0], abs=0.01)
+    assert "upside down, give `up: [0.0, 1.0, 0.0]`" in caplog.text
+    _, frame = fit_field_frame(lying, rng, usual=splat.UP_OF_SPZ)
+    assert frame.source is not None and frame.source.axes[2] == pytest.approx([0, 1, 0], abs=0.01)
+
+
+def test_a_street_between_walls_lies_level(rng):
+    """The walls have more Gaussians than the street, which is level by the usual axes."""
+    street = ground_field(rng)[1000:5900]
+    walls = [replace(street, means=street.means[:, [2, 1, 0]] + np.float32([side, 0, 0.9])) for side in (-0.3, 0.3)]
+    street = replace(street, means=street.means * np.float32([0.3, 1, 1]))
+    whole = GaussianField.concatenate([street, *(wall[::2] for wall in walls)])
+    _, frame = fit_field_frame(whole, rng, usual=(0, 0, 1))
+    assert frame.source is not None and frame.source.axes[2] == pytest.approx([0, 0, 1], abs=0.1)
+
+
+def sky(rng, count, radius):
+    """A hemisphere of opaque Gaussians above ground that has z up."""
+    rays = rng.normal(size=(count, 3))
+    rays[:, 2] = np.abs(rays[:, 2])
+    rays *= radius / np.linalg.norm(rays, axis=1, keepdims=True)
+    size = np.log(radius * np.sqrt(2 * np.pi / count))
+    whole = ground_field(rng, n=count)
+    return replace(whole, means=rays.astype(np.float32), log_scales=np.full((count, 3), size, np.float32))
+
+
+@pytest.mark.parametrize("share, radius", [(0.01, 5), (0.01, 100), (0.15, 5), (0.15, 25), (0.4, 25)])
+def test_a_shell_of_sky_is_dropped_and_said(rng, caplog, share, radius):
+    field = ground_field(rng)[:-20]
+    alone = fit_field_frame(field, np.random.default_rng(0))[1]
+    around = sky(rng, int(share / (1 - share) * len(field)), radius)
+    _, frame = fit_field_frame(GaussianField.concatenate([field, around]), np.random.default_rng(0))
+    assert frame.removed == len(around) and alone.removed == 0
+    assert frame.source is not None and alone.source is not None
+    side, wanted = (f.exemplar.side * f.source.unit for f in (frame, alone))
+    assert side == pytest.approx(wanted, rel=0.02)
+    assert f"{len(around)} of {len(field) + len(around)} Gaussians" in caplog.text and "crop" in caplog.text
+
+
+def test_details_and_sparse_ground_are_no_reason_to_drop_the_rest(rng):
+    field = ground_field(rng)[:-20]
+    middle = rng.normal(0, 0.05, (20, 3))
+    bushes = [replace(field, means=(field.means * np.float32(0.05) + at).astype(np.float32))[::4] for at in middle]
+    bushes = [replace(bush, log_scales=bush.log_scales - np.float32(2)) for bush in bushes[:2]]
+    detailed = GaussianField.concatenate([field, *bushes])
+    assert fit_field_frame(detailed, rng, (0, 0, 1))[1].removed == 0
+    sparse = np.arange(len(field)) % 3 == 0
+    assert fit_field_frame(field[sparse | (field.means[:, 0] < 0)], rng, (0, 0, 1))[1].removed == 0
+
+
+def test_a_crop_is_the_scene_whatever_lies_around(rng):
+    field = ground_field(rng, n=24000)[:-20]
+    cropped, frame = fit_field_frame(field, rng, (0, 0, 1), crop=((-1, -1, -1), (0, 0, 1)))
+    assert frame.source is not None
+    inside = (field.means[:, :2] <= 0).all(1)
+    assert len(cropped) == inside.sum()
+    assert frame.exemplar.side * frame.source.unit == pytest.approx(0.94, rel=0.04)
+    with pytest.raises(InputError, match="0 opaque Gaussians in the box `crop`"):
+        fit_field_frame(field, rng, crop=((5, 5, 5), (6, 6, 6)))
+
+
+def test_the_frame_says_where_the_world_lies_in_the_file(rng):
+    """Places of UTM size come back to the precision of float32 within the scene."""
+    turn = Rotation.from_euler("xyz", [100, 5, 30], degrees=True).as_matrix()
+    lying = splat._transform_field(ground_field(rng)[:-20], turn, 3.0, np.array([2.0, 1, 0]))
+    origin = np.array([456789.0, 5234567.0, 420.0])
+    field, frame = fit_field_frame(lying, rng, origin=origin)
+    assert frame.source is not None
+    back = np.array(frame.source.origin) + frame.source.unit * field.means.astype(float) @ np.array(frame.source.axes)
+    assert back == pytest.approx(lying.means + origin, abs=1e-5)
+    crop = (origin - 9, origin + 9)
+    assert len(fit_field_frame(lying, rng, crop=crop, origin=origin)[0]) == len(lying)
+
+
+def test_positions_coarser_than_the_gaussians_are_refused(rng):
+    field = ground_field(rng)
+    far = replace(field, means=field.means + np.float32([0, 5234567, 0]))
+    with pytest.raises(InputError, match="0.5 apart.*double"):
+        fit_field_frame(far, rng)

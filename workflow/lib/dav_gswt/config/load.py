@@ -155,11 +155,14 @@ def _describe_error(model: type[BaseModel], values: dict, error: ValidationError
 
 def _keys_of(values: Any, location: tuple) -> list:
     """The part of an error's location that are keys of the config: pydantic adds names of kinds of values."""
-    keys = []
+    keys, entered = [], True
     for part in location:
+        if isinstance(values, dict) and entered and part == values.get("kind"):  # a field has a key of its kind's name
+            entered = False
+            continue
         if isinstance(values, dict) and part in values or isinstance(values, list) and isinstance(part, int):
             keys.append(part)
-            values = values[part]
+            values, entered = values[part], True
     return keys
 
 

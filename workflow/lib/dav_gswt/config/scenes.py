@@ -1,11 +1,13 @@
 """Scenes: what there is to make a terrain of, and how further photos of it are taken."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, FiniteFloat, field_validator, model_validator
 
 from dav_gswt.capture.agents import list_agents
 from dav_gswt.config.base import ConfigModel, Name, PhotoSize, Seed, Text, key
+from dav_gswt.images.file_kinds import advise_conversion
 
 if TYPE_CHECKING:
     SyntheticAgent = PhotoAgent = str
@@ -13,6 +15,7 @@ else:
     SyntheticAgent, PhotoAgent = Literal[list_agents("synthetic")], Literal[list_agents("photos")]
 Range = Annotated[tuple[float, float], Field(description="lowest and highest", strict=False)]
 Coordinate = Annotated[float, Field(ge=-100, le=100)]
+Corner = Annotated[tuple[FiniteFloat, FiniteFloat, FiniteFloat], Field(strict=False)]
 GroundPlace = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
 
 # What the keys' `read_by` and `agents` share. Rules that read `agent` get some keys for some agents only.
@@ -216,13 +219,37 @@ class PhotoScene(_PhotographedScene):
 
 
 class FieldScene(_Scene):
-    """A finished 3D Gaussian splatting file instead of photos."""
+    """A finished Gaussian splat instead of photos."""
 
     kind: Literal["field"]
-    field: Annotated[str, Field(pattern=r"\.[pP][lL][yY]$")] = key("a finished 3D Gaussian splatting `.ply`")
-    up: tuple[float, float, float] = key(
-        "a direction that points roughly up in the file", (0.0, -1.0, 0.0), read_by=("import_field",), strict=False
+    field: Text = key("a finished splat: `.ply` of any trainer, plain or compressed, `.spz` or `.splat`")
+    up: Corner | None = key(
+        "a direction that points roughly up in the file; the side on which things stand if left out",
+        None,
+        read_by=("import_field",),
     )
+    crop: Annotated[tuple[Corner, Corner], Field(strict=False)] | None = key(
+        "lowest and highest corner of the scene in the file, as `[[-5, -5, -1], [5, 5, 2]]`; what is outside is "
+        "dropped. If left out, the dense part is the scene",
+        None,
+        read_by=("import_field",),
+    )
+
+    @field_validator("field")
+    @classmethod
+    def _require_splat(cls, path: str) -> str:
+        suffix = Path(path).suffix.lower()
+        if suffix in (".ksplat", ".sog"):
+            raise ValueError(advise_conversion(Path(path), "sog" if suffix == ".sog" else "ksplat"))
+        if suffix not in (".ply", ".spz", ".splat"):
+            raise ValueError("a finished splat ends in .ply, .spz or .splat")
+        return path
+
+    @model_validator(mode="after")
+    def _order_corners(self) -> "FieldScene":
+        if self.crop and not all(low < high for low, high in zip(*self.crop, strict=True)):
+            raise ValueError("crop: its first corner must be the lower one on every axis")
+        return self
 
 
 SCENES: dict[str, type[_Scene]] = {"synthetic": SyntheticScene, "photos": PhotoScene, "field": FieldScene}

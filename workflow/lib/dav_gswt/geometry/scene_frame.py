@@ -99,6 +99,18 @@ class FocalLength:
 
 
 @dataclass(frozen=True)
+class SourceFrame:
+    """Where the world lies in the file that it was imported from: a point p of the world is at origin + unit p @ axes.
+
+    Double precision: coordinates as large as those of UTM keep their millimetres.
+    """
+
+    origin: tuple[float, float, float]
+    axes: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+    unit: float
+
+
+@dataclass(frozen=True)
 class SceneFrame:
     """A z-up world frame with the ground near z = 0, and how it came about.
 
@@ -106,8 +118,8 @@ class SceneFrame:
     all ground that photos see. test, test_groups: names of photos that only test; None where the scene names none.
     photos_per_cell: photos that must see ground of the exemplar. relief: spread of the points about the plane, in
     flying heights. focal_ratio: the used focal length over EXIF's. reprojection_error: mean, pixels. points: of the
-    sparse model. verdict: on structure from motion. gaussians, removed: of an imported field. renderer: versions of a
-    synthetic scene's renderer.
+    sparse model. verdict: on structure from motion. gaussians, removed, source: of an imported field. renderer:
+    versions of a synthetic scene's renderer.
     """
 
     kind: Literal["photos", "synthetic", "field"]
@@ -130,6 +142,7 @@ class SceneFrame:
     verdict: SfmVerdict | None = None
     gaussians: int | None = None
     removed: int | None = None
+    source: SourceFrame | None = None
     renderer: dict[str, str | None] | None = None
 
 

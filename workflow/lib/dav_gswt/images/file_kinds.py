@@ -1,5 +1,6 @@
 """What kind of file it is, by its first bytes: names and suffixes of people's files are often wrong."""
 
+import shlex
 import zipfile
 from pathlib import Path
 from typing import Literal
@@ -14,6 +15,8 @@ PHOTO_MAGIC = (b"\xff\xd8\xff", b"\x89PNG", b"II*\0", b"MM\0*", b"BM", b"P5", b"
 PHOTO_MAGIC = (*PHOTO_MAGIC, b"\0\0\0\x0cjP  ")
 RAW_SUFFIXES = {".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".raw"}  # most are TIFF by their bytes
 ATOMS = {b"moov", b"mdat", b"wide", b"free", b"skip"}  # a QuickTime file may begin with any of them
+BY_SUFFIX: dict[str, Kind] = {".splat": "splat", ".ksplat": "ksplat"}  # their first bytes tell nothing
+CONVERTER = "npx @playcanvas/splat-transform"  # Node.js
 
 
 def detect_kind(path: Path) -> Kind:
@@ -38,7 +41,22 @@ def detect_kind(path: Path) -> Kind:
         return "spz"
     if head.startswith(b"PK\3\4"):
         return "sog" if _has_member(path, "meta.json") else "other"
-    return {".splat": "splat", ".ksplat": "ksplat"}.get(suffix, "other")
+    return BY_SUFFIX.get(suffix, "other")
+
+
+def advise_conversion(path: Path, kind: Kind) -> str | None:
+    """What a splat is that the library does not read, and the command that converts it; None if it reads this kind."""
+    names = {"ksplat": "a .ksplat (GaussianSplats3D)", "sog": "a SOG (PlayCanvas)"}
+    if kind == "spz" and _begins_with(path, b"NGSP"):
+        names["spz"] = "an SPZ of version 4 (versions 1 to 3 are read)"
+    source = path / "meta.json" if path.is_dir() else path  # an unpacked SOG is a folder
+    command = f"{CONVERTER} {shlex.quote(str(source))} {shlex.quote(f'{path.stem}.ply')}"
+    return f"is {names[kind]}; convert it: {command}" if kind in names else None
+
+
+def _begins_with(path: Path, magic: bytes) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(magic)) == magic
 
 
 def _has_member(path: Path, name: str) -> bool:

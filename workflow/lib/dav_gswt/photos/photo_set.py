@@ -12,14 +12,16 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import read_field, write_field
+from dav_gswt.field import write_field
 from dav_gswt.files import atomic_folder
 from dav_gswt.geometry.scene_frame import LeftOutPhoto, SceneFrame, write_scene_frame
 from dav_gswt.images import image_files
+from dav_gswt.images.file_kinds import detect_kind
 from dav_gswt.logs import progress
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model, splat
+from dav_gswt.photos.importers.splat_files import read_splat
 from dav_gswt.photos.lenses import Lens, pinhole_parameters, write_lenses
 from dav_gswt.photos.masks import PhotoMasks, find_borders, read_picture
 from dav_gswt.photos.photo_listing import Source, list_photos
@@ -110,17 +112,21 @@ def import_field(
     source: Path | str,
     out: Path | str,
     ground: Path | str,
-    up: Sequence = splat.UP,
+    up: Sequence | None = None,
+    crop: Sequence | None = None,
     seed: int = 0,
 ) -> SceneFrame:
-    """Bring a finished 3DGS .ply into its ground frame: the field to `out`, ground.json to `ground`.
+    """Bring a finished splat into its ground frame: the field to `out`, ground.json to `ground`.
 
-    up: a rough direction upwards in the file. Raises: InputError: see `read_field` and
-    `fit_field_frame`.
+    up: a rough direction upwards in the file; None: the side on which things stand. crop: lowest and highest corner of
+    the scene in the file; None: its dense part. Raises: InputError: see `read_splat` and `fit_field_frame`.
     """
-    given = read_field(source)
+    given = read_splat(source)
+    if given.sh_degree > 0:
+        splat.report_dropped_harmonics(given.sh_degree)
+    usual = splat.UP_OF_SPZ if detect_kind(Path(source)) == "spz" else splat.UP
     try:
-        entered, frame = splat.fit_field_frame(given, np.random.default_rng(seed), up)
+        entered, frame = splat.fit_field_frame(given.field, np.random.default_rng(seed), up, crop, given.origin, usual)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     write_field(entered, out)

@@ -1,19 +1,20 @@
 """What somebody brings, recognised by what is in it: photos, a video, a splat, or another program's project."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dav_gswt.errors import InputError
-from dav_gswt.images.file_kinds import Kind, detect_kind
+from dav_gswt.images.file_kinds import Kind, advise_conversion, detect_kind
 from dav_gswt.photos.photo_listing import PICTURES, PhotoListing, list_photos
 
 LEAST_PHOTOS = 3
 SPLATS: tuple[Kind, ...] = ("ply", "spz", "splat", "ksplat", "sog")
 COLMAP_FILES = ("cameras.bin", "cameras.txt")
 OPENSFM_FILES = ("opensfm/reconstruction.json", "reconstruction.json")
-SPLAT_PROPERTY = b"property float f_dc_0"  # in the head of a .ply: it holds Gaussians
+SPLAT_PROPERTY = re.compile(rb"property (float|float32|double|float64) f_dc_0\b")  # a .ply that holds Gaussians
 PACKED_PROPERTY = b"packed_position"
 PLY_HEAD = 8192
 
@@ -67,6 +68,8 @@ def _recognize_file(path: Path, name: str) -> Recognised:
 def _recognize_splat(path: Path, name: str, kind: Kind) -> Recognised:
     if kind == "ply" and not holds_gaussians(path):
         raise InputError(f"{path}: a mesh or point cloud, without Gaussians; bring the photos it was made from")
+    if advice := advise_conversion(path, kind):
+        raise InputError(f"{path}: {advice}")
     return Recognised({"kind": "field", "field": str(path.resolve())}, f"a finished splat (.{kind})", name)
 
 
@@ -74,10 +77,12 @@ def holds_gaussians(path: Path) -> bool:
     """Whether a .ply names the properties of Gaussians, plain or packed."""
     with path.open("rb") as file:
         head = file.read(PLY_HEAD)
-    return SPLAT_PROPERTY in head or PACKED_PROPERTY in head
+    return SPLAT_PROPERTY.search(head) is not None or PACKED_PROPERTY in head
 
 
 def _recognize_folder(folder: Path, name: str, model: Path | None) -> Recognised:
+    if advice := advise_conversion(folder, "sog" if (folder / "means_l.webp").is_file() else "other"):
+        raise InputError(f"{folder}: {advice}")
     found_models = _find_models(folder)
     listing = list_photos(folder / "images" if found_models and (folder / "images").is_dir() else folder)
     photos, files = list(listing.photos.values()), listing.files

@@ -1,0 +1,132 @@
+"""Finished splats as other programs store them: `.ply`, `.spz` (versions 1 to 3) and `.splat`, without harmonics.
+
+SPZ is gzip of a header and of fixed-point columns (https://github.com/nianticlabs/spz); `.splat` has 32 bytes a
+Gaussian (https://github.com/antimatter15/splat). Sizes are checked before anything is allocated.
+"""
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.field import Splats, build_field, read_ply, rgb_to_sh
+from dav_gswt.files import UNREADABLE
+from dav_gswt.images.file_kinds import advise_conversion, detect_kind
+
+SPZ_MAGIC, SPZ_HEADER, SPZ_SMALLEST, SPZ_COLOUR = 0x5053474E, 16, -10.0, 0.15
+MOST_PACKED = 1032  # times that gzip can make a file smaller
+MOST_GAUSSIANS = 100_000_000
+RECORD = np.dtype([("place", "<f4", 3), ("scale", "<f4", 3), ("colour", "u1", 4), ("turn", "u1", 4)])  # of a .splat
+
+
+def read_splat(path: Path | str) -> Splats:
+    """Read a finished splat of any kind, its colours without their view-dependent part.
+
+    Raises: InputError: no such file, a kind that is not read, with the command that converts it, or a broken file.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file")
+    kind = detect_kind(path)
+    if advice := advise_conversion(path, kind):
+        raise InputError(f"{path}: {advice}")
+    if kind not in ("spz", "splat"):
+        return read_ply(path, harmonics=False)
+    try:
+        return _read_spz(path) if kind == "spz" else _read_dot_splat(path)
+    except UNREADABLE as error:
+        raise InputError(
+            f"{path}: not a readable .{kind} ({summarize_error(error)}); copy or export it again"
+        ) from error
+
+
+def _read_dot_splat(path: Path) -> Splats:
+    size = path.stat().st_size
+    if size % RECORD.itemsize or not size:
+        raise InputError(f"{path}: {size} bytes are no whole Gaussians of {RECORD.itemsize} bytes; copy it again")
+    rows = np.fromfile(path, RECORD)
+    with np.errstate(divide="ignore", invalid="ignore"):  # zero is thickened, what is below it refused
+        log_scales = np.log(rows["scale"])
+    field = build_field(
+        path,
+        means=rows["place"],
+        sh=_unpack_colours(rows["colour"][:, :3], 1 / 255, 0.0),
+        log_scales=log_scales,
+        quats=(rows["turn"].astype(np.float32) - 128) / 128,
+        opacity_logits=_unpack_opacities(rows["colour"][:, 3]),
+    )
+    return Splats(field, np.zeros(3), 0)
+
+
+def _read_spz(path: Path) -> Splats:
+    with gzip.open(path) as file:
+        header = _read_exactly(file, SPZ_HEADER)
+        magic, version, n = np.frombuffer(header, "<u4", 3).tolist()
+        degree, fraction = header[12], header[13]
+        if magic != SPZ_MAGIC or version not in (1, 2, 3) or degree > 4 or fraction > 24:
+            raise InputError(f"{path}: not an SPZ of version 1, 2 or 3; copy or export it again")
+        place, turn = 2 if version == 1 else 3, 4 if version == 3 else 3
+        room = MOST_PACKED * path.stat().st_size
+        if not 0 < n <= MOST_GAUSSIANS or n * (3 * place + turn + 7) > room:
+            raise InputError(f"{path}: the header announces {n} Gaussians, not what the file holds; is it cut short?")
+        sizes = (3 * place, 1, 3, 3, turn)
+        places, opacities, colours, scales, turns = (
+            np.frombuffer(_read_exactly(file, n * each), np.uint8).reshape(n, each) for each in sizes
+        )
+    field = build_field(
+        path,
+        means=places.view("<f2").astype(np.float32) if version == 1 else _unpack_places(places, fraction),
+        sh=_unpack_colours(colours, 1 / 255 / SPZ_COLOUR, -0.5 / SPZ_COLOUR, sh=True),
+        log_scales=scales / np.float32(16) + np.float32(SPZ_SMALLEST),
+        quats=_unpack_smallest_three(turns.view("<u4")[:, 0]) if version == 3 else _unpack_first_three(turns),
+        opacity_logits=_unpack_opacities(opacities[:, 0]),
+    )
+    return Splats(field, np.zeros(3), degree)
+
+
+def _read_exactly(file: gzip.GzipFile, size: int) -> bytes:
+    data = file.read(size)
+    if len(data) != size:
+        raise EOFError("it ends too early")
+    return data
+
+
+def _unpack_colours(
+    values: UInt8[Array, "n 3"], scale: float, shift: float, sh: bool = False
+) -> Float32[Array, "n 1 3"]:
+    """Coefficients of degree 0, from bytes of colours or (sh) of coefficients."""
+    colours = values * np.float32(scale) + np.float32(shift)
+    return colours[:, None] if sh else rgb_to_sh(colours)
+
+
+def _unpack_opacities(values: UInt8[Array, "n"]) -> Float32[Array, "n"]:
+    """Logits; those of 0 and 255 are infinite."""
+    with np.errstate(divide="ignore"):
+        return (np.log(values.astype(np.float32)) - np.log(255 - values.astype(np.float32))).astype(np.float32)
+
+
+def _unpack_places(values: UInt8[Array, "n 9"], fraction: int) -> Float32[Array, "n 3"]:
+    """Fixed point of 24 bits, two's complement, little-endian."""
+    wide = np.zeros((len(values), 3, 4), np.uint8)
+    wide[..., 1:] = values.reshape(-1, 3, 3)  # the sign is in the uppermost byte
+    return (wide.view("<i4")[..., 0] >> 8).astype(np.float32) / np.float32(2**fraction)
+
+
+def _unpack_first_three(values: UInt8[Array, "n 3"]) -> Float32[Array, "n 4"]:
+    xyz = values / np.float32(127.5) - np.float32(1)
+    return np.column_stack([np.sqrt(np.maximum(1 - (xyz**2).sum(1), 0)), xyz])
+
+
+def _unpack_smallest_three(words: Array) -> Float32[Array, "n 4"]:
+    """w x y z from which of x, y, z, w is the largest (two bits), then the others in order: a sign and nine bits."""
+    rows, which = np.arange(len(words)), words >> 30
+    digits = words[:, None] >> np.array([20, 10, 0], np.uint32) & 1023
+    small = (digits & 511) * np.float32(np.sqrt(0.5) / 511) * np.where(digits & 512, -1, 1).astype(np.float32)
+    others = np.array([[k for k in range(4) if k != largest] for largest in range(4)])[which]
+    xyzw = np.empty((len(words), 4), np.float32)
+    xyzw[rows[:, None], others] = small
+    xyzw[rows, which] = np.sqrt(np.maximum(1 - (small**2).sum(1), 0))
+    return np.ascontiguousarray(xyzw[:, [3, 0, 1, 2]])
