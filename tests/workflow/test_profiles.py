@@ -50,7 +50,7 @@ def test_plain_snakemake_reads_the_default_profile(clone, read_as):
 
 def test_make_run_reads_the_default_profile(clone, read_as, monkeypatch):
     commands = []
-    monkeypatch.setattr(make_run, "follow", lambda command: commands.append(command) or (1, 0))
+    monkeypatch.setattr(make_run, "follow", lambda command, root: commands.append(command) or (1, 0))
     assert make_run.main(["--cores", "2"]) == 1
     words = commands[0][commands[0].index("snakemake") + 1 :]
     args = read_as(*(word for word in words if word not in ("--logger", "davgswt")))  # a plugin, found by PYTHONPATH

@@ -15,13 +15,14 @@ from typing import Any
 import yaml
 
 from dav_gswt.cli import run
+from dav_gswt.cli.judgement import judge_terrain
 from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.errors import InputError
 from dav_gswt.files import REPOSITORY, atomic_file
 from dav_gswt.paths import encode_branch, stage_folder
 from dav_gswt.photos.recognition import Recognised, recognize_input
 
-SCENE_FILE = "scene.yaml"
+SCENE_FILE, STILL = "scene.yaml", "walker.png"
 AGENTS = {"drone": "plan", "handheld": "handheld", "rig": "serial"}  # --capture, and the scene's agent
 START, USUAL_ROUND = 8, 4  # photos of the first fit and of a round where a budget is given
 HEAD = """\
@@ -39,6 +40,7 @@ class Made:
     field: Path
     report: Path | None
     scene: Path
+    judgement: tuple[str, ...] = ()
 
 
 def add_command(commands) -> None:
@@ -176,13 +178,17 @@ def collect_results(out: Path, settings: dict[str, Any]) -> Made:
     terrain, round_folder = (out / stage_folder(stage, branch) for stage in ("terrain", "round"))
     photos = out / stage_folder("photos", branch)
     link_folder(terrain / "page", out / "page")
-    still = next(iter(sorted(terrain.glob("*.png"))))
-    link_file(still, out / "terrain.png")
+    link_file(terrain / STILL, out / "terrain.png")
     link_file(round_folder / "field.ply", out / "field.ply")
     report = out / "report.html" if (photos / "report.html").is_file() else None
     if report:
         link_file(photos / "report.html", report)
-    return Made(out / "page", out / "terrain.png", out / "field.ply", report, out / SCENE_FILE)
+    materials = out / stage_folder("materials", branch) / "materials.json"
+    if materials.is_file():
+        link_file(materials.with_name("materials.png"), out / "materials.png")
+    metrics = (round_folder if branch["t"] else out / stage_folder("coarse", branch)) / "metrics.json"
+    said = judge_terrain(photos / "ground.json", *(each if each.is_file() else None for each in (materials, metrics)))
+    return Made(out / "page", out / "terrain.png", out / "field.ply", report, out / SCENE_FILE, tuple(said))
 
 
 def link_file(source: Path, target: Path) -> None:
@@ -210,7 +216,8 @@ def link_folder(source: Path, target: Path) -> None:
 def report_made(made: Made) -> None:
     """Print where the results are, and what to type next."""
     size, folder = sum(path.stat().st_size for path in made.page.rglob("*") if path.is_file()), made.page.parent
-    lines = [
+    lines = [*(f"  {sentence}" for sentence in made.judgement), ""] if made.judgement else []
+    lines += [
         f"  page     {made.page} ({size / 1e6:.0f} MB; any web host can serve it)",
         f"  still    {made.still}",
         f"  field    {made.field} (for any splat viewer)",
