@@ -105,6 +105,33 @@ def test_shrinking_averages_areas():
     assert image_files.shrink_to(image, 5).shape == (3, 5, 3)
 
 
+@pytest.mark.parametrize("turn", [1, 6])
+def test_a_large_jpeg_is_shrunk_as_it_is_decoded(turn, tmp_path):
+    """Means over 3 x 3 pixels of a picture without detail finer than 16: the same to two steps of 8 bits."""
+    y, x = np.mgrid[:240, :360] / 16
+    picture = np.repeat(0.5 + 0.2 * (np.sin(x) + np.cos(y))[..., None], 3, axis=2)  # JPEG halves the colours anyway
+    path = stored(tmp_path / "a.jpg", np.uint8(255 * picture), Orientation=turn)
+    small = image_files.read_shrunk_photo(path, 120)
+    assert small.shape == ((80, 120, 3) if turn == 1 else (120, 80, 3))
+    assert np.abs(small - image_files.shrink_to(image_files.read_photo(path), 120)).max() < 2.5 / 255
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png"])
+def test_a_picture_that_is_not_reduced_is_shrunk_to_the_bit(suffix, tmp_path):
+    path = stored(tmp_path / f"a{suffix}", GENERATOR.integers(0, 256, (24, 30, 3)).astype(np.uint8))
+    for longest in (40, 20):
+        expected = image_files.shrink_to(image_files.read_photo(path), longest)
+        assert np.array_equal(image_files.read_shrunk_photo(path, longest), expected)
+
+
+def test_a_jpeg_that_was_cut_short_is_refused_by_name_at_any_size(tmp_path):
+    path = stored(tmp_path / "a.jpg", GENERATOR.integers(0, 256, (160, 160, 3)).astype(np.uint8))
+    path.write_bytes(path.read_bytes()[:3000])
+    for longest in (20, 160):
+        with pytest.raises(InputError, match=r"a\.jpg: damaged or cut short"):
+            image_files.read_shrunk_photo(path, longest)
+
+
 def test_exr_keeps_parts_channels_and_texts_by_name_and_leaves_the_arguments_alone(tmp_path):
     maps = {k: GENERATOR.random((3, 5)).astype(np.float32) for k in ("R", "G", "B", "Z", "uncertainty")}
     channels, header = dict(maps), {"lam": repr(0.1), "pose": "a"}

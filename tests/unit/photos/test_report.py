@@ -63,7 +63,7 @@ def test_the_page_needs_nothing_but_itself_and_escapes_names(made, root, tmp_pat
     text = (tmp_path / "a.html").read_text()
     assert text == (tmp_path / "b.html").read_text(), "equal photos give equal bytes"
     links = re.findall(r'(?:src|href)="([^"]*)"', text)
-    assert len(links) == 13 and all(link.startswith("data:image/") for link in links)
+    assert len(links) == 14 and all(link.startswith("data:image/") for link in links)
     assert "default-src 'none'" in text and not re.search(r"url\(|@import|<script|https?:", text)
     assert not {"<b>", "<i>"} & set(re.findall(r"<[^>]*>", text))
     for said in ("matches &lt;i&gt;no&lt;/i&gt;", "&lt;img src=", "&lt;b&gt;bold", "12 of 14 photos", "it is odd"):
@@ -84,6 +84,18 @@ def test_advice_names_weak_photos_and_how_much_few_photos_see(made, flown):
     assert "% of the exemplar is seen by fewer than 3 photos" in said[0]
     small = replace(FRAME, exemplar=Square(0.0, 0.0, 0.4))
     assert "only 0.40 flying heights wide" in list_advice(collect_facts(made(small)))[-1]
+
+
+def test_the_page_says_which_ground_the_photos_miss(flown, root, tmp_path):
+    """Of twelve photos all but those at the corners are blurred: only one photo shows the ground below each."""
+    sharp = np.random.default_rng(0).random((60, 80, 3), np.float32)
+    for blurred in ((), (1, 2, 4, 5, 6, 7, 9, 10)):
+        pictures = ((name, GREY if i in blurred else sharp) for i, name in enumerate(flown.names))
+        write_photo_folder(tmp_path / "photos", flown, pictures, FRAME)
+        write_report(tmp_path / "photos", root / "workflow/report/photos.html", "dunes", tmp_path / "a.html")
+        text = (tmp_path / "a.html").read_text()
+        assert ("Nothing is missing" in text, "Blurred: 001.png, 002.png" in text) == (not blurred, bool(blurred))
+        assert ("seen by too few photos, at" in text.replace("square flying heights ", "")) == bool(blurred)
 
 
 def test_coverage_does_not_depend_on_the_unit(made, flown):

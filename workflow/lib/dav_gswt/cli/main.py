@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from dav_gswt.cli import export, make, run_safely
+from dav_gswt.cli import export, gaps, make, run_safely
 from dav_gswt.errors import InputError
 from dav_gswt.inspect import command as inspect
 from dav_gswt.terrain import serve
@@ -15,6 +15,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="dav-gswt", description=__doc__)
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     make.add_command(commands)
+    gaps.add_command(commands)
     inspect.add_command(commands)
     export.add_command(commands)
     about = "walk over a terrain in a browser: serves its page on this machine"

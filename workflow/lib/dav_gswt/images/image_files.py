@@ -9,6 +9,7 @@ import OpenImageIO as oiio
 import tifffile
 from jaxtyping import Float, Float16, Float32, UInt16
 from numpy import ndarray as Array
+from PIL import Image
 from scipy.ndimage import map_coordinates
 from scipy.sparse import csr_array
 
@@ -53,6 +54,27 @@ def read_photo(path: Path | str) -> Float32[Array, "h w 3"]:
     Grey becomes three equal channels. Raises: InputError: missing, not an image, cut short, or too large.
     """
     return _read_colours(path)[0]
+
+
+def read_shrunk_photo(path: Path | str, longest: int) -> Float32[Array, "h w 3"]:
+    """`read_photo` shrunk to at most `longest` pixels along the longer side, by area means.
+
+    A JPEG is decoded at a half, a quarter or an eighth of its size where that is enough, in a third of the time and a
+    sixth of the memory: libjpeg leaves out the high frequencies of its blocks.
+    """
+    width, height, turn = read_stored_size(path)
+    small = fit_size(width, height, longest)
+    try:
+        with Image.open(path) as file:
+            if file.mode in ("RGB", "L"):
+                file.draft(file.mode, small)
+            reduced = file.size != (width, height)
+            pixels = np.asarray(file.convert("RGB"), np.float32) / 255 if reduced else None
+    except (Image.DecompressionBombError, *UNREADABLE):  # another format, or a damaged file, which is named below
+        pixels = None
+    if pixels is None:
+        return shrink_to(read_photo(path), longest)
+    return np.ascontiguousarray(_apply_orientation(shrink_image(pixels, *small), turn))
 
 
 def read_photo_and_alpha(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w"]]:

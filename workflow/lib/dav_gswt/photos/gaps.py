@@ -4,34 +4,41 @@ Footprints are those of the photos on the surface that their points describe, hi
 is a map, an outline for each gap, and the poses of photos that would fill it.
 """
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from matplotlib.figure import Figure
 from numpy import ndarray as Array
 from scipy import ndimage
 from scipy.interpolate import griddata
 from skimage.measure import find_contours
 
 from dav_gswt.geometry.cameras import Camera, look_at
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame
+from dav_gswt.images import figures
 from dav_gswt.photos.colmap_model import ColmapModel
+from dav_gswt.photos.view_split import find_aim_point
 
-CELLS = 200  # along the longer side of the map
-DEPTH_SIDE = 96  # pixels along the longer side of the pictures in which hidden ground is found
-HIDDEN = 0.04  # of the distance: ground farther behind what a photo shows there is hidden in it
+FINE, MOST = 40, 400  # cells in a flying height, and along the longer side of the map at most
 NEED = 3  # photos that must see a place
-LEAST_ANGLE = 8.0  # degrees between the outer directions from which a place is seen
+SIDES = 16  # horizontal directions in which views of a place are compared
+LEAST_ANGLE = 8.0  # degrees between the outer directions from which a place is seen: less says little of heights
+LEAN = 20.0  # degrees off straight down: where all views lean farther to one side, they are from that side only
 COARSE = 2.0  # times the usual width of a photo's pixel on the ground
 REACH = 4.0  # flying heights from the camera, beyond which a photo tells nothing of the ground
-LEAST_AREA = 0.01  # of a picture's footprint: smaller gaps are none
+BRIDGE = 1.0  # flying heights: half the width of a bay of the flight plan that is asked for
+LEAST_AREA = 0.01  # of a photo's usual footprint: smaller gaps are none
 OVERLAP = 0.7  # of neighbouring photos that fill a gap
-HORIZON = 75.0  # degrees off straight down, from which a picture shows the horizon
-REASONS = ("seen by no photo", "seen by too few photos", "seen from one side", "seen too coarsely")
+HORIZON = 0.5  # share of a picture that must show ground within REACH
+REASONS = ("seen by no photo", "seen by too few photos", "seen from one side only", "seen too coarsely")
 COLOURS = ("#882255", "#d55e00", "#e69f00", "#56b4e9")
-GOOD = "#b8d8b8"
+WELL, BEYOND = -1, -2  # in place of a reason: seen well, not asked for
+GOOD, BACK = "#b8d8b8", "#ffffff"
+LABELLED, LISTED = 20, 10  # gaps that have their number on the map, that are told of one by one
 
 
 @dataclass(frozen=True)
@@ -43,29 +50,69 @@ class Surface:
     cell: float
     heights: Float[Array, "rows columns"]
 
-    @property
+    @cached_property
     def centres(self) -> Float[Array, "n 3"]:
         rows, columns = self.heights.shape
         x = self.west + (np.arange(columns) + 0.5) * self.cell
         y = self.south + (np.arange(rows) + 0.5) * self.cell
         return np.stack([*np.meshgrid(x, y), self.heights], -1).reshape(-1, 3)
 
+    def find_heights(self, places: Float[Array, "n d"]) -> Float[Array, "n"]:
+        """Heights below or above places, linear between the centres of cells and constant beyond the outermost."""
+        at = (places[:, 1::-1] - [self.south, self.west]) / self.cell - 0.5
+        return ndimage.map_coordinates(self.heights, at.T, order=1, mode="nearest")
+
+
+@dataclass(frozen=True)
+class CellViews:
+    """How photos see each cell: their number; the side of the finest pixel on the ground, along its longer side; and
+    lean: along each of SIDES horizontal directions the least component of the unit vectors to the photos, 1 if none."""
+
+    counts: Int[Array, "rows columns"]
+    widths: Float[Array, "rows columns"]
+    lean: Float[Array, "sides rows columns"]
+
+    @property
+    def angles(self) -> Float[Array, "rows columns"]:
+        """Degrees between the outer directions from which each cell is seen, by their distance along the ground."""
+        opposite = np.roll(self.lean, SIDES // 2, axis=0)
+        apart = np.where(self.counts > 0, -(self.lean + opposite).min(0), 0)
+        return 2 * np.degrees(np.arcsin(np.clip(apart / 2, 0, 1)))
+
+    @property
+    def one_sided(self) -> Bool[Array, "rows columns"]:
+        """Where all views are from nearly one direction, or lean to one side by more than LEAN."""
+        return (self.angles < LEAST_ANGLE) | (self.lean.max(0) > np.sin(np.radians(LEAN)))
+
 
 @dataclass(frozen=True)
 class Gap:
-    """A piece of ground that photos miss. reason: its place in REASONS. outline: closed, in the world's plane."""
+    """A connected piece of ground that photos miss.
 
-    reason: int
-    area: float
-    outline: Float[Array, "n 2"]
+    areas: in square world units, by reason. rings: closed, in the world's plane, the outer one first and
+    counterclockwise, then those around ground that is seen well.
+    """
+
+    areas: dict[str, float]
+    rings: tuple[Float[Array, "_ 2"], ...]
+    middle: Float[Array, "3"]
+
+    @property
+    def area(self) -> float:
+        return sum(self.areas.values())
+
+    @property
+    def reason(self) -> str:
+        """What is wrong with most of it."""
+        return max(self.areas, key=lambda reason: self.areas[reason])
 
 
 @dataclass(frozen=True)
 class Gaps:
-    """What a photo set misses. fault: of each cell its place in REASONS, -1 where it is seen well, -2 outside.
+    """What a photo set misses. fault: of each cell its place in REASONS, or WELL or BEYOND.
 
-    area: of all ground that is asked for. pixel: usual width of a photo's pixel on the ground, world units. horizon:
-    names of photos that look at the horizon.
+    area: of all ground that is asked for. pixel: usual side of a photo's pixel on the ground, world units. horizon:
+    names of photos that show the horizon more than the ground.
     """
 
     surface: Surface
@@ -76,174 +123,279 @@ class Gaps:
     horizon: tuple[str, ...]
 
 
-def find_gaps(model: ColmapModel, frame: SceneFrame) -> Gaps:
-    """The gaps of a photo set over its ground. model: in the frame's world."""
-    surface = build_surface(model, frame)
-    counts, angles, widths = measure_cells(model.cameras, surface, REACH * frame.flying_height)
-    asked = find_asked_ground(counts, frame.flying_height / surface.cell)
-    pixel = float(np.median(widths[counts >= NEED])) if (counts >= NEED).any() else np.inf
-    faults = [counts == 0, counts < NEED, angles < LEAST_ANGLE, widths > COARSE * pixel]
-    fault = np.select([asked & each for each in faults], range(len(faults)), np.where(asked, -1, -2))
-    footprint = (pixel * np.mean([camera.width for camera in model.cameras])) ** 2
-    gaps = list_gaps(fault, surface, LEAST_AREA * footprint)
-    tilted = np.cos(np.radians(HORIZON))
-    pairs = zip(model.names, model.cameras, strict=True)
-    horizon = tuple(name for name, camera in pairs if -camera.forward[2] < tilted)
-    return Gaps(surface, fault, gaps, float(asked.sum() * surface.cell**2), pixel, horizon)
+def find_gaps(model: ColmapModel, frame: SceneFrame, blurred: Collection[str] = ()) -> Gaps:
+    """The gaps of a photo set over its ground. model: in the frame's world. blurred: photos that do not count."""
+    reach = REACH * frame.flying_height
+    pairs = [*zip(model.names, model.cameras, strict=True)]
+    horizon = tuple(name for name, camera in pairs if measure_ground_share(camera, reach) < HORIZON)
+    cameras = [camera for name, camera in pairs if name not in {*blurred, *horizon}]
+    surface = build_surface(model, frame, cameras or [*model.cameras])
+    views = measure_cells(cameras, surface, reach)
+    seen = views.counts >= NEED
+    inner = find_inner_ground(cameras, surface, frame.flying_height)
+    asked = inner | ndimage.binary_fill_holes(inner | seen) & ~seen
+    judged = inner & seen if (inner & seen).any() else seen
+    pixel = float(np.median(views.widths[judged])) if seen.any() else np.inf
+    faults = [views.counts == 0, ~seen, inner & views.one_sided, inner & (views.widths > COARSE * pixel)]
+    fault = np.select([asked & each for each in faults], range(len(faults)), np.where(asked | seen, WELL, BEYOND))
+    footprint = np.median([camera.width * camera.height for camera in model.cameras]) * pixel**2
+    pieces, _ = ndimage.label(fault >= 0)
+    small = np.bincount(pieces.ravel()) * surface.cell**2 < (LEAST_AREA * footprint if seen.any() else 0.0)
+    fault = np.where(small[pieces] & (fault >= 0), WELL, fault)
+    return Gaps(
+        surface, fault, list_gaps(fault, surface), float((fault != BEYOND).sum() * surface.cell**2), pixel, horizon
+    )
 
 
-def build_surface(model: ColmapModel, frame: SceneFrame) -> Surface:
-    """The surface through the median heights of the points in each cell; gaps between them are interpolated."""
-    low, high = np.percentile(model.points[:, :2], [1, 99], axis=0)
-    low, high = low - 0.5 * frame.flying_height, high + 0.5 * frame.flying_height
-    cell = float((high - low).max() / CELLS)
-    columns, rows = np.maximum(1, np.ceil((high - low) / cell).astype(int))
+def measure_ground_share(camera: Camera, reach: float) -> float:
+    """The share of a picture that shows ground (z = 0) nearer than `reach`."""
+    origins, rays = camera.resized(16, 12).rays()
+    with np.errstate(divide="ignore"):
+        distance = origins[..., 2] / -rays[..., 2] * np.linalg.norm(rays, axis=-1)
+    return float(((distance > 0) & (distance < reach)).mean())
+
+
+def build_surface(model: ColmapModel, frame: SceneFrame, cameras: Sequence[Camera]) -> Surface:
+    """The surface through the median heights of the points in each cell; it is linear between them.
+
+    It reaches a flying height beyond the places that the cameras look at.
+    """
+    aims = np.stack([find_aim_point(camera) for camera in cameras])
+    low, high = aims.min(0) - frame.flying_height, aims.max(0) + frame.flying_height
+    cell = max(frame.flying_height / FINE, float((high - low).max() / MOST))
+    columns, rows = np.ceil((high - low) / cell).astype(int)
     at = np.floor((model.points[:, :2] - low) / cell).astype(int)
     inside = ((at >= 0) & (at < [columns, rows])).all(1)
     flat = at[inside, 1] * columns + at[inside, 0]
     cells = np.unique(flat)
-    heights = ndimage.median(model.points[inside, 2], flat, cells)
+    heights = np.asarray(ndimage.median(model.points[inside, 2], flat, cells), float)
     known = np.stack(np.divmod(cells, columns), -1)
     grid = np.mgrid[:rows, :columns].reshape(2, -1).T
-    filled = griddata(known, heights, grid, "linear") if len(known) > 3 else np.full(len(grid), np.nan)
-    nearest = griddata(known, heights, grid, "nearest")
+    filled = np.full(len(grid), np.nan)
+    if len(np.unique(known[:, 0])) > 1 and len(np.unique(known[:, 1])) > 1 and len(known) > 3:
+        filled = griddata(known, heights, grid, "linear")
+    nearest = griddata(known, heights, grid, "nearest") if len(known) else np.zeros(len(grid))
     filled = np.where(np.isfinite(filled), filled, nearest).reshape(rows, columns)
     return Surface(float(low[0]), float(low[1]), cell, ndimage.median_filter(filled, 3))
 
 
-def measure_cells(
-    cameras: tuple[Camera, ...], surface: Surface, reach: float
-) -> tuple[Int[Array, "rows columns"], Float[Array, "rows columns"], Float[Array, "rows columns"]]:
-    """Of each cell: photos that see it, degrees between the directions to the outer ones, width of the finest pixel.
+def measure_cells(cameras: Sequence[Camera], surface: Surface, reach: float) -> CellViews:
+    """How cameras see the cells of a surface. reach: photos from farther away do not count."""
+    points, shape = surface.centres, surface.heights.shape
+    turns = 2 * np.pi * np.arange(SIDES) / SIDES
+    sides = np.stack([np.cos(turns), np.sin(turns)])
+    counts, finest, lean = np.zeros(len(points), int), np.full(len(points), np.inf), np.ones((SIDES, len(points)))
+    for camera in cameras:
+        sees = find_seen_cells(camera, surface, reach)
+        way = camera.centre - points[sees]
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
+        depth = (points[sees] - camera.centre) @ camera.forward
+        counts[sees] += 1
+        finest[sees] = np.minimum(finest[sees], depth / camera.fx / np.clip(way[:, 2], 0.05, 1))
+        lean[:, sees] = np.minimum(lean[:, sees], (way[:, :2] @ sides).T)
+    return CellViews(counts.reshape(shape), finest.reshape(shape), lean.reshape(SIDES, *shape))
 
-    The angle is twice the largest one off the mean direction. reach: farther photos do not count.
+
+def find_seen_cells(camera: Camera, surface: Surface, reach: float) -> Int[Array, "k"]:
+    """Indices of the cells that a camera sees: in the picture, nearer than `reach`, and not hidden by higher ground.
+
+    The line from a cell to the camera is followed in steps of a cell until it is above all ground. Ground hides what
+    lies behind it if it rises above the line by more than half a cell, since heights are not exact.
     """
     points = surface.centres
-    counts, total = np.zeros(len(points), int), np.zeros((len(points), 3))
-    finest = np.full(len(points), np.inf)
-    seen = []
-    for camera in cameras:
-        sees = find_seen_points(camera, points, reach)
-        away = camera.centre - points[sees]
-        distance = np.linalg.norm(away, axis=1)
-        counts[sees] += 1
-        total[sees] += away / distance[:, None]
-        depth = (points[sees] - camera.centre) @ camera.forward
-        finest[sees] = np.minimum(finest[sees], depth / camera.fx)
-        seen.append(sees)
-    mean = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
-    least = np.ones(len(points))
-    for camera, sees in zip(cameras, seen, strict=True):
-        away = camera.centre - points[sees]
-        cosine = np.einsum("ni,ni->n", away, mean[sees]) / np.linalg.norm(away, axis=1)
-        least[sees] = np.minimum(least[sees], cosine)
-    angles = 2 * np.degrees(np.arccos(np.clip(least, -1, 1)))
-    shape = surface.heights.shape
-    return counts.reshape(shape), angles.reshape(shape), finest.reshape(shape)
-
-
-def find_seen_points(camera: Camera, points: Float[Array, "n 3"], reach: float) -> Int[Array, "k"]:
-    """Indices of the points of a surface that a camera sees: inside the picture, near, and behind no others."""
     at, depth = camera.project(points)
-    inside = (depth > 0) & (depth < reach) & (at > 0).all(1) & (at < [camera.width, camera.height]).all(1)
-    rows = np.flatnonzero(inside)
-    scale = DEPTH_SIDE / max(camera.width, camera.height)
-    pixel = np.floor(at[rows] * scale).astype(int)
-    flat = pixel[:, 1] * (DEPTH_SIDE + 1) + pixel[:, 0]
-    nearest = np.full((DEPTH_SIDE + 1) ** 2, np.inf)
-    np.minimum.at(nearest, flat, depth[rows])
-    return rows[depth[rows] <= nearest[flat] + HIDDEN * np.linalg.norm(points[rows] - camera.centre, axis=1)]
+    inside = (depth > 0) & (at > 0).all(1) & (at < [camera.width, camera.height]).all(1)
+    rows = np.flatnonzero(inside & (np.linalg.norm(points - camera.centre, axis=1) < reach))
+    start, way = points[rows], camera.centre - points[rows]
+    level = np.maximum(np.linalg.norm(way[:, :2], axis=1), 1e-9)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        top = np.where(way[:, 2] > 0, (surface.heights.max() - start[:, 2]) / way[:, 2], 1.0)
+    steps = np.clip(top, 0, 1) * level / surface.cell
+    hidden = np.zeros(len(rows), bool)
+    for step in range(1, int(steps.max(initial=0)) + 1):
+        there = np.flatnonzero(~hidden & (step <= steps))
+        on_line = start[there] + (step * surface.cell / level[there])[:, None] * way[there]
+        hidden[there] = surface.find_heights(on_line) > on_line[:, 2] + 0.5 * surface.cell
+    return rows[~hidden]
 
 
-def find_asked_ground(counts: Int[Array, "rows columns"], reach: float) -> Bool[Array, "rows columns"]:
-    """The ground that the photos were meant to show: what enough of them see, with holes and bays closed.
+def find_inner_ground(cameras: Sequence[Camera], surface: Surface, height: float) -> Bool[Array, "rows columns"]:
+    """The ground between the places that photos look at: what a flight was meant to show.
 
-    reach: half the width of a bay that is closed, in cells.
+    Its margin, which the outermost photos show from one side or once, is not asked for. Bays narrower than two BRIDGE
+    are closed, and holes.
     """
-    well, steps = counts >= NEED, max(1, round(0.5 * reach))
-    padded = np.pad(well, steps)
-    away = ndimage.distance_transform_edt(~padded)
+    rows, columns = surface.heights.shape
+    aimed, steps = np.zeros((rows, columns), bool), round(BRIDGE * height / surface.cell)
+    for camera in cameras:
+        column, row = np.floor((find_aim_point(camera) - [surface.west, surface.south]) / surface.cell).astype(int)
+        aimed[row, column] = True
+    away = ndimage.distance_transform_edt(~np.pad(aimed, steps + 1))
     closed = ndimage.distance_transform_edt(away <= steps) > steps
-    return ndimage.binary_fill_holes(closed[steps:-steps, steps:-steps] | well)
+    return ndimage.binary_fill_holes(closed[steps + 1 : -steps - 1, steps + 1 : -steps - 1] | aimed)
 
 
-def list_gaps(fault: Int[Array, "rows columns"], surface: Surface, least: float) -> tuple[Gap, ...]:
-    """The connected pieces of cells of one fault, the largest first; pieces smaller than `least` are left out."""
-    found = []
-    for reason in range(len(REASONS)):
-        pieces, count = ndimage.label(fault == reason)
-        for piece in range(1, count + 1):
-            area = float((pieces == piece).sum() * surface.cell**2)
-            if area >= least:
-                rings = find_contours(np.pad(pieces == piece, 1).astype(float), 0.5)
-                ring = max(rings, key=len)  # the outer one
-                outline = np.array([surface.west, surface.south]) + surface.cell * (ring[:, ::-1] - 0.5)
-                found.append(Gap(reason, area, outline))
+def list_gaps(fault: Int[Array, "rows columns"], surface: Surface) -> tuple[Gap, ...]:
+    """The connected pieces of cells with faults, the largest first."""
+    found, (pieces, _) = [], ndimage.label(fault >= 0)
+    corner = np.array([surface.west, surface.south])
+    for piece, box in enumerate(ndimage.find_objects(pieces), 1):
+        own = pieces[box] == piece
+        counts = np.bincount(fault[box][own], minlength=len(REASONS)) * surface.cell**2
+        start = corner + surface.cell * np.array([box[1].start, box[0].start])
+        rings = [
+            start + surface.cell * (ring[:, ::-1] - 0.5) for ring in find_contours(np.pad(own, 1).astype(float), 0.5)
+        ]
+        rings = sorted(rings, key=lambda ring: -abs(measure_ring(ring)))
+        turned = [ring if (measure_ring(ring) > 0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)]
+        deep = np.unravel_index(ndimage.distance_transform_edt(np.pad(own, 1))[1:-1, 1:-1].argmax(), own.shape)
+        middle = start + surface.cell * (np.array(deep[::-1]) + 0.5)
+        areas = {reason: float(area) for reason, area in zip(REASONS, counts, strict=True) if area}
+        found.append(Gap(areas, tuple(turned), np.r_[middle, surface.find_heights(middle[None])]))
     return tuple(sorted(found, key=lambda gap: -gap.area))
 
 
-def plan_photos(gaps: Gaps, frame: SceneFrame, lens: Camera) -> list[tuple[str, Camera]]:
-    """Photos straight down that fill the gaps, from the usual flying height on a grid. lens: whose view they have."""
-    height, surface = frame.flying_height, gaps.surface
-    step = (1 - OVERLAP) * height * np.array([lens.width / lens.fx, lens.height / lens.fy])
-    rows, columns = np.nonzero(gaps.fault >= 0)
-    at = surface.cell * (np.stack([columns, rows], 1) + 0.5)
-    planned = []
-    for square in np.unique(np.floor(at / step).astype(int), axis=0):
-        own = (np.floor(at / step).astype(int) == square).all(1)
-        ground = float(surface.heights[rows[own], columns[own]].max())
-        x, y = (surface.west, surface.south) + at[own].mean(0)
-        rotation, translation = look_at([x, y, ground + height], [x, y, ground])
-        name = f"gap_{len(planned) + 1:03d}"
-        planned.append((name, replace(lens, rotation=rotation, translation=translation)))
-    return planned
+def measure_ring(ring: Float[Array, "n 2"]) -> float:
+    """The area inside a closed line, positive if it runs counterclockwise."""
+    x, y = (ring - ring[0]).T
+    return 0.5 * float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum())
+
+
+def plan_photos(gaps: Gaps, frame: SceneFrame, lens: Camera) -> list[Camera]:
+    """Photos straight down that fill the gaps: NEED more of every cell, from the usual flying height above the highest
+    ground below. lens: whose view they have.
+
+    They are chosen greedily among the knots of a grid whose neighbours overlap by OVERLAP.
+    """
+    surface, height = gaps.surface, frame.flying_height
+    missed = np.flatnonzero(gaps.fault >= 0)
+    if not len(missed):
+        return []
+    size = height * np.array([lens.width / lens.fx, lens.height / lens.fy])
+    step, at = (1 - OVERLAP) * size, surface.centres[missed, :2]
+    low, high = np.floor((at.min(0) - size / 2) / step), np.ceil((at.max(0) + size / 2) / step)
+    knots = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True))), -1).reshape(-1, 2)
+    window = np.maximum(1, np.round(size[::-1] / surface.cell).astype(int))
+    highest = replace(surface, heights=ndimage.maximum_filter(surface.heights, tuple(window)))
+    grounds, cameras, sees = highest.find_heights(knots * step), [], np.zeros((len(knots), len(missed)), bool)
+    for knot, ground, row in zip(knots * step, grounds, sees, strict=True):
+        rotation, translation = look_at([*knot, ground + height], [*knot, ground])
+        cameras.append(replace(lens, rotation=rotation, translation=translation))
+        near = np.flatnonzero((np.abs(at - knot) < size).all(1))
+        seen = find_seen_cells(cameras[-1], surface, REACH * height) if len(near) else []
+        row[near] = np.isin(missed[near], seen)
+    chosen, left = [], np.full(len(missed), NEED)
+    while True:
+        gain = np.where(np.isin(np.arange(len(knots)), chosen), 0, np.count_nonzero(sees & (left > 0), axis=1))
+        if not gain.any():
+            return [cameras[i] for i in sorted(chosen)]
+        chosen.append(int(gain.argmax()))
+        left = left - sees[chosen[-1]]
 
 
 def describe_gaps(gaps: Gaps, frame: SceneFrame) -> dict[str, Any]:
     """The gaps as GeoJSON, in longitude and latitude where the photos have GPS, else in the world's units."""
-    place = frame.georeference
 
-    def locate(outline: Float[Array, "n 2"]) -> list[list[float]]:
-        if place is None:
-            return outline.tolist()
-        earth = place.to_earth(np.c_[outline, np.zeros(len(outline))])
+    def locate(ring: Float[Array, "n 2"]) -> list[list[float]]:
+        if frame.georeference is None:
+            return np.round(ring, 6).tolist()
+        earth = frame.georeference.to_earth(np.c_[ring, gaps.surface.find_heights(ring)])
         return np.round(earth[:, [1, 0]], 8).tolist()
 
     unit = "m2" if frame.unit == "metre" else "square flying heights"
     features = [
         {
             "type": "Feature",
-            "properties": {"reason": REASONS[gap.reason], "area": round(gap.area, 4), "unit": unit},
-            "geometry": {"type": "Polygon", "coordinates": [locate(gap.outline)]},
+            "properties": {
+                "number": number,
+                "reason": gap.reason,
+                "area": round(gap.area, 4),
+                "areas": {reason: round(area, 4) for reason, area in gap.areas.items()},
+                "unit": unit,
+            },
+            "geometry": {"type": "Polygon", "coordinates": [locate(ring) for ring in gap.rings]},
         }
-        for gap in gaps.gaps
+        for number, gap in enumerate(gaps.gaps, 1)
     ]
     return {"type": "FeatureCollection", "features": features}
 
 
-def draw_gaps(gaps: Gaps, model: ColmapModel, frame: SceneFrame) -> Figure:
-    """The map: ground by what is wrong with it, and where the photos were taken."""
+def describe_ground(found: Gaps, frame: SceneFrame) -> list[str]:
+    """What ground is missing, in words: a line in all, and one for each of the largest gaps."""
+    whole = f"{format_area(found.area, frame)} of ground"
+    if not found.gaps:
+        return [f"Nothing is missing: {whole} is seen by three photos or more, from several sides and closely enough."]
+    missing = sum(gap.area for gap in found.gaps)
+    lines = [f"{format_area(missing, frame)} of {whole} is missing ({100 * missing / found.area:.1f} %):"]
+    for number, gap in enumerate(found.gaps[:LISTED], 1):
+        parts = sorted(gap.areas.items(), key=lambda part: -part[1])
+        words = ", ".join(f"{format_area(area, frame)} {reason}" for reason, area in parts)
+        lines.append(f"  {number}. {words}{_format_place(gap.middle, frame)}")
+    if (more := len(found.gaps) - LISTED) > 0:
+        lines.append(f"  and {more} smaller {'one' if more == 1 else 'ones'}")
+    return lines
+
+
+def format_area(area: float, frame: SceneFrame) -> str:
+    """An area of square world units in words: hectares from one on."""
+    if frame.unit != "metre":
+        return f"{area:.2f} square flying heights"
+    return f"{area / 1e4:.2f} ha" if area >= 1e4 else f"{area:.0f} m²" if area >= 10 else f"{area:.1f} m²"
+
+
+def _format_place(at: Float[Array, "3"], frame: SceneFrame) -> str:
+    if frame.georeference is None:
+        return f", at {at[0]:.2f}, {at[1]:.2f} of the map"
+    latitude, longitude, _ = frame.georeference.to_earth(at[None])[0]
+    return f", at {latitude:.6f}, {longitude:.6f}"
+
+
+def draw_gaps(gaps: Gaps, model: ColmapModel, frame: SceneFrame, unused: Collection[str] = ()):
+    """The map: ground by what is wrong with it, and where the photos were taken. unused: photos that do not count."""
     from matplotlib.colors import BoundaryNorm, ListedColormap  # not above: it loads for a second
 
-    surface = gaps.surface
+    surface, unit = gaps.surface, "m" if frame.unit == "metre" else "flying heights"
     rows, columns = surface.heights.shape
-    figure = Figure(figsize=(8, 8 * max(0.3, rows / columns) + 1.2), layout="constrained")
+    figure = figures.make_figure(8.0, float(np.clip(7 * rows / columns, 3, 10)) + 1.2)
     axes = figure.subplots()
     east, north = surface.west + columns * surface.cell, surface.south + rows * surface.cell
-    colours = ListedColormap(["#ffffff", GOOD, *COLOURS])
+    colours = ListedColormap([BACK, GOOD, *COLOURS])
     axes.imshow(
         gaps.fault,
         cmap=colours,
-        norm=BoundaryNorm(np.arange(-2.5, len(COLOURS) + 0.5), colours.N),
+        norm=BoundaryNorm(np.arange(BEYOND - 0.5, len(COLOURS) + 0.5), colours.N),
         origin="lower",
         extent=(surface.west, east, surface.south, north),
         interpolation="nearest",
     )
-    places = np.array([camera.centre for camera in model.cameras])
-    axes.plot(places[:, 0], places[:, 1], "k.", ms=4)
-    marks = [axes.plot([], [], "s", color=c, ms=9)[0] for c in (GOOD, *COLOURS)] + [axes.plot([], [], "k.")[0]]
-    axes.legend(marks, ["seen well", *REASONS, "photos"], loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=2)
-    unit = "metres" if frame.unit == "metre" else "flying heights"
-    axes.set(xlabel=f"east, {unit}" if frame.georeference else unit, ylabel=f"north, {unit}")
-    axes.set_aspect("equal")
+    here = gaps.fault != BEYOND
+    x, y = surface.centres[:columns, 0], surface.centres[::columns, 1]
+    axes.contour(x, y, np.where(here, surface.heights, np.nan), 8, colors="k", alpha=0.2, linewidths=0.5)
+    places = np.array([camera.centre[:2] for camera in model.cameras])
+    shown = np.concatenate([places, np.stack([x[here.nonzero()[1]], y[here.nonzero()[0]]], 1)])
+    margin = 0.1 * frame.flying_height
+    axes.set_xlim(shown[:, 0].min() - margin, shown[:, 0].max() + margin)
+    axes.set_ylim(shown[:, 1].min() - margin, shown[:, 1].max() + margin)
+    marks = [axes.plot([], [], "s", color=colour, ms=9)[0] for colour in (GOOD, *COLOURS)]
+    names = ["seen well", *REASONS]
+    for name, mark, out in (("photos", "k.", False), ("photos that do not count", "kx", True)):
+        chosen = places[[(photo in unused) == out for photo in model.names]]
+        if len(chosen):
+            marks += axes.plot(*chosen.T, mark, ms=4)
+            names.append(name)
+    for number, gap in enumerate(gaps.gaps[:LABELLED], 1):
+        outline = {"boxstyle": "circle,pad=0.25", "fc": "w", "ec": "k", "lw": 0.8}
+        axes.text(*gap.middle[:2], str(number), ha="center", va="center", fontsize=8, bbox=outline)
+    figure.legend(marks, names, loc="outside lower center", ncols=4, fontsize=8, frameon=False)
+    if frame.georeference:
+        draw_north(axes, frame.georeference)
+    axes.set(xlabel=f"x, {unit}", ylabel=f"y, {unit}", aspect="equal")
     return figure
+
+
+def draw_north(axes, place: Georeference) -> None:
+    """An arrow to the north in the corner of a map."""
+    turn = np.radians(place.north)
+    tip = np.array([0.93, 0.93]) + 0.07 * np.array([-np.sin(turn), np.cos(turn)])
+    arrow = {"arrowstyle": "<-"}
+    axes.annotate("N", (0.93, 0.93), tuple(tip), "axes fraction", "axes fraction", arrow, ha="center", va="center")

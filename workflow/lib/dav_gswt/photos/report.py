@@ -21,7 +21,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import figures, image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos import view_split
+from dav_gswt.photos import gaps, view_split
 from dav_gswt.photos.colmap_model import (
     ColmapModel,
     count_shared_points,
@@ -30,6 +30,7 @@ from dav_gswt.photos.colmap_model import (
     transform_model,
 )
 from dav_gswt.photos.ground_frame import Coverage, count_coverage
+from dav_gswt.photos.sharpness import find_blurred
 from dav_gswt.photos.view_split import find_aim_point
 from dav_gswt.templates import render_template
 
@@ -69,11 +70,16 @@ def write_report(folder: Path | str, template: Path | str, scene: str, out: Path
     found = collect_facts(folder)
     frame, names = found.frame, sorted(found.model.names, key=lambda name: name in found.tests)
     pictures = {name: make_thumbnail(Path(folder) / "images" / name) for name in progress(names, "shrink photos")}
+    missed, blurred = find_missed_ground(found, Path(folder) / "images")
     values = {
         "scene": scene,
         "summary": _summarize(found),
         "advice": list_advice(found),
         "map": draw_map(found),
+        "gaps": gaps.describe_ground(missed, frame) if missed else None,
+        "gaps_map": encode_figure(gaps.draw_gaps(missed, found.model, frame, blurred)) if missed else None,
+        "blurred": blurred,
+        "horizon": missed.horizon if missed else (),
         "facts": _list_facts(found),
         "verdict": frame.verdict,
         "left_out": frame.left_out,
@@ -99,6 +105,14 @@ def collect_facts(folder: Path | str) -> ReportFacts:
     off = reprojection_errors(model)
     error = float(off.mean()) if frame.reprojection_error is None and len(off) else frame.reprojection_error
     return ReportFacts(frame, model, tests, find_weaknesses(model, off, tests), need, cover, error)
+
+
+def find_missed_ground(found: ReportFacts, images: Path) -> tuple[gaps.Gaps | None, list[str]]:
+    """The ground that all placed photos miss, None where no points are known; and the names of blurred photos."""
+    names = found.model.names
+    blurred = find_blurred([images / name for name in names], threads=1)
+    blurred = [name for name, is_blurred in zip(names, blurred.tolist(), strict=True) if is_blurred]
+    return gaps.find_gaps(found.model, found.frame, blurred) if len(found.model.points) else None, blurred
 
 
 def find_weaknesses(model: ColmapModel, off: Float[Array, "m"], tests: frozenset[str]) -> dict[str, list[str]]:
@@ -207,13 +221,15 @@ def draw_map(found: ReportFacts) -> str:
         if name in found.weak:
             axes.annotate(name, tuple(camera.centre[:2]), (4, 4), textcoords="offset points", fontsize=7, color=MARK)
     if frame.georeference:
-        turn = np.radians(frame.georeference.north)
-        tip = np.array([0.93, 0.93]) + 0.07 * np.array([-np.sin(turn), np.cos(turn)])
-        arrow = {"arrowstyle": "<-"}
-        axes.annotate("N", (0.93, 0.93), tuple(tip), "axes fraction", "axes fraction", arrow, ha="center", va="center")
+        gaps.draw_north(axes, frame.georeference)
     unit = "m" if frame.unit == "metre" else "flying heights"
     axes.set(xlabel=f"x, {unit}", ylabel=f"y, {unit}", aspect="equal")
     axes.autoscale()
+    return encode_figure(figure)
+
+
+def encode_figure(figure) -> str:
+    """A figure as a PNG in a data URI."""
     file = io.BytesIO()
     figure.savefig(file, format="png", metadata={"Software": None})
     return _encode_uri(file.getvalue(), "png")

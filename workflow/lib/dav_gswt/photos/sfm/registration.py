@@ -223,7 +223,7 @@ def _write_shrunk_photos(
 
     def write(photo: SfmPhoto) -> str | None:
         try:
-            image = image_files.shrink_image(image_files.read_photo(photo.path), photo.width, photo.height)
+            image = image_files.read_shrunk_photo(photo.path, max(photo.width, photo.height))
         except InputError as error:
             return str(error)
         grey = image @ np.array([0.299, 0.587, 0.114], np.float32)

@@ -1,0 +1,157 @@
+"""Which ground photos miss: holes, hidden ground, one side, coarse photos, and what a second flight mends."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import photos as synth
+from fixtures.frames import scene_frame
+
+from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.images.figures import save_figure
+from dav_gswt.images.image_files import read_photo
+from dav_gswt.photos import gaps
+from dav_gswt.photos.gaps import REASONS, Surface, find_gaps, find_seen_cells, measure_cells, measure_ring
+
+NO_PHOTO, FEW, ONE_SIDE, TOO_COARSE = REASONS
+PLACE = Georeference(52.0, 13.0, 40.0, north=30.0, metres_per_unit=1.0)
+FRAME = scene_frame(kind="photos", unit="metre", flying_height=1.0, georeference=PLACE)
+STEP, SIDE = 0.25, 9
+
+
+def fly(keep=lambda x, y: True, height=lambda x, y: 1.0, side=SIDE):
+    """Photos straight down on a grid; a photo shows 1.067 x 0.8 of the plane per unit of height."""
+    at = [(STEP * (j - side // 2), STEP * (i - side // 2)) for i in range(side) for j in range(side)]
+    return [synth.camera((x, y, height(x, y))) for x, y in at if keep(x, y)]
+
+
+def model_of(cameras, relief=0.0):
+    return synth.model(cameras, synth.plain(1500, 1.6, np.random.default_rng(0), relief))
+
+
+def flat(cell=0.02, half=1.0):
+    count = round(2 * half / cell)
+    return Surface(-half, -half, cell, np.zeros((count, count)))
+
+
+def test_a_whole_flight_misses_nothing_though_its_margin_is_seen_from_one_side():
+    found = find_gaps(model_of(fly(), relief=0.01), FRAME)
+    assert found.gaps == () and found.horizon == ()
+    assert found.area > (STEP * (SIDE - 1)) ** 2
+    assert found.pixel == pytest.approx(1 / synth.FOCAL, rel=0.05)
+
+
+def test_a_hole_in_the_flight_is_one_gap_of_the_size_that_geometry_says():
+    """Photos nearer than .75 to the middle are left out: x within .75 - .533 and y within .75 - .4 is unseen."""
+    (gap,) = find_gaps(model_of(fly(lambda x, y: max(abs(x), abs(y)) > 0.6)), FRAME).gaps
+    assert gap.areas[NO_PHOTO] == pytest.approx(2 * 0.217 * 2 * 0.35, abs=0.03)  # a cell more or less at the border
+    assert set(gap.areas) == {NO_PHOTO, ONE_SIDE}, "a column of photos shows three of each cell at its border"
+    assert np.abs(gap.middle[:2]).max() < 0.1
+
+
+def test_a_bay_at_the_border_of_a_flight_is_a_gap_too():
+    (gap,) = find_gaps(model_of(fly(lambda x, y: abs(x) > 0.6 or y < -0.1)), FRAME).gaps
+    assert NO_PHOTO in gap.areas and gap.middle[1] > 0
+
+
+def test_the_far_side_of_a_wall_is_hidden_as_far_as_the_line_of_sight_says():
+    """A trench .3 deep between x = 0 and .2. From x = -.5, z = 1 its floor is hidden up to x = .15."""
+    surface = flat()
+    x = surface.centres[:, 0].reshape(surface.heights.shape)
+    trench = (x > 0) & (x < 0.2)
+    surface = replace(surface, heights=np.where(trench, -0.3, 0.0))
+    seen = np.zeros(trench.size, bool)
+    seen[find_seen_cells(synth.camera((-0.5, 0, 1), (0, 0.001, 0)), surface, 4.0)] = True
+    middle = np.abs(surface.centres[:, 1]) < 0.01
+    floor = middle & trench.ravel()
+    assert np.array_equal(seen[floor], x.ravel()[floor] > 0.15 + surface.cell / 2)  # and half a cell of tolerance
+    level = middle & ~trench.ravel() & (np.abs(x.ravel()) < 0.4)
+    assert seen[level & (x.ravel() < 0)].all() and seen[level & (x.ravel() > 0.25)].all()
+    above = synth.camera((0.1, 0, 1), (0.1, 0.001, 0))
+    assert set(np.flatnonzero(floor)) <= set(find_seen_cells(above, surface, 4.0).tolist())
+
+
+def test_rough_heights_hide_nothing_in_a_photo_from_above():
+    rough = replace(flat(), heights=np.random.default_rng(0).normal(0, 0.002, (100, 100)))
+    down = synth.camera((0, 0, 1), (0, 0.001, 0))
+    assert len(find_seen_cells(down, rough, 4.0)) == len(find_seen_cells(down, flat(), 4.0))
+
+
+def test_views_of_one_side_are_told_from_those_of_two():
+    surface = flat(0.1)
+    middle = surface.centres[:, :2].reshape(20, 20, 2)[10, 10]
+
+    def one_sided(*eyes):
+        cameras = [synth.camera((*(middle + eye[:2]), eye[2]), (*middle, 0)) for eye in eyes]
+        return measure_cells(cameras, surface, 4.0).one_sided[10, 10]
+
+    assert one_sided((0.6, 0, 0.8), (0.5, 0.3, 0.8), (0.5, -0.3, 0.8)), "all from the east"
+    assert not one_sided((0.6, 0, 0.8), (0.5, 0.3, 0.8), (-0.5, -0.3, 0.8))
+    assert not one_sided((0.1, 0.001, 1), (0.5, 0.3, 0.8)), "one from above"
+    assert one_sided((0.02, 0.001, 1), (0.01, 0.03, 1), (0, 0.02, 1)), "all from one spot above"
+
+
+def test_the_angle_between_views_does_not_depend_on_their_azimuth():
+    surface = flat(0.1)
+    for turn in np.radians(np.arange(0, 180, 7)):
+        eye = 0.2 * np.array([np.cos(turn), np.sin(turn)])
+        cameras = [synth.camera((*(sign * eye), 1), (0.05, 0.05, 0)) for sign in (1, -1)]
+        angle = measure_cells(cameras, surface, 4.0).angles[10, 10]
+        exact = sum(np.degrees(np.arctan(0.2 + sign * 0.05 * (np.cos(turn) + np.sin(turn)))) for sign in (1, -1))
+        assert exact * 0.97 <= angle <= exact * 1.01  # cos(180 / SIDES) = .98
+
+
+def test_ground_that_was_flown_over_too_high_is_seen_too_coarsely():
+    found = find_gaps(model_of(fly(height=lambda x, y: 2.6 if x > 0.3 else 1.0)), FRAME)
+    assert {gap.reason for gap in found.gaps} == {TOO_COARSE}
+    assert found.gaps[0].middle[0] > 0.5  # photos from x = .25 show ground up to .78 finely
+
+
+def test_blurred_photos_and_those_of_the_horizon_do_not_count():
+    sparse = model_of(fly())
+    near = [name for name, c in zip(sparse.names, sparse.cameras, strict=True) if np.abs(c.centre[:2]).max() < 0.6]
+    assert find_gaps(sparse, FRAME).gaps == ()
+    assert NO_PHOTO in find_gaps(sparse, FRAME, near).gaps[0].areas
+    level = synth.camera((0, 0, 1), (10, 0, 0.5))
+    found = find_gaps(model_of([*fly(), level]), FRAME)
+    assert found.horizon == (f"{SIDE**2:03d}.png",) and found.gaps == ()
+
+
+@pytest.mark.parametrize("hole, height", [(0.6, lambda x: 1.0), (0.0, lambda x: 2.6 if x > 0.3 else 1.0)])
+def test_few_planned_photos_fill_every_gap(hole, height):
+    cameras = fly(lambda x, y: max(abs(x), abs(y)) >= hole, lambda x, y: height(x))
+    found = find_gaps(model_of(cameras), FRAME)
+    planned = gaps.plan_photos(found, FRAME, cameras[0])
+    assert found.gaps and 3 <= len(planned) <= 16
+    assert all(camera.centre[2] == pytest.approx(1.0, abs=0.05) for camera in planned)
+    again = find_gaps(model_of([*cameras, *planned]), FRAME)
+    assert again.gaps == ()
+    assert gaps.plan_photos(again, FRAME, cameras[0]) == []
+
+
+def test_outlines_are_counterclockwise_closed_and_lie_on_earth():
+    fault = np.full((40, 40), gaps.WELL)
+    fault[10:20, 5:25] = 0
+    fault[12:18, 10:15] = gaps.WELL  # an island that is seen well
+    surface = Surface(-1.0, -2.0, 0.1, np.full((40, 40), 3.0))
+    (gap,) = gaps.list_gaps(fault, surface)
+    found = gaps.Gaps(surface, fault, (gap,), 16.0, 0.01, ())
+    (feature,) = gaps.describe_gaps(found, FRAME)["features"]
+    outer, inner = (np.array(ring) for ring in feature["geometry"]["coordinates"])
+    assert (outer[0] == outer[-1]).all() and measure_ring(outer) > 0 > measure_ring(inner)
+    world = PLACE.to_world(np.c_[outer[:, ::-1], np.full(len(outer), 43.0)])
+    assert np.allclose([world[:, :2].min(0), world[:, :2].max(0)], [[-0.5, -1.0], [1.5, 0.0]], atol=0.01)
+    assert feature["properties"]["area"] == pytest.approx((200 - 30) * 0.01)
+    assert feature["properties"]["reason"] == NO_PHOTO
+    bare = gaps.describe_gaps(found, scene_frame(unit="flying height"))["features"][0]
+    assert np.allclose(np.min(bare["geometry"]["coordinates"][0], 0), [-0.5, -1.0])
+
+
+def test_the_map_shows_each_fault_in_its_colour(tmp_path):
+    sparse = model_of(fly(lambda x, y: max(abs(x), abs(y)) > 0.6))
+    found = find_gaps(sparse, FRAME)
+    figure = gaps.draw_gaps(found, sparse, FRAME, ["000.png"])
+    save_figure(figure, tmp_path / "gaps.png")
+    pixels = np.rint(255 * read_photo(tmp_path / "gaps.png")).reshape(-1, 3)
+    for colour in (gaps.GOOD, gaps.COLOURS[0], gaps.COLOURS[1]):
+        assert (pixels == [int(colour[i : i + 2], 16) for i in (1, 3, 5)]).all(1).sum() > 200
