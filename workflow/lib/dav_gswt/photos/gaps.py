@@ -356,7 +356,11 @@ def draw_gaps(gaps: Gaps, model: ColmapModel, frame: SceneFrame, unused: Collect
 
     surface, unit = gaps.surface, "m" if frame.unit == "metre" else "flying heights"
     rows, columns = surface.heights.shape
-    figure = figures.make_figure(8.0, float(np.clip(7 * rows / columns, 3, 10)) + 1.2)
+    here, x, y = gaps.fault != BEYOND, surface.centres[:columns, 0], surface.centres[::columns, 1]
+    places = np.array([camera.centre[:2] for camera in model.cameras])
+    shown = np.concatenate([places, np.stack([x[here.nonzero()[1]], y[here.nonzero()[0]]], 1)])
+    low, high = shown.min(0) - 0.1 * frame.flying_height, shown.max(0) + 0.1 * frame.flying_height
+    figure = figures.make_figure(8.0, float(np.clip(7 * (high - low)[1] / (high - low)[0], 3, 10)) + 1.2)
     axes = figure.subplots()
     east, north = surface.west + columns * surface.cell, surface.south + rows * surface.cell
     colours = ListedColormap([BACK, GOOD, *COLOURS])
@@ -368,28 +372,22 @@ def draw_gaps(gaps: Gaps, model: ColmapModel, frame: SceneFrame, unused: Collect
         extent=(surface.west, east, surface.south, north),
         interpolation="nearest",
     )
-    here = gaps.fault != BEYOND
-    x, y = surface.centres[:columns, 0], surface.centres[::columns, 1]
     axes.contour(x, y, np.where(here, surface.heights, np.nan), 8, colors="k", alpha=0.2, linewidths=0.5)
-    places = np.array([camera.centre[:2] for camera in model.cameras])
-    shown = np.concatenate([places, np.stack([x[here.nonzero()[1]], y[here.nonzero()[0]]], 1)])
-    margin = 0.1 * frame.flying_height
-    axes.set_xlim(shown[:, 0].min() - margin, shown[:, 0].max() + margin)
-    axes.set_ylim(shown[:, 1].min() - margin, shown[:, 1].max() + margin)
     marks = [axes.plot([], [], "s", color=colour, ms=9)[0] for colour in (GOOD, *COLOURS)]
     names = ["seen well", *REASONS]
     for name, mark, out in (("photos", "k.", False), ("photos that do not count", "kx", True)):
         chosen = places[[(photo in unused) == out for photo in model.names]]
         if len(chosen):
-            marks += axes.plot(*chosen.T, mark, ms=4)
+            marks += axes.plot(chosen[:, 0], chosen[:, 1], mark, ms=4)
             names.append(name)
     for number, gap in enumerate(gaps.gaps[:LABELLED], 1):
         outline = {"boxstyle": "circle,pad=0.25", "fc": "w", "ec": "k", "lw": 0.8}
-        axes.text(*gap.middle[:2], str(number), ha="center", va="center", fontsize=8, bbox=outline)
+        axes.text(gap.middle[0], gap.middle[1], str(number), ha="center", va="center", fontsize=8, bbox=outline)
     figure.legend(marks, names, loc="outside lower center", ncols=4, fontsize=8, frameon=False)
     if frame.georeference:
         draw_north(axes, frame.georeference)
     axes.set(xlabel=f"x, {unit}", ylabel=f"y, {unit}", aspect="equal")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     return figure
 
 

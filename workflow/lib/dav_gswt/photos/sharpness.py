@@ -13,6 +13,7 @@ from dav_gswt.logs import progress
 from dav_gswt.threads import map_ahead
 
 SIDE = 2000  # pixels along the longer side at which photos are compared
+FAR = 8  # pixels
 BLUR = 0.6  # a picture with less than this share of the usual fine detail is blurred
 USUAL = 80  # percentile of all pictures that is usual
 GREY = np.array([0.299, 0.587, 0.114], np.float32)  # Rec. 601
@@ -26,13 +27,13 @@ def find_blurred(paths: Sequence[Path], threads: int) -> Bool[Array, "n"]:
 
 
 def measure_detail(grey: Float32[Array, "h w"]) -> float:
-    """The least share, over four directions, of the contrast between neighbouring pixels in that of pixels four apart.
+    """The least share, over four directions, of the contrast between neighbouring pixels in that of pixels FAR apart.
 
     Motion blurs along one direction, and a lens out of focus along all; the ratio hardly depends on what is shown.
     """
     shares = []
     for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
-        near, far = (_contrast(grey, dy * step, dx * step) for step in (1, 4))
+        near, far = (_contrast(grey, dy * step, dx * step) for step in (1, FAR))
         shares.append(near / far if far > 0 else 0.0)
     return min(shares)
 
