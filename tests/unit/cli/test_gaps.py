@@ -87,7 +87,7 @@ def test_what_cannot_be_used_ends_with_1_and_a_wrong_call_with_2(tmp_path, capsy
     assert stopped.value.code == 2
 
 
-@pytest.mark.slow  # a minute: structure from motion twice
+@pytest.mark.slow  # minutes: structure from motion twice
 @pytest.mark.parametrize("hole", [False, True])
 def test_photos_on_disk_are_placed_and_a_missing_part_of_the_flight_is_found(hole, tmp_path, capsys):
     at = [(0.3 * (i - 3), 0.22 * (j - 3)) for i in range(7) for j in range(7)]
