@@ -15,7 +15,7 @@ import numpy as np
 
 from dav_gswt.capture.drone import plan_flight
 from dav_gswt.errors import InputError
-from dav_gswt.files import locate_path, write_json
+from dav_gswt.files import write_json
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import figures
 from dav_gswt.logs import PROGRESS
@@ -23,6 +23,7 @@ from dav_gswt.photos.colmap_model import ColmapModel
 from dav_gswt.photos.gaps import Gaps, describe_gaps, describe_ground, draw_gaps, find_gaps, plan_photos
 from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model
+from dav_gswt.photos.photo_listing import locate_source
 from dav_gswt.photos.recognition import recognize_input
 from dav_gswt.photos.sfm.registration import SfmOptions, register_photos
 from dav_gswt.photos.sharpness import find_blurred
@@ -35,7 +36,7 @@ SAFE = 0.25  # flying heights: error of a mission's altitudes above which none i
 
 @dataclass(frozen=True)
 class PlacedPhotos:
-    """Photos in their ground frame. model: images are named as the photos' files. blurred: of all photos."""
+    """Photos in their ground frame. model: images are named as the photos' files. blurred: names of placed photos."""
 
     model: ColmapModel
     frame: SceneFrame
@@ -59,14 +60,14 @@ def _run(options: argparse.Namespace) -> int:
     logging.basicConfig(level=logging.WARNING, format="  %(message)s")
     logging.getLogger(PROGRESS).setLevel(logging.INFO)
     recognised = recognize_input(options.input, options.model)
-    if "folder" not in recognised.entry:
+    if "folder" not in recognised.entry or recognised.about == "a video":
         raise InputError(f"{options.input[0]}: {recognised.about}; gaps are found from photos, so name their folder")
     out = options.out or Path(f"{recognised.name}-gaps")
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; name a folder with -o FOLDER")
     print(f"{', '.join(map(str, options.input))}: {recognised.about}", flush=True)
     sfm = SfmOptions(focal=options.focal, size=SIDE, features=FEATURES, threads=options.cores)
-    placed = place_photos(recognised.entry["folder"], sfm, recognised.entry.get("model"))
+    placed = place_photos(locate_source(recognised.entry["folder"]), sfm, recognised.entry.get("model"))
     found = find_gaps(placed.model, placed.frame, placed.blurred)
     ground = "\n".join(describe_ground(found, placed.frame))
     print(f"\n{describe_photos(placed, found)}\n\n{ground}\n")
@@ -75,21 +76,17 @@ def _run(options: argparse.Namespace) -> int:
     return 1 if found.gaps else 0
 
 
-def place_photos(folder: Path | str, options: SfmOptions, given: Path | str | None) -> PlacedPhotos:
+def place_photos(source: list[Path], options: SfmOptions, given: Path | str | None) -> PlacedPhotos:
     """Register photos, and find those that are blurred. given: a camera model of another program.
 
     Raises: InputError: see `register_photos`, `import_model` and `fit_ground_frame`.
     """
-    folder = locate_path(folder)
-    found = import_model(given, folder, options) if given else register_photos(folder, options)
+    found = import_model(given, source, options) if given else register_photos(source, options)
     about = found.positions.about if found.positions else None
     model, frame = fit_ground_frame(found.model, np.random.default_rng(options.seed), about)
-    model = replace(model, names=tuple(path.name for path in found.sources))
-    others = [path for name, _ in found.left_out if (path := folder / name).is_file()]
-    paths = [*found.sources, *others]
-    names = np.array([path.name for path in paths])
-    blurred = tuple(sorted(names[find_blurred(paths, options.threads)].tolist()))
-    return PlacedPhotos(model, frame, found.left_out, blurred)
+    names = tuple(path.name for path in found.sources)
+    blurred = np.array(names)[find_blurred(found.sources, options.threads)]
+    return PlacedPhotos(replace(model, names=names), frame, found.left_out, tuple(sorted(blurred.tolist())))
 
 
 def write_gaps(out: Path, placed: PlacedPhotos, found: Gaps) -> list[str]:
