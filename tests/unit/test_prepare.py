@@ -72,7 +72,7 @@ def test_make_run_leaves_the_core_out_until_there_is_a_compiler_and_then_builds_
         (tmp_path / part).mkdir(parents=True)
     for tool in ("sh", "grep", "touch", "rm", "echo", "test"):
         (tmp_path / "programs" / tool).symlink_to(shutil.which(tool))
-    for name in ("Makefile", "pyproject.toml", "requirements.lock", "requirements-weights.lock", "workflow/prepare.py"):
+    for name in ("Makefile", "pyproject.toml", "requirements.lock", "workflow/prepare.py"):
         shutil.copy(root / name, tmp_path / name)
     for name in ("pip", "python"):
         script(tmp_path / ".venv/bin" / name, f'echo "{name} $@" >> "{tmp_path}/asked"')

