@@ -1,5 +1,6 @@
-# Each target sets the environment up if it is missing. `make run SCENE=name CORES=4` for another scene or machine.
+# Each target sets the environment up if it is missing. `make help` lists them.
 SCENE ?=
+PHOTOS ?=
 CORES ?= 2
 PORT ?= 8000
 WORKERS ?= 2
@@ -11,18 +12,35 @@ PYTHON ?= python3
 export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
-.PHONY: setup reference run view test test-all lint lint-code lint-types lint-viewer lint-docs mutants \
+.PHONY: help setup reference run view test test-all lint lint-code lint-types lint-viewer lint-docs mutants \
   bench docs compiler sanitize fuzz
 .DELETE_ON_ERROR:
+
+ifneq ($(filter run view,$(MAKECMDGOALS)),)
+  WORDS := $(filter-out run view,$(MAKECMDGOALS))
+  ifneq ($(WORDS),)
+    $(error For photos of your own type: make run PHOTOS=$(firstword $(WORDS)))
+  endif
+endif
+
+help:
+	@echo "make run                  a terrain of a small synthetic desert; SCENE=name for another scene of config/scenes"
+	@echo "make run PHOTOS=folder    a terrain of your photos, a video or a splat, in folder-terrain"
+	@echo "make view                 walk over it in a browser; SCENE and PHOTOS as above, PORT=8000"
+	@echo "make setup                the environment alone (.venv); CORES=2 limits the processors of a run"
+	@echo "make test, test-all       what people use; also slow tests"
+	@echo "make lint, docs, bench    style and types; the documentation as a site; benchmarks"
 
 # .venv alone
 setup: .venv/installed
 
 run: .venv/installed
-	@$(BIN)/python -m dav_gswt.cli.run --cores $(CORES) $(if $(SCENE),--scene $(SCENE))
+	@$(if $(PHOTOS),$(BIN)/dav-gswt make --cores $(CORES) "$(PHOTOS)",\
+	  $(BIN)/python -m dav_gswt.cli.run --cores $(CORES) $(if $(SCENE),--scene $(SCENE)))
 
 view: .venv/installed
-	@$(BIN)/python -m dav_gswt.cli.run --view --port $(PORT) $(if $(SCENE),--scene $(SCENE))
+	@$(if $(PHOTOS),$(BIN)/dav-gswt view --port $(PORT) "$(PHOTOS)",\
+	  $(BIN)/python -m dav_gswt.cli.run --view --port $(PORT) $(if $(SCENE),--scene $(SCENE)))
 
 # A worker takes a whole module, since its tests share what they look at.
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadscope --no-loadscope-reorder --durations 20 $(PYTEST_OPTIONS)

@@ -82,7 +82,7 @@ def test_a_finished_field_goes_from_field_to_terrain(planned, tmp_path):
 
 
 def test_the_frames_of_a_video_are_chosen_before_they_are_registered(planned, tmp_path):
-    (tmp_path / "walk.mp4").touch()
+    (tmp_path / "walk.mp4").write_bytes(b"\0\0\0\x18ftypisom" + bytes(40))
     entry = "{kind: photos, folder: walk.mp4, size: 256, start: 2, agent: replay, preset: draft, tiling: small}"
     (tmp_path / "video.yaml").write_text(f"scene: walk\nscenes: {{walk: {entry}}}\n")
     plan = planned(tmp_path, configs=(USUAL, TINY, tmp_path / "video.yaml"))

@@ -13,7 +13,7 @@ from dav_gswt.views.policies import POLICY_NAME, PRIOR_POLICIES, ZERO_SETTINGS, 
 
 RESULTS = "results"
 # Directories beside the scenes' own; no scene may have such a name.
-RESERVED = ("logs", "benchmarks", "snapshots", "weights", "sweeps", "tables", "gallery")
+RESERVED = ("logs", "benchmarks", "snapshots", "weights", "sweeps", "tables", "gallery", "latest")
 SNAPSHOTS = f"{RESULTS}/snapshots"  # photos on disk while a large set is fitted: outside the outputs
 
 # One directory level a stage, which names only the settings that the stage adds. <name> stands for another entry.

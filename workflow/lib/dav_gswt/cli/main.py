@@ -27,15 +27,14 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def find_page(folder: Path | None) -> Path:
-    """The folder of a page: the folder itself, the page in it, or without a folder the newest one here.
+    """The folder of a page: the folder itself, the page in it or of what was made of it; else the newest one here.
 
     Raises: InputError: there is none.
     """
     if folder is not None:
-        return folder / "page" if (folder / "page/index.html").is_file() else folder
-    found = [path.parent for path in Path().glob("*/page/index.html")] + [
-        path.parent for path in Path().glob("page/index.html")
-    ]
+        places = [folder / "page", make.name_terrain(folder) / "page"]
+        return next((place for place in places if (place / "index.html").is_file()), folder)
+    found = [path.parent for pattern in ("page", "*/page") for path in Path().glob(f"{pattern}/index.html")]
     if not found:
         raise InputError("there is no terrain here: `dav-gswt make PHOTOS` makes one, `dav-gswt view FOLDER` opens it")
     return max(found, key=lambda path: (path / "index.html").stat().st_mtime)

@@ -6,7 +6,9 @@ be edited and run again, and `results`, the files of all stages.
 
 import argparse
 import os
+import shlex
 import shutil
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +22,7 @@ from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.errors import InputError
 from dav_gswt.files import REPOSITORY, atomic_file
 from dav_gswt.paths import encode_branch, stage_folder
-from dav_gswt.photos.recognition import Recognised, recognize_input
+from dav_gswt.photos.recognition import Recognised, name_scene, recognize_input
 
 SCENE_FILE, STILL = "scene.yaml", "walker.png"
 AGENTS = {"drone": "plan", "handheld": "handheld", "rig": "serial"}  # --capture, and the scene's agent
@@ -77,7 +79,7 @@ def prepare_scene(options: argparse.Namespace) -> tuple[Path, dict[str, Any]]:
         recognised = None
     else:
         recognised = recognize_input(options.input, options.model)
-        out = options.out or Path(f"{recognised.name}-terrain")
+        out = options.out or name_terrain(options.input[0])
         print(f"{', '.join(map(str, options.input))}: {recognised.about}")
         given = read_earlier(out, recognised)
     changed = apply_options(given, options)
@@ -85,6 +87,11 @@ def prepare_scene(options: argparse.Namespace) -> tuple[Path, dict[str, Any]]:
         folder = out if earlier is None else options.input[0]
         write_scene(out / SCENE_FILE, changed, HEAD.format(about=recognised.about if recognised else "", folder=folder))
     return out, load_scene(out)
+
+
+def name_terrain(source: Path) -> Path:
+    """The folder here that a terrain of an input is written to."""
+    return Path(f"{name_scene(source)}-terrain")
 
 
 def find_earlier(inputs: list[Path]) -> Path | None:
@@ -216,15 +223,16 @@ def link_folder(source: Path, target: Path) -> None:
 def report_made(made: Made) -> None:
     """Print where the results are, and what to type next."""
     size, folder = sum(path.stat().st_size for path in made.page.rglob("*") if path.is_file()), made.page.parent
+    program = shlex.quote(os.path.relpath(sys.argv[0]) if shutil.which("dav-gswt") is None else "dav-gswt")
     lines = [*(f"  {sentence}" for sentence in made.judgement), ""] if made.judgement else []
     lines += [
         f"  page     {made.page} ({size / 1e6:.0f} MB; any web host can serve it)",
         f"  still    {made.still}",
-        f"  field    {made.field} (for any splat viewer)",
+        f"  field    {made.field} (for any splat viewer; for engines: {program} export {folder} -o FOLDER)",
     ]
     lines += [f"  report   {made.report}"] if made.report else []
     lines += [
-        f"  scene    {made.scene} (edit it, then run `dav-gswt make {folder}`)",
-        f"Walk over it: dav-gswt view {folder}",
+        f"  scene    {made.scene} (edit it, then run `{program} make {folder}`)",
+        f"Walk over it: {program} view {folder}",
     ]
     print("\n".join(lines), flush=True)

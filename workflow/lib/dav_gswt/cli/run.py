@@ -18,7 +18,7 @@ import psutil
 from dav_gswt.cli import run_safely
 from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.errors import InputError
-from dav_gswt.paths import encode_branch, stage_folder
+from dav_gswt.paths import RESULTS, encode_branch, stage_folder
 from dav_gswt.raster import backends
 from dav_gswt.terrain import serve
 
@@ -261,10 +261,22 @@ def list_pages(given: dict) -> list[Path]:
     return sorted((path.parent for path in found), key=lambda path: path.stat().st_mtime, reverse=True)
 
 
+def link_latest(scene: str, folder: Path) -> Path:
+    """Let results/latest/SCENE lead to the folder of a round."""
+    link = Path(RESULTS, "latest", scene)
+    link.parent.mkdir(parents=True, exist_ok=True)
+    with suppress(FileNotFoundError):
+        link.unlink()
+    link.symlink_to(os.path.relpath(folder, link.parent), target_is_directory=True)
+    return link
+
+
 def report_result(given: dict, done: str, overlays: list[Path]) -> None:
     """Print what was made, where it is, and what to type next."""
     page = list_pages(given)[0]
-    terrain, bundle, tiles = page.parent, page.parents[1], page.parents[2]
+    latest = link_latest(given["scene"], page.parents[3])
+    terrain, bundle, tiles = (latest / path.relative_to(page.parents[3]) for path in list(page.parents)[:3])
+    page = terrain / page.name
     usual = given["scene"] == read_config([CONFIG])["scene"] and not set(overlays) - {SMALLER}
     size = sum(path.stat().st_size for path in page.rglob("*") if path.is_file())
     print(

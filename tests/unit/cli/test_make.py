@@ -1,0 +1,124 @@
+"""`dav-gswt make`: the folder of a terrain, its scene.yaml, what is linked into it and what is said of it."""
+
+import argparse
+import json
+
+import pytest
+import yaml
+
+from dav_gswt.cli import judgement, main, make
+from dav_gswt.errors import InputError
+
+JPEG = b"\xff\xd8\xff\xe0" + b"0" * 40
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder `pit` of three photos in the working directory."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pit").mkdir()
+    for number in range(3):
+        (tmp_path / f"pit/{number}.jpg").write_bytes(JPEG + bytes([number]))
+    return tmp_path
+
+
+def prepare(*arguments: str):
+    parser = argparse.ArgumentParser()
+    make.add_command(parser.add_subparsers())
+    return make.prepare_scene(parser.parse_args(["make", *arguments]))
+
+
+def scene_of(folder):
+    return yaml.safe_load((folder / "pit-terrain/scene.yaml").read_text())
+
+
+def test_a_folder_becomes_a_scene_that_uses_all_photos(folder, capsys):
+    out, settings = prepare("pit", "--preset", "draft")
+    assert str(out) == "pit-terrain" and "pit: 3 photos" in capsys.readouterr().out
+    assert scene_of(folder) == {
+        "scene": "pit",
+        "scenes": {"pit": {"kind": "photos", "folder": str(folder / "pit"), "preset": "draft"}},
+    }
+    scene = settings["scenes"]["pit"]
+    assert scene["preset"] == "draft" and scene["agent"] == "replay" and "start" not in scene
+
+
+def test_what_was_edited_stays_and_options_change_it(folder):
+    prepare("pit")
+    path = folder / "pit-terrain/scene.yaml"
+    path.write_text(path.read_text().replace("kind: photos", "kind: photos\n    focal: 28.0"))
+    prepare("pit")
+    assert scene_of(folder)["scenes"]["pit"]["focal"] == 28.0
+    prepare("pit-terrain", "--preset", "reference")
+    assert scene_of(folder)["scenes"]["pit"] | {"folder": ""} == {
+        "kind": "photos", "folder": "", "focal": 28.0, "preset": "reference",
+    }  # fmt: skip
+    prepare("pit-terrain/scene.yaml", "--capture", "drone")
+    assert scene_of(folder)["scenes"]["pit"]["agent"] == "plan"
+
+
+def test_folders_in_the_way_and_other_inputs_are_refused(folder):
+    (folder / "full").mkdir()
+    (folder / "full/letter.txt").write_text("dear")
+    with pytest.raises(InputError, match="full: is in the way and no terrain"):
+        prepare("pit", "-o", "full")
+    prepare("pit")
+    (folder / "pit").rename(folder / "moved")
+    with pytest.raises(InputError, match="has the terrain of another input"):
+        prepare("moved", "-o", "pit-terrain")
+    with pytest.raises(InputError, match="config files go to Snakemake"):
+        (folder / "my.yaml").write_text("scene: x")
+        prepare("my.yaml")
+    assert (folder / "full/letter.txt").read_text() == "dear"
+
+
+@pytest.mark.parametrize(
+    "photos, split", [(16, (8, 2, 4)), (20, (8, 3, 4)), (19, (10, 3, 3)), (8, (8, 0, 1)), (5, (5, 0, 1))]
+)
+def test_a_budget_is_used_up_in_rounds_of_about_four(photos, split):
+    start, rounds, per_round = make.split_budget(photos)
+    assert (start, rounds, per_round) == split and start + rounds * per_round == photos
+
+
+def test_results_are_linked_whole_and_replace_earlier_ones(tmp_path):
+    source, target = tmp_path / "source", tmp_path / "target"
+    for place, name in ((source, "a/b.txt"), (source, "c.txt"), (target, "old.txt")):
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        (place / name).write_text(name)
+    make.link_folder(source, target)
+    assert sorted(str(p.relative_to(target)) for p in target.rglob("*") if p.is_file()) == ["a/b.txt", "c.txt"]
+    assert (target / "c.txt").samefile(source / "c.txt")
+
+
+def test_view_finds_a_terrain_by_its_input_and_the_newest_one(folder):
+    with pytest.raises(InputError, match="there is no terrain here"):
+        main.find_page(None)
+    for name in ("old-terrain", "pit-terrain"):
+        (folder / name / "page").mkdir(parents=True)
+        (folder / name / "page/index.html").write_text(name)
+    for given in ("pit", "pit-terrain", "pit-terrain/page"):
+        assert main.find_page(type(folder)(given)).resolve() == folder / "pit-terrain/page"
+    assert main.find_page(None).resolve() == folder / "pit-terrain/page"
+
+
+def test_the_judgement_says_what_was_found_how_good_it_is_and_what_would_help(tmp_path):
+    ground = {"kind": "photos", "images": 5, "registered": 4, "left_out": [{"name": "a.jpg", "reason": "blurred"}]}
+    ground["verdict"] = {"signs": [{"name": "tilt", "grade": "doubtful", "reason": "photos look aside"}]}
+    weak = {"grade": "marginal", "reason": "too little of it was photographed"}
+    materials = {"excluded": 0.07, "objects": [{}], "materials": [{"share": 0.4, "verdict": weak}]}
+    materials["materials"].append({"share": 0.6, "verdict": {"grade": "good", "reason": ""}})
+    metrics = {"psnr": 20.0, "psnr_colour_corrected": 26.0, "test_views": [{}, {}]}
+    paths = [tmp_path / name for name in ("ground.json", "materials.json", "metrics.json")]
+    for path, value in zip(paths, (ground, materials, metrics), strict=True):
+        path.write_text(json.dumps(value))
+    said = judgement.judge_terrain(*paths)
+    assert said == [
+        "Found 2 kinds of ground (60%, 40%) and 1 thing standing on it. "
+        "7% of it is shown nowhere (dark in materials.png).",
+        "4 of 5 photos are used; not a.jpg.",
+        "Beside 2 photos that it never saw, it shows them well, a little softer (26.0 dB).",
+        "Photos look aside.",
+        "Too little of it was photographed.",
+    ]
+    paths[2].write_text('{"psnr": null, "test_views": []}')
+    assert "was not measured (--test 2" in judgement.judge_terrain(paths[0], None, paths[2])[1]
