@@ -6,6 +6,7 @@ import json
 import pytest
 import yaml
 
+import dav_gswt
 from dav_gswt.cli import judgement, main, make
 from dav_gswt.errors import InputError
 
@@ -122,3 +123,18 @@ def test_the_judgement_says_what_was_found_how_good_it_is_and_what_would_help(tm
     ]
     paths[2].write_text('{"psnr": null, "test_views": []}')
     assert "was not measured (--test 2" in judgement.judge_terrain(paths[0], None, paths[2])[1]
+
+
+def test_python_makes_a_terrain_as_the_command_does(folder, monkeypatch):
+    asked = []
+    monkeypatch.setattr(make, "run_scene", lambda out, settings, cores: asked.append((out, settings)) or 0)
+    made = make.Made(*(folder / name for name in ("page", "terrain.png", "field.ply", "report.html", "scene.yaml")))
+    monkeypatch.setattr(make, "collect_results", lambda out, settings: made)
+    assert dav_gswt.make("pit", preset="draft", test=1) is made
+    (out, settings), *_ = asked
+    assert str(out) == "pit-terrain" and settings["scenes"]["pit"]["test"] == 1
+    with pytest.raises(InputError, match="speed: no option"):
+        dav_gswt.make("pit", speed=3)
+    monkeypatch.setattr(make, "run_scene", lambda *_: 1)
+    with pytest.raises(InputError, match="no terrain was made"):
+        dav_gswt.make("pit")

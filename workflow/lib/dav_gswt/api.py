@@ -1,4 +1,4 @@
-"""The library's front: from photos with known cameras to an endless terrain, in ten functions.
+"""The library's front: from photos with known cameras to an endless terrain, in a dozen functions.
 
 `import dav_gswt` offers all of them. Each one calls the functions that the rules of the workflow call; the packages
 below `dav_gswt` have everything else. docs/python.md shows them in one example.
@@ -7,7 +7,7 @@ below `dav_gswt` have everything else. docs/python.md shows them in one example.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Float32
@@ -24,10 +24,14 @@ from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.views.scoring import ScoringResult
 
+if TYPE_CHECKING:
+    from dav_gswt.cli.make import Made
+
 __all__ = [
     "cut_tiles",
     "fit_field",
     "look_at",
+    "make",
     "make_levels",
     "open_terrain",
     "read_field",
@@ -57,6 +61,17 @@ class Terrain:
 
     endless: EndlessTerrain
     manifest: Manifest
+
+
+def make(source: Path | str, out: Path | str | None = None, **options: Any) -> "Made":
+    """Make a terrain of photos, a video, a splat or a project, as `dav-gswt make` does; returns where its files are.
+
+    out: a folder; None: NAME-terrain here. options: of the command line, such as preset="draft" or budget=16.
+    Raises: InputError: the input is not understood or cannot give a terrain.
+    """
+    from dav_gswt.cli.make import make_terrain  # here, not above: the command line stands over this front
+
+    return make_terrain(Path(source), Path(out) if out else None, **options)
 
 
 def read_photos(folder: Path | str, size: int = 768, names: list[str] | None = None) -> Photos:

@@ -48,7 +48,10 @@ class Made:
 def add_command(commands) -> None:
     """Add the command to a parser's commands."""
     about = "photos, a video, a splat or another program's project become a terrain"
-    parser = commands.add_parser("make", help=about, description=__doc__)
+    _add_options(commands.add_parser("make", help=about, description=__doc__))
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", nargs="+", type=Path, help="photos or folders of them, a video, a splat, a project")
     parser.add_argument("-o", "--out", type=Path, metavar="FOLDER", help="where it is written (default: NAME-terrain)")
     parser.add_argument("--preset", help="draft, standard or reference: speed against accuracy (default: standard)")
@@ -65,6 +68,20 @@ def add_command(commands) -> None:
 def _run(options: argparse.Namespace) -> int:
     out, settings = prepare_scene(options)
     return run_scene(out, settings, options.cores)
+
+
+def make_terrain(source: Path, out: Path | None = None, **given: Any) -> Made:
+    """`dav-gswt make` for Python. given: options of the command line. Raises: InputError: no terrain was made."""
+    parser = argparse.ArgumentParser()
+    _add_options(parser)
+    options = parser.parse_args([str(source.expanduser())])
+    if unknown := sorted(given.keys() - vars(options).keys()):
+        raise InputError(f"{unknown[0]}: no option of `dav-gswt make`")
+    vars(options).update(given, out=out)
+    folder, settings = prepare_scene(options)
+    if run_scene(folder, settings, options.cores):
+        raise InputError(f"{source}: no terrain was made; what was printed says why")
+    return collect_results(folder, settings)
 
 
 def prepare_scene(options: argparse.Namespace) -> tuple[Path, dict[str, Any]]:
