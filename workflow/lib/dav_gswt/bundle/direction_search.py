@@ -55,7 +55,7 @@ def search_directions(fields: list[GaussianField], side: float, wanted: float = 
         missing = more != elevations and along_azimuths < decibels + 3.0  # half of the error is 3 dB
         elevations_next, kept_next = (more, kept) if missing else (elevations, 2 * kept)
         if len(elevations_next) * kept_next + 1 > MAX_ORDERS:
-            _log.warning("orders: %.1f dB with %d directions, and no room for more", decibels, MAX_ORDERS)
+            _log.info("orders: %.1f dB with %d directions, and no room for more", decibels, MAX_ORDERS)
             break
         elevations, kept = elevations_next, kept_next
     return DirectionRings(elevations, 2 * kept)

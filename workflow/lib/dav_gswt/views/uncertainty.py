@@ -89,7 +89,7 @@ class Scales:
     def from_terms(terms: Mapping[str, Float[Array, "n"]]) -> "Scales":
         """Compute robust scales of the terms of all candidates. A term that is 0 everywhere is logged."""
         scales = Scales({name: robust_scale(values) for name, values in terms.items()})
-        for name in (n for n, scale in scales.by_term.items() if scale == 0):
+        for name in (n for n, scale in scales.by_term.items() if scale == 0 and len(terms[n])):
             _log.warning("%s is 0 at every candidate: the term has no weight", name)
         return scales
 
