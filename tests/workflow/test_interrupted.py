@@ -56,13 +56,14 @@ def ended(tmp_path_factory) -> Callable[..., Ended]:
 
     def call(folder: Path, rule: str, number: int, alone: bool = False) -> Ended:
         command = [sys.executable, "-m", "dav_gswt.cli.run", *ARGUMENTS]
-        out = tmp_path_factory.mktemp("out") / "out"
+        out, begun = tmp_path_factory.mktemp("out") / "out", time.time()
         with out.open("w") as file:
             job = subprocess.Popen(
                 command, cwd=folder, stdout=file, stderr=file, start_new_session=True, env=os.environ | ALONE
             )
         end = time.monotonic() + 200
-        while f"] {rule}\n" not in out.read_text():
+        logs = folder / "results/logs"  # a job begins its log when it begins
+        while not any(log.stat().st_mtime >= begun for log in logs.rglob(f"{rule}.log")):
             assert job.poll() is None and time.monotonic() < end, out.read_text()
             time.sleep(0.05)
         time.sleep(0.5)  # into the job, which has its imports to do
