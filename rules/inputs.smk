@@ -188,8 +188,8 @@ def source_photos(wildcards):
 
 
 def unnameable_photos(wildcards):
-    """A params function: those of them that cannot be inputs, as Snakemake would take part of their path for a name of
-    its own; with what changes when they do."""
+    """A params function: size and time of the files that cannot be inputs, as Snakemake would read wildcards in their
+    paths; a change of them runs the rule again."""
     found = [Path(path) for files in source_files(wildcards.scene).values() for path in files if TEMPLATE.search(path)]
     return [f"{path} {path.stat().st_size} {path.stat().st_mtime_ns}" for path in found]
 

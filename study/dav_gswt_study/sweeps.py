@@ -72,9 +72,11 @@ def _read_seams(cell: dict) -> dict:
 
 
 def draw_figure(name: str, axes: list[str], rows: list[dict]):
-    """A line a scene: means over seeds, and a dot a seed. name: of the sweep; axes: what is varied, as the config names
-    it. Of two axes the last value of the second is shown, but for curves of PSNR against photos, a line a value of the
-    first."""
+    """Draw one line per scene through the means over seeds, and one dot per seed.
+
+    name: of the sweep. axes: the settings that are varied, as the config names them. With two axes the figure shows the
+    last value of the second one; curves of PSNR against photos have one line for each value of the first.
+    """
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     curves = scenes if "rounds" in axes[1:] else []
     last = [row for row in rows if len(axes) < 2 or row["varied_1"] == _last(rows, row["varied_0"])]

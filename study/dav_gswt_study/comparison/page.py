@@ -140,6 +140,4 @@ def _draw_forest(axes, compared: list[dict], baseline: str) -> None:
     alone = [[r["mean"] for r in compared if r["policy"] == row["policy"] and r["scene"] != EVERY] for row in ranked]
     names, found = [row["policy"] for row in ranked], [(row["mean"], row["low"], row["high"]) for row in ranked]
     plots.draw_forest(axes, names, found, alone)
-    axes.set_xlabel(
-        f"nAUC less that of {baseline} (dB): mean and 95 % interval over scenes, dots are scenes", fontsize=9
-    )
+    axes.set_xlabel(f"nAUC minus {baseline} (dB): mean and 95 % interval over scenes, one dot per scene", fontsize=9)

@@ -24,7 +24,7 @@ LISTS = 16  # list 2 n + 1 is list 2 n with left and right exchanged, in another
 FORMAT, VERSION = "davgswt-2afc-key", 1
 SECONDS = 5.0  # for which a pair is shown, as in the paper
 
-Trial = list[str]  # the pair's name, and those of the pictures on the left and on the right
+Trial = list[str]  # names of the pair, of the left picture and of the right picture
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ def write_ablation(path: Path | str, rows: list[dict], baseline: str) -> None:
             dots.append([r["difference"] for r in scenes])
         plots.draw_forest(axes, variants, found, dots)
         axes.tick_params(labelleft=axes.get_subplotspec().is_first_col())
-        axes.set_xlabel(f"{NAMES[measure]}, less that of {baseline}", fontsize=8)
+        axes.set_xlabel(f"{NAMES[measure]}, minus {baseline}", fontsize=8)
     figures.save_figure(figure, path)
 
 

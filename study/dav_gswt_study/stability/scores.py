@@ -72,7 +72,7 @@ def _close_deviation_cases() -> list[Case]:
 
 
 def _w2_sq(means: Array, variances: Array) -> Array:
-    """The distance between Gaussians: that of their means and of their deviations, as points."""
+    """Squared W2 between diagonal Gaussians: that of the means plus that of the standard deviations."""
     return un.w2_sq(means)[1] + un.w2_sq(np.sqrt(variances, dtype=np.float64))[1]
 
 

@@ -68,8 +68,8 @@ def tabulate_sensitivity(sweeps: dict[str, list[dict]], defaults: dict[str, str]
     """A row for each setting and value: means over scenes and seeds, deviations over seeds, and the paper's values.
 
     score_s: seconds to score all candidates once, the paper's uncertainty time; stills_s: to draw three stills;
-    render_ms: of the viewer, empty where it measured nothing. paper_: the row of the paper with the same value, or,
-    where it has other values (k), that of the same place from low to high.
+    render_ms: of the viewer, empty where it measured nothing. paper_: the paper's row for the same value, or,
+    where its values differ (k), the row of the same rank.
     Args: sweeps: rows of each, with the viewer's, by the setting that it varies; defaults: values where not varied.
     """
     found = []

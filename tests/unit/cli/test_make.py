@@ -48,12 +48,15 @@ def test_what_was_edited_stays_and_options_change_it(folder):
     prepare("pit")
     path = folder / "pit-terrain/scene.yaml"
     path.write_text(path.read_text().replace("kind: photos", "kind: photos\n    focal: 28.0"))
+    path.write_text(path.read_text() + "# mine\n")
     prepare("pit")
+    assert path.read_text().startswith("# A terrain of 3 photos") and path.read_text().endswith("# mine\n")
     assert scene_of(folder)["scenes"]["pit"]["focal"] == 28.0
     prepare("pit-terrain", "--preset", "reference")
     assert scene_of(folder)["scenes"]["pit"] | {"folder": ""} == {
         "kind": "photos", "folder": "", "focal": 28.0, "preset": "reference",
     }  # fmt: skip
+    assert path.read_text().startswith("# A terrain of 3 photos")
     prepare("pit-terrain/scene.yaml", "--capture", "drone")
     assert scene_of(folder)["scenes"]["pit"]["agent"] == "plan"
 

@@ -11,6 +11,7 @@ import shutil
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -99,10 +100,12 @@ def prepare_scene(options: argparse.Namespace) -> tuple[Path, dict[str, Any]]:
         out = options.out or name_terrain(options.input[0])
         print(f"{', '.join(map(str, options.input))}: {recognised.about}")
         given = read_earlier(out, recognised)
-    changed = apply_options(given, options)
-    if recognised or changed != given:
-        folder = out if earlier is None else options.input[0]
-        write_scene(out / SCENE_FILE, changed, HEAD.format(about=recognised.about if recognised else "", folder=folder))
+    changed, path = apply_options(given, options), out / SCENE_FILE
+    if not path.is_file() and recognised:
+        write_scene(path, changed, HEAD.format(about=recognised.about, folder=out))
+    elif changed != given:
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+        write_scene(path, changed, "".join(takewhile(lambda line: line.startswith("#"), lines)))
     return out, load_scene(out)
 
 
