@@ -25,6 +25,7 @@ from dav_gswt.field import SH0
 from dav_gswt.files import atomic_file
 
 ARRAY_BUFFER = 34962
+ELEMENT_ARRAY_BUFFER = 34963
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 COMPONENTS = {"<f4": 5126, "|u1": 5121}
 EXTENSION = "KHR_gaussian_splatting"

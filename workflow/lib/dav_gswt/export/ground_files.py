@@ -17,6 +17,7 @@ from trimesh.exchange.gltf import export_glb
 
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.export.axes import Y_UP, turn_points
+from dav_gswt.export.glb import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER
 from dav_gswt.export.ground_surface import (
     GroundSurface,
     check_points,
@@ -91,7 +92,16 @@ def write_meshes(meshes: Mapping[str, Trimesh], extras: dict[str, Any], path: Pa
         turned = Trimesh(turn_points(mesh.vertices, Y_UP), mesh.faces, process=False)
         scene.add_geometry(turned, node_name=name, geom_name=name, metadata=extras)
     with atomic_file(path) as part:
-        part.write_bytes(export_glb(scene, include_normals=False))
+        part.write_bytes(export_glb(scene, include_normals=False, tree_postprocessor=_name_targets))
+
+
+def _name_targets(tree: dict[str, Any]) -> None:
+    """Say of each buffer view whether it holds vertices or indices, which glTF's validator asks for."""
+    for mesh in tree["meshes"]:
+        for primitive in mesh["primitives"]:
+            for accessor in primitive["attributes"].values():
+                tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = ARRAY_BUFFER
+            tree["bufferViews"][tree["accessors"][primitive["indices"]]["bufferView"]]["target"] = ELEMENT_ARRAY_BUFFER
 
 
 def _write_heights(surface: GroundSurface, folder: Path, origin: Float[Array, "3"]) -> dict[str, Any]:
