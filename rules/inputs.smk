@@ -118,9 +118,14 @@ def chooser_of(preset):
     return config["presets"][preset].get("choose_with") or preset
 
 
+def is_windowed(values):
+    """Whether the field of these wildcards is fitted in windows."""
+    return paths.fits_windows(config, values["scene"], values["preset"])
+
+
 def values_of_choice(values):
-    """The wildcards of the rounds that choose a field's photos, which may be those of another preset."""
-    return values | ({"preset": chooser_of(values["preset"])} if values["t"] else {})
+    """The wildcards of the rounds that choose a field's photos and windows, which may be those of another preset."""
+    return values | ({"preset": chooser_of(values["preset"])} if values["t"] or is_windowed(values) else {})
 
 
 def chosen_folder(stage, wildcards, t=""):
@@ -227,11 +232,35 @@ def inpainter_weights(wildcards):
     return {"weights": terrain_weights(wildcards.inpainter)}
 
 
+def draft_of(wildcards):
+    """The field that says where materials are, and its ground: the round's own, or the draft of a field of windows."""
+    windowed = is_windowed(wildcards)
+    folder = chosen_round(wildcards, int(wildcards.t)) if windowed else "<results>/<round>{inpainted}"
+    fitted = {"windows": "<results>/<round>/windows"} if windowed else {}
+    return fitted | {"field": f"{folder}/field.ply", "ground": f"{folder}/ground.exr"}
+
+
+def windows_of_round(wildcards):
+    """The windows of a field that was fitted in such, to measure them by themselves."""
+    return {"windows": "<results>/<round>/windows"} if is_windowed(wildcards) else {}
+
+
+def draft_of_windows(wildcards):
+    """The same of a rule that fits windows or measures them; nothing where there are none."""
+    if not is_windowed(wildcards):
+        return {}
+    folder = chosen_round(wildcards, int(wildcards.t))
+    return {"draft": f"{folder}/field.ply", "draft_ground": f"{folder}/ground.exr"}
+
+
 def maps_of_prior(wildcards):
     """The uncertainty maps of a round by its prior. Without a prior the field itself says what is known."""
     if wildcards.prior == "none":
         return {}
-    return {"maps": f"<results>/{'<scored>' if wildcards.t == '0' else '<round>'}/maps.npz"}
+    stage = "scored" if wildcards.t == "0" else "round"
+    if is_windowed(wildcards):
+        return {"maps": f"{chosen_folder(stage, wildcards, wildcards.t)}/maps.npz"}
+    return {"maps": f"<results>/<{stage}>/maps.npz"}
 
 
 def materials_of(wildcards):
@@ -277,13 +306,14 @@ def story_of_field(wildcards):
     if config["scenes"][wildcards.scene]["kind"] == "field":
         return {}
     t = int(wildcards.t)
+    last = "<results>/<round>" if is_windowed(wildcards) else round_folder(t)
     return {
         "views": "<results>/<start>/views.json",
         "images": "<results>/<photos>/images",
         "model": "<results>/<photos>/sparse",
         "frame": "<results>/<photos>/ground.json",
         "captures": captures_until(wildcards),
-        "metrics": [*metrics_before(wildcards), f"{round_folder(t)}/metrics.json"],
+        "metrics": [*metrics_before(wildcards), f"{last}/metrics.json"],
     }
 
 
@@ -325,8 +355,8 @@ def photo_targets(scene):
         expand(rules.report_photos.output.page, scene=scene)
         + expand(rules.evaluate_coarse.output.metrics, **chosen)
         + expand([rules.evaluate_round.output.metrics] * (rounds > 1), **(chosen | {"t": range(1, rounds)}))
-        + expand([rules.evaluate_round.output.metrics] * bool(rounds), **values)
-        + expand(list(scored), **values)
+        + expand([rules.evaluate_round.output.metrics] * bool(rounds or is_windowed(values)), **values)
+        + expand(list(scored), **(chosen if is_windowed(values) else values))
     )
 
 
@@ -362,13 +392,15 @@ def describe_run(values, measured):
     def of(made, ts=None, wildcards=values):
         return expand(made, **(wildcards if ts is None else wildcards | {"t": list(ts)}))
 
-    tested = rules.evaluate_round if rounds else rules.evaluate_coarse
+    windowed = is_windowed(values)
+    tested = rules.evaluate_round if rounds or windowed else rules.evaluate_coarse
     files = {"metrics": tested.output.metrics} if "views" in measured else {}
     files |= {"manifest": rules.bundle_tiles.output.manifest} if "tiles" in measured else {}
     files |= {"still": rules.render_terrain.output.stills[0]} if "stills" in measured else {}
     times = {"coarse": of(rules.fit_coarse.benchmark, [rounds], chosen)}
     times["update"] = of(rules.update_field.benchmark, range(1, rounds + 1), chosen)
-    times["update"] += of(rules.fit_chosen_photos.benchmark) if chosen != values else []
+    last = rules.fit_windows if windowed else rules.fit_chosen_photos
+    times["update"] += of(last.benchmark) if chosen != values else []
     times["score"] = of(rules.score_coarse.benchmark, [rounds], chosen) if rounds else []
     times["score"] += of(rules.score_round.benchmark, range(1, rounds), chosen)
     for key, job in (("select", rules.select_poses), ("capture", rules.capture_views)):

@@ -10,8 +10,7 @@ rule find_materials:
     input:
         unpack(maps_of_prior),
         unpack(masks_of_materials),
-        field="<results>/<round>{inpainted}/field.ply",
-        ground="<results>/<round>{inpainted}/ground.exr",
+        unpack(draft_of),
     output:
         materials=report(
             directory("<results>/<materials>"),

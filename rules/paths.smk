@@ -52,6 +52,11 @@ FITS_ONCE = "|".join(name for name, preset in config["presets"].items() if prese
 FITS_ONCE = rf"(?!(?:{CHOOSERS})/)(?:{FITS_ONCE})(?:-[^/]+)?"
 FITS_ROUNDS = rf"(?!{FITS_ONCE}/){paths.NAME}"
 
+# Runs whose last fit is of windows of the ground alone, by scene and preset: a constraint of the scene that looks ahead
+WINDOWED_SCENES = "|".join(name for name in config["scenes"] if paths.fits_windows(config, name)) or NEVER
+WINDOWED = rf"(?:{WINDOWED_SCENES})(?=/seed(?:{NATURAL})/{FITS_ONCE}/)"
+NOT_WINDOWED = rf"(?!{WINDOWED}){paths.NAME}"
+
 
 pathvars:
     **paths.TREE,

@@ -3,7 +3,8 @@
 In: photos, their model, views.json; of round t the photos captured so far. Out: field.ply (standard 3DGS), ground.exr
 (height, seen or not), fit.json (its steps and Gaussians), metrics.json (the test photos, which nothing else sees).
 Round t starts from round t - 1, so T is only which round is asked for. With `choose_with` in the preset its rounds are
-another preset's, and fit_chosen_photos fits all of their photos at once.
+another preset's, and fit_windows fits all of their photos at once, in the windows of the ground that tiles are cut from;
+fit_chosen_photos does so on all the ground (`exemplar: whole`).
 """
 
 
@@ -118,6 +119,7 @@ rule fit_chosen_photos:
     benchmark:
         "<benchmarks>/<round>/fit_chosen_photos.tsv"
     wildcard_constraints:
+        scene=NOT_WINDOWED,
         policy=CHOOSING,
         preset=FITS_ONCE,
         t=POSITIVE,
@@ -136,9 +138,47 @@ rule fit_chosen_photos:
         "../scripts/fit_chosen_photos.py"
 
 
+rule fit_windows:
+    """Fit the windows of the ground that tiles and objects are cut from, at the photos' own resolution."""
+    input:
+        unpack(draft_of_windows),
+        unpack(masks_of_materials),
+        captures=captures_until,
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        windows=directory("<results>/<round>/windows"),
+        fit="<results>/<round>/fit.json",
+    log:
+        "<logs>/<round>/fit_windows.log",
+    benchmark:
+        "<benchmarks>/<round>/fit_windows.tsv"
+    wildcard_constraints:
+        scene=WINDOWED,
+        policy=CHOOSING,
+        preset=FITS_ONCE,
+    threads: 2
+    resources:
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt("60m"),
+    params:
+        preset=preset_keys("fit_windows"),
+        seed=integer("seed"),
+        t=integer("t"),
+        keep=SNAPSHOTS,
+        source=code_of("fit_windows"),
+    script:
+        "../scripts/fit_windows.py"
+
+
 use rule evaluate_coarse as evaluate_round with:
     input:
         unpack(lpips_weights),
+        unpack(windows_of_round),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         fit="<results>/<round>/fit.json",
@@ -154,7 +194,7 @@ use rule evaluate_coarse as evaluate_round with:
     benchmark:
         "<benchmarks>/<round>/evaluate_round.tsv"
     wildcard_constraints:
-        t=POSITIVE,
+        scene=rf"{WINDOWED}|{paths.NAME}(?=/.*/iter[1-9])",  # round 0 of others is a copy
     params:
         preset=preset_keys("evaluate_round"),
         t=integer("t"),
@@ -176,6 +216,7 @@ rule copy_coarse_field:
     benchmark:
         "<benchmarks>/<active>/iter0/copy_coarse_field.tsv"
     wildcard_constraints:
+        scene=NOT_WINDOWED,
         policy=CHOOSING,
     script:
         "../scripts/copy_coarse_field.py"

@@ -2,7 +2,7 @@
 
 from dav_gswt.field import read_field
 from dav_gswt.logs import logging_to
-from dav_gswt.materials import build, store
+from dav_gswt.materials import build, store, windows
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import pose_maps
@@ -13,6 +13,7 @@ with logging_to(snakemake.log[0]):
     if paths.get("maps"):  # scored by a prior: tiles use its uncertainty instead of the field's own
         field = pose_maps.apply_uncertainty(field, pose_maps.read_pose_maps(paths.maps)[1])
     masks = {name.removeprefix("mask_"): path for name, path in paths.items() if name.startswith("mask_")}
-    found = build.find_materials(field, ground.read_ground(paths.ground), seed, masks)
+    focused = windows.read_windows(paths.windows) if paths.get("windows") else None
+    found = build.find_materials(field, ground.read_ground(paths.ground), seed, masks, focused)
     provenance = record_provenance({"field": paths.field, "ground": paths.ground}, {"seed": seed})
     store.write_materials(found, snakemake.output.materials, provenance)

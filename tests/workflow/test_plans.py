@@ -56,7 +56,7 @@ def test_presets_share_the_rounds_of_the_preset_that_chooses_for_them(planned, t
     targets = [BUNDLE.format(**DEFAULT).replace("draft", name) for name in ("draft", "standard", "reference")]
     plan = planned(tmp_path, *targets)
     assert plan["fit_coarse"] == plan["score_coarse"] == 1 and plan["select_poses"] == plan["update_field"] == 2
-    assert plan["fit_chosen_photos"] == 2 and plan["copy_chosen_photos"] == 4 and plan["make_levels"] == 3
+    assert plan["fit_windows"] == 2 and plan["copy_chosen_photos"] == 4 and plan["make_levels"] == 3
 
 
 def test_a_folder_alone_is_a_scene_whose_photos_are_all_fitted_at_once(planned, tmp_path):
@@ -72,6 +72,29 @@ def test_a_folder_alone_is_a_scene_whose_photos_are_all_fitted_at_once(planned, 
     metrics = "results/Sand_Pit/seed0/{}/coarse/metrics.json"
     plan = planned(tmp_path, metrics.format("draft"), metrics.format("standard"), configs=configs)
     assert plan["register_photos"] == plan["split_views"] == 1 and plan["fit_coarse"] == 2
+
+
+@pytest.mark.parametrize("start", ["", "start: 2, "])
+def test_the_last_fit_of_a_preset_that_chooses_with_another_is_of_windows_unless_the_whole_is_wanted(
+    planned, tmp_path, start
+):
+    """Of the draft's field of the same photos, also where all photos are fitted at once."""
+    (tmp_path / "photos").mkdir()
+    for name in "abcd":
+        (tmp_path / f"photos/{name}.jpg").write_bytes(b"\xff\xd8\xff")
+    entry = f"kind: photos, folder: photos, {start}preset: standard"
+    for name, more in {"focus": "", "whole": ", exemplar: whole", "one": ", materials: one"}.items():
+        (tmp_path / "mine.yaml").write_text(f"scene: mine\nscenes: {{mine: {{{entry}{more}}}}}\n")
+        plan = planned(tmp_path, configs=(USUAL, tmp_path / "mine.yaml"))
+        focused, rounds = name == "focus", 2 if start else 0
+        assert (
+            plan["fit_windows"] == focused
+            and plan["fit_coarse"] == 1
+            and plan["update_field"] == rounds - (0 if focused or not rounds else 1)
+        )
+        assert plan["fit_chosen_photos"] == (bool(rounds) and not focused)
+        assert plan["copy_coarse_field"] == (not rounds and not focused)
+        assert plan["evaluate_round"] == (rounds or focused)
 
 
 def test_a_finished_field_goes_from_field_to_terrain(planned, tmp_path):

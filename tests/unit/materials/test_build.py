@@ -47,8 +47,8 @@ def test_an_object_of_a_material_that_is_left_out_counts_on_the_ground_that_it_i
     """A shrub on a speck of ground that has no tiles would else stand as densely as on that speck."""
     first, *others = found.classes.footprints
     moved = replace(found.classes, footprints=[replace(first, material=1), *others])
-    parts = build._Parts(made.field(), made.grid(), found.maps, np.zeros((1, 1, 3)), moved, 4.0, 0)
-    dense = build._extract_objects(parts, {0: 0})
+    plan = build.GroundPlan(found.maps, moved, [], 4.0)
+    dense = build._extract_objects(plan, made.field(), made.grid(), {0: 0}, None)
     assert {each.material for each in dense} == {0} and dense[0].density == dense[1].density
 
 

@@ -93,6 +93,18 @@ def encode_branch(config: Mapping, scene: str, policy: str | None = None, change
     return fit | {"policy": policy, "prior": prior} | numbers | rounds | tiles
 
 
+def fits_windows(config: Mapping, scene: str, preset: str | None = None) -> bool:
+    """Whether the last fit is of windows of the ground alone: those that tiles are cut from.
+
+    It needs a preset that chooses with another one, whose field says where they are. Ground that is tiled as one, or
+    painted where no photo saw it, is fitted whole. preset: None: one that chooses so.
+    """
+    entry = config["scenes"][scene]
+    chooses = preset is None or bool(config["presets"][preset].get("choose_with"))
+    focused = entry.get("exemplar") == "focus" and entry["materials"] != "one"
+    return chooses and focused and not config["inpaint"]
+
+
 def stage_template(stage: str) -> str:
     """The path of a stage below results/ with its wildcards: {scene}/seed{seed}/..."""
     template = TREE[stage]

@@ -80,7 +80,7 @@ ClassTerm = Annotated[NoiseClasses | RangeClasses | PaintedClasses, Field(discri
 
 
 EVALUATING = ("evaluate_round",)  # metrics.json records what its field was fitted with
-FITTING = ("fit_coarse", "evaluate_coarse", "update_field", "fit_chosen_photos", *EVALUATING)
+FITTING = ("fit_coarse", "evaluate_coarse", "update_field", "fit_chosen_photos", "fit_windows", *EVALUATING)
 
 
 class Preset(ConfigModel):

@@ -17,10 +17,11 @@ from dav_gswt.materials import extraction, outlines, segmentation
 from dav_gswt.materials.borders import measure_bend, measure_fray
 from dav_gswt.materials.classes import GroundClasses, classify_ground
 from dav_gswt.materials.filling import fill_cells
-from dav_gswt.materials.maps import GroundMaps, measure_ground, read_masks
+from dav_gswt.materials.maps import HALF, GroundMaps, measure_ground, read_masks, resample
 from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.tiles import energy, layout, patches, texture
+from dav_gswt.tiles import compose, energy, layout, patches, texture
+from dav_gswt.tiles.layout import Exemplar
 
 _log = logging.getLogger(__name__)
 
@@ -87,37 +88,79 @@ class FoundMaterials:
 
 
 @dataclass(frozen=True)
-class _Parts:
-    """What all steps read. features: weighed CIELAB of all cells."""
+class GroundPlan:
+    """What the ground of an exemplar is: what materials are cut from, before any is.
+
+    Attributes:
+        maps, classes: of the exemplar.
+        sources: the cells that each material is made of; none of a material that is left out.
+        tile_side: in cells.
+        whole: all of the ground is one material, and is tiled as it is.
+    """
+
+    maps: GroundMaps
+    classes: GroundClasses
+    sources: list[Bool[Array, "m m"]]
+    tile_side: float
+    whole: bool = False
+
+
+@dataclass(frozen=True)
+class Cutting:
+    """A part of the ground that something is cut from. own: its cells there; grid: its exemplar is that part."""
 
     field: GaussianField
     grid: Ground
     maps: GroundMaps
-    features: Float[Array, "m m k"]
-    classes: GroundClasses
-    tile_side: float
-    seed: int
+    own: Bool[Array, "n n"]
 
 
-def find_materials(
-    field: GaussianField,
-    grid: Ground,
-    seed: int,
-    mask_files: Mapping[str, Path | str] | None = None,
-) -> FoundMaterials:
-    """Find the materials of a field's exemplar and the objects on them.
+@dataclass(frozen=True)
+class FocusedFields:
+    """Windows of the ground that were fitted by themselves: field and grid of each, and whether tiles are cut from it.
 
-    Ground of one material without objects is given back as it is. So are, with a warning, ground of
-    which nothing would be left to tile, and a field without a ground layer (an imported field, or ground
-    that is too rough for a layer).
+    maps: of the exemplar, as the windows show it, and around them as the draft and the photos do.
+    """
+
+    windows: list[tuple[GaussianField, Ground]]
+    tiled: list[bool]
+    maps: GroundMaps
+
+    def find_window(self, own: Bool[Array, "m m"], tiled: bool) -> int | None:
+        """The window that holds most of these cells of the maps; None where none holds any.
+
+        tiled: only windows that tiles are cut from; else one must hold them all.
+        """
+        counts = [int(own[find_cells(self.maps.exemplar, grid)].sum()) for _, grid in self.windows]
+        if tiled:
+            counts = [count * each for count, each in zip(counts, self.tiled, strict=True)]
+        best = int(np.argmax(counts))
+        return best if counts[best] >= (1 if tiled else own.sum()) else None
+
+
+def find_cells(place: Exemplar, grid: Ground) -> tuple[slice, slice]:
+    """The cells of an exemplar whose middles lie in that of a grid."""
+    west, south, side = grid.exemplar
+    ends = [
+        np.ceil((np.array([low, low + side]) - start) / place.spacing - 0.5).astype(int).clip(0, place.cells)
+        for low, start in ((south, place.south), (west, place.west))
+    ]
+    return slice(*ends[0].tolist()), slice(*ends[1].tolist())
+
+
+def plan_ground(maps: GroundMaps, layered: bool, mask_files: Mapping[str, Path | str] | None = None) -> GroundPlan:
+    """Tell the materials and objects of an exemplar apart.
+
+    One material without objects is kept as it is. So are, with a warning, ground of which nothing would be left to
+    tile, and a field without a ground layer (an imported field, or ground that is too rough for a layer).
 
     Args:
+        layered: whether the field has a ground layer.
         mask_files: by material, or `exclude`; see `maps.read_masks`.
     """
-    maps = measure_ground(field, grid)
-    if not field.ground.any():
+    if not layered:
         _log.warning("materials: this field has no ground layer: all of the ground is tiled as one")
-        return _keep_whole(field, grid, maps)
+        return _plan_whole(maps)
     masks = read_masks(mask_files, maps.cells) if mask_files else None
     classes = classify_ground(maps, masks)
     free = replace(maps, known=maps.known & ~classes.excluded)
@@ -126,31 +169,101 @@ def find_materials(
     classes = replace(refined, excluded=classes.excluded | (classes.occupied & ~refined.occupied))
     sources = [_ignore_scarce(classes, k) for k in range(classes.number)]
     if all(source.all() for source in sources) and masks is None:
-        return _keep_whole(field, grid, maps)
-    features = segmentation.describe_cells(maps.colour)[..., :3]
-    parts = _Parts(field, grid, maps, features, classes, choose_tile_side(maps, sources), seed)
-    made = {k: _make_material(parts, k, sources[k]) for k in progress(range(classes.number), "fill materials")}
-    kept = {k: each for k, each in made.items() if each is not None}
-    if not kept:
-        _log.warning(
-            "materials: nothing is left to tile (shade, objects or cut off): all of the ground is tiled as one"
-        )
-        return _keep_whole(field, grid, maps)
-    total = sum(each.info.share for each in kept.values())
-    materials = [replace(each, info=replace(each.info, share=each.info.share / total)) for each in kept.values()]
-    objects = _extract_objects(parts, {k: place for place, k in enumerate(kept)})
-    return _report(maps, classes, parts.tile_side, materials, objects)
+        return _plan_whole(maps)
+    if not any(source.any() for source in sources):
+        _warn_of_nothing()
+        return _plan_whole(maps)
+    return GroundPlan(maps, classes, sources, choose_tile_side(maps, sources))
 
 
-def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMaterials:
+def _warn_of_nothing() -> None:
+    _log.warning("materials: nothing is left to tile (shade, objects or cut off): all of the ground is tiled as one")
+
+
+def _plan_whole(maps: GroundMaps) -> GroundPlan:
     """All of the ground as one material."""
     everything, nothing = np.ones(maps.known.shape, bool), np.zeros(maps.known.shape, bool)
-    side = choose_tile_side(maps, [everything])
+    classes = GroundClasses(nothing.astype(int), nothing.astype(int), [], nothing, ["material0"])
+    return GroundPlan(maps, classes, [everything], choose_tile_side(maps, [everything]), True)
+
+
+def find_materials(
+    field: GaussianField,
+    grid: Ground,
+    seed: int,
+    mask_files: Mapping[str, Path | str] | None = None,
+    focused: FocusedFields | None = None,
+) -> FoundMaterials:
+    """Find the materials of a field's exemplar and the objects on them, and cut both out: see `plan_ground`.
+
+    focused: fields of windows that they are cut from; None: from the field itself.
+    """
+    maps = measure_ground(field, grid) if focused is None else focused.maps
+    plan = plan_ground(maps, bool(field.ground.any()), mask_files)
+    if plan.whole:
+        return _keep_whole(field, grid, plan, focused)
+    parts = _Parts(plan, segmentation.describe_cells(plan.maps.colour)[..., :3], seed)
+    cuttings = _find_cuttings(field, grid, plan, focused)
+    made = {k: _make_material(parts, k, cutting) for k, cutting in progress(cuttings.items(), "fill materials")}
+    kept = {k: each for k, each in made.items() if each is not None}
+    if not kept:
+        _warn_of_nothing()
+        return _keep_whole(field, grid, _plan_whole(plan.maps), focused)
+    total = sum(each.info.share for each in kept.values())
+    materials = [replace(each, info=replace(each.info, share=each.info.share / total)) for each in kept.values()]
+    objects = _extract_objects(plan, field, grid, {k: place for place, k in enumerate(kept)}, focused)
+    side = plan.tile_side * plan.maps.exemplar.spacing / materials[0].grid.spacing
+    return _report(plan.maps, plan.classes, side, materials, objects)
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """What all materials read. features: weighed CIELAB of all cells."""
+
+    plan: GroundPlan
+    features: Float[Array, "m m k"]
+    seed: int
+
+
+def _find_cuttings(
+    field: GaussianField, grid: Ground, plan: GroundPlan, focused: FocusedFields | None
+) -> dict[int, Cutting]:
+    """What each material is cut from, by number; materials that are left out have none."""
+    found = {}
+    for number, own in enumerate(plan.sources):
+        if not own.any():
+            continue
+        if focused is None:
+            row, column, cells = choose_window(own, plan.tile_side)
+            small = replace(grid, first_row=grid.first_row + row, first_column=grid.first_column + column, cells=cells)
+            source = own[row : row + cells, column : column + cells]
+            found[number] = Cutting(field, small, plan.maps.crop(row, column, cells), source)
+        else:
+            window = focused.find_window(own, True)
+            if window is None:
+                _log.warning("%s lies in no window that was fitted: it is left out", plan.classes.names[number])
+                continue
+            found[number] = _sample_window(plan, focused.windows[window], own)
+    return found
+
+
+def _sample_window(plan: GroundPlan, window: tuple[GaussianField, Ground], own: Bool[Array, "m m"]) -> Cutting:
+    """A window with what belongs to a thing there."""
+    field, grid = window
+    maps = measure_ground(field, grid)
+    return Cutting(field, grid, maps, (resample(own, plan.maps.exemplar, maps.exemplar) >= HALF) & maps.known)
+
+
+def _keep_whole(field: GaussianField, grid: Ground, plan: GroundPlan, focused: FocusedFields | None) -> FoundMaterials:
+    """All of the ground as one material: as it is, or its window."""
+    maps, side = plan.maps, None
     colour = [float(value) for value in maps.colour.mean((0, 1))]
-    info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, colour, None, None)
-    judged = judge_material(info.name, (maps.cells / side) ** 2, 0.0)
-    classes = GroundClasses(nothing.astype(int), nothing.astype(int), [], nothing, [info.name])
-    return _report(maps, classes, None, [Material(info, field, grid, 0.0, judged)], [])
+    info = MaterialInfo("material0", 1.0, maps.cells * maps.exemplar.spacing, colour, None, None)
+    judged = judge_material(info.name, (maps.cells / plan.tile_side) ** 2, 0.0)
+    if focused is not None:
+        field, grid = focused.windows[0]
+        side = plan.tile_side * maps.exemplar.spacing / grid.spacing
+    return _report(maps, plan.classes, side, [Material(info, field, grid, 0.0, judged)], [])
 
 
 def _report(
@@ -193,35 +306,31 @@ def _ignore_scarce(classes: GroundClasses, number: int) -> Bool[Array, "m m"]:
     return np.zeros_like(own)
 
 
-def _make_material(parts: _Parts, number: int, own: Bool[Array, "m m"]) -> Material | None:
+def _make_material(parts: _Parts, number: int, cutting: Cutting) -> Material | None:
     """The exemplar of one material, made of its own cells; None where it has no room for a patch."""
-    grid = parts.grid
-    if not own.any():
-        return None
-    row, column, cells = choose_window(own, parts.tile_side)
-    window, source = parts.maps.crop(row, column, cells), own[row : row + cells, column : column + cells]
+    plan, window, source = parts.plan, cutting.maps, cutting.own
+    name, cells = plan.classes.names[number], cutting.grid.cells
+    tile_side = plan.tile_side * plan.maps.exemplar.spacing / cutting.grid.spacing
     hidden = energy.make_occluder_layer(window.cover)
     terms = energy.SeamEnergy("colour", 0.0, energy.make_colour_layer(window.colour), None, hidden).terms(1.0)
-    plan = layout.plan_layout(cells, 1, min(1.0, parts.tile_side / cells), 0.125)
-    features = patches.make_guidance(window.colour, window.height, np.zeros(source.shape), plan).features
+    areas = layout.plan_layout(cells, 1, min(1.0, tile_side / cells), 0.125)
+    features = patches.make_guidance(window.colour, window.height, np.zeros(source.shape), areas).features
     rng = np.random.default_rng([parts.seed, number])
-    sources = fill_cells(features, terms, source, _choose_patch(window, source), rng)
+    sources = fill_cells(features, terms, source, _choose_patch(window, source), rng) if source.any() else None
     if sources is None:
-        _log.warning("%s is too small and narrow to be tiled; it is left out", parts.classes.names[number])
+        _log.warning("%s is too small and narrow to be tiled; it is left out", name)
         return None
-    small = replace(grid, first_row=grid.first_row + row, first_column=grid.first_column + column, cells=cells)
-    made, made_grid = extraction.extract_exemplar(parts.field, small, window, sources, source)
-    filled = float(sources.copied.mean())
-    colour = [float(value) for value in parts.maps.colour[own].mean(0)]
-    share = float(parts.classes.shares[number])
-    counted = parts.maps.known & ~parts.classes.excluded & ~parts.classes.occupied
-    whole = parts.classes.materials == number  # with the excluded ground in it: shade of a tree parts no material
-    patch_scale = _measure_patches(whole) * grid.spacing
-    fray = measure_fray(parts.features, whole, counted, parts.tile_side)
-    bend = measure_bend(whole, counted, parts.tile_side)
-    fray, bend = (None if value is None else value * grid.spacing for value in (fray, bend))
-    info = MaterialInfo(parts.classes.names[number], share, patch_scale, colour, fray, bend)
-    judged = judge_material(info.name, float(own.sum()) / parts.tile_side**2, filled)
+    made, made_grid = extraction.extract_exemplar(cutting.field, cutting.grid, window, sources, source)
+    filled, own, spacing = float(sources.copied.mean()), plan.sources[number], plan.maps.exemplar.spacing
+    colour = [float(value) for value in plan.maps.colour[own].mean(0)]
+    counted = plan.maps.known & ~plan.classes.excluded & ~plan.classes.occupied
+    whole = plan.classes.materials == number  # with the excluded ground in it: shade of a tree parts no material
+    patch_scale = _measure_patches(whole) * spacing
+    fray = measure_fray(parts.features, whole, counted, plan.tile_side)
+    bend = measure_bend(whole, counted, plan.tile_side)
+    fray, bend = (None if value is None else value * spacing for value in (fray, bend))
+    info = MaterialInfo(name, float(plan.classes.shares[number]), patch_scale, colour, fray, bend)
+    judged = judge_material(info.name, float(own.sum()) / plan.tile_side**2, filled)
     return Material(info, made, made_grid, filled, judged)
 
 
@@ -266,13 +375,25 @@ def _measure_patches(own: Bool[Array, "m m"]) -> float:
     return 4 * float(own.sum()) / max(ends, 1)
 
 
-def _extract_objects(parts: _Parts, index: dict[int, int]) -> list[ExtractedObject]:
+def _extract_objects(
+    plan: GroundPlan, field: GaussianField, grid: Ground, index: dict[int, int], focused: FocusedFields | None
+) -> list[ExtractedObject]:
     """All objects; index: new number of each material that is kept. Others' objects stand on the largest one."""
-    spacing, objects = parts.grid.spacing, []
-    areas = parts.classes.shares * float((~parts.classes.excluded).sum()) * spacing**2
-    standing = extraction.bin_standing(parts.field, parts.grid, parts.maps)
-    for number, footprint in enumerate(parts.classes.footprints):
-        own = extraction.extract_object(parts.field, parts.grid, parts.maps, standing, footprint)
+    objects, classes, spacing = [], plan.classes, plan.maps.exemplar.spacing
+    areas = classes.shares * float((~classes.excluded).sum()) * spacing**2
+    windows = [(field, grid)] if focused is None else focused.windows
+    opened: dict[int, tuple[GroundMaps, compose.BinnedLevel]] = {}
+    for number, footprint in enumerate(classes.footprints):
+        place = 0 if focused is None else focused.find_window(footprint.cells, False)
+        if place is None:
+            continue
+        own_field, own_grid = windows[place]
+        if place not in opened:
+            maps = plan.maps if focused is None else measure_ground(own_field, own_grid)
+            opened[place] = maps, extraction.bin_standing(own_field, own_grid, maps)
+        maps, standing = opened[place]
+        cells = resample(footprint.cells, plan.maps.exemplar, maps.exemplar) >= HALF
+        own = extraction.extract_object(own_field, own_grid, maps, standing, replace(footprint, cells=cells))
         radius = float(np.sqrt(footprint.cells.sum() / np.pi)) * spacing
         ground = footprint.material if footprint.material in index else next(iter(index))  # that it is placed on
         height, density = float(own.means[:, 2].max()), 1 / float(areas[ground])

@@ -7,20 +7,24 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.images import image_files
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import top_view
 from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.reconstruction.photo_colours import median_colours
 from dav_gswt.tiles.compose import compute_cover, compute_ground_maps
 from dav_gswt.tiles.layout import Exemplar
 
 UNKNOWN = 0.9  # uncertainty from which nothing is known of a cell
+PLANNED = 384  # cells along the side of the maps that windows are chosen by: about what grain is described on
 EXCLUDE = "exclude"  # name of the mask of ground that is shown nowhere
 NO_CLASS = -1  # of cells that belong to no material
 HALF = 0.5  # brightness from which a pixel of a mask counts
+ALIKE = 0.4  # blur of values for wider cells, in those
 ASPECT = 0.01  # a mask that is less square does not show the exemplar
 
 
@@ -109,6 +113,42 @@ def measure_ground(field: GaussianField, grid: Ground) -> GroundMaps:
     colour = np.clip(above.colour[nearest].astype(float), 0, 1)
     surface = above.height[nearest].astype(float)
     return GroundMaps(colour, height, surface, compute_cover(field, exemplar, height), known, exemplar)
+
+
+def sharpen_maps(maps: GroundMaps, views: list[TrainingView], cells: int = PLANNED) -> GroundMaps:
+    """Finer maps of the same ground, with the colours of the photos.
+
+    The maps of a draft are as soft as its cells. Each cell of the finer ones has the median colour of the photos that
+    show its surface; heights and cover are the draft's. views: at one exposure. cells: along the side.
+    """
+    place = maps.exemplar
+    fine = Exemplar(place.west, place.south, place.spacing * maps.cells / cells, cells)
+    coarse = resample_maps(maps, fine)
+    middles = (np.arange(cells) + 0.5) * fine.spacing
+    x, y = np.meshgrid(place.west + middles, place.south + middles)
+    colour, seen = median_colours(np.stack([x.ravel(), y.ravel(), coarse.surface.ravel()], 1), views)
+    colour = np.where(seen[:, None], colour, coarse.colour.reshape(-1, 3)).reshape(cells, cells, 3).astype(float)
+    known = coarse.known & seen.reshape(cells, cells)
+    return replace(coarse, colour=np.clip(colour, 0, 1), known=known if known.any() else np.ones_like(known))
+
+
+def resample(layer: Array, place: Exemplar, at: Exemplar) -> Float[Array, "n n"]:
+    """A layer of values at the cells of another exemplar over the same ground, as if both were blurred alike."""
+    middles = (np.arange(at.cells) + 0.5) * at.spacing
+    row = (at.south - place.south + middles) / place.spacing - 0.5
+    column = (at.west - place.west + middles) / place.spacing - 0.5
+    wider = at.spacing / place.spacing
+    values = gaussian_filter(layer.astype(float), ALIKE * wider, mode="nearest") if wider > 1 else layer.astype(float)
+    return map_coordinates(values, np.meshgrid(row, column, indexing="ij"), order=1, mode="nearest")
+
+
+def resample_maps(maps: GroundMaps, at: Exemplar) -> GroundMaps:
+    """The maps at the cells of another exemplar over the same ground."""
+    height, surface, cover, known = (
+        resample(layer, maps.exemplar, at) for layer in (maps.height, maps.surface, maps.cover, maps.known)
+    )
+    colour = np.stack([resample(layer, maps.exemplar, at) for layer in np.moveaxis(maps.colour, -1, 0)], -1)
+    return GroundMaps(colour, height, surface, cover, known >= HALF, at)
 
 
 @dataclass(frozen=True)

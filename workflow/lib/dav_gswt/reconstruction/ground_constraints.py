@@ -28,12 +28,20 @@ class GroundConstraints:
 
     The first `fixed` Gaussians are never pruned, relocated or perturbed; the first `discs` of them are the discs.
     ceiling: the largest height of objects above the surface, by cell. smoothing: cells over which the gradients of the
-    discs' heights are blurred; None: the discs keep their heights.
+    discs' heights are blurred; None: the discs keep their heights. frozen: Gaussians after the underlay that stay as
+    they are, and beside which none grow.
     """
 
-    def __init__(self, grid: Ground, ceiling: Float[Array, "rows columns"], smoothing: float | None = SMOOTHING):
+    def __init__(
+        self,
+        grid: Ground,
+        ceiling: Float[Array, "rows columns"],
+        smoothing: float | None = SMOOTHING,
+        frozen: int = 0,
+    ):
         self.discs, self.detail = grid.heights.size, grid.spacing
-        self.fixed = self.discs + count_underlay(grid)
+        self.fixed = self.discs + count_underlay(grid) + frozen
+        self.frozen = slice(self.fixed - frozen, self.fixed)
         self.shape: tuple[int, int] = grid.shape
         self.smoothing = smoothing
         self.grid, self.ceiling = grid, replace(grid, heights=ceiling)

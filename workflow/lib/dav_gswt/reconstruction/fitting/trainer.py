@@ -131,6 +131,7 @@ def _grow(run: TrainingState, task: TrainingTask) -> None:
     misplaced = task.constraints.find_misplaced(run.state.values)
     allowed = task.schedule.max_gaussians(run.step, len(run.state))
     assert run.errors is not None  # noted in the steps before
+    run.errors[task.constraints.frozen] = 0
     densification.grow(run.state, task.constraints.fixed, misplaced, run.errors, allowed, run.rng)
 
 

@@ -1,0 +1,124 @@
+"""Which windows of the ground are fitted, and what is cut from them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import mixed_ground as made
+
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.scene_frame import Square
+from dav_gswt.materials import build, windows
+from dav_gswt.materials.maps import sharpen_maps
+from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.raster import render
+from dav_gswt.reconstruction.fitting.plan import FitSettings
+
+SIDE = made.CELLS * made.SPACING
+SETTINGS = FitSettings(fit_size=256, spacing=1.5, max_gaussians=20_000, steps=10)
+
+
+def photo(x, y, height, size=256, picture=None):
+    """A view from straight above a place."""
+    camera = cameras.pinhole([x, y, height], [x, y + 1e-3, 0], size, size, 60.0)
+    image = np.full((size, size, 3), 0.5, np.float32) if picture is None else picture(camera)
+    return TrainingView(f"{x}_{y}", camera, image, np.ones((size, size), np.float32))
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return build.plan_ground(made.maps(), True)
+
+
+@pytest.fixture(scope="module")
+def views():
+    return [photo(x, y, 8.0) for x in (3, 6, 9) for y in (3, 6, 9)]
+
+
+def test_each_material_and_each_object_outside_has_a_window(plan, views):
+    focus = windows.choose_windows(plan, views, SETTINGS)
+    place, tiled = plan.maps.exemplar, [each for each in focus.windows if each.tiled]
+    for own in plan.sources:
+        best = max(own[cells_of(place, each.square)].sum() for each in tiled)
+        assert best >= min(windows.MOST * own.sum(), build.MARGINAL * plan.tile_side**2) * 0.95
+    for footprint in plan.classes.footprints:
+        assert any(
+            footprint.cells[cells_of(place, each.square)].sum() == footprint.cells.sum() for each in focus.windows
+        )
+    assert all(each.square.side >= min(SIDE, build.ROOM * plan.tile_side * place.spacing) - 2 for each in tiled)
+
+
+def cells_of(place, square):
+    first = [
+        round((low - start) / place.spacing) for low, start in ((square.south, place.south), (square.west, place.west))
+    ]
+    return tuple(slice(k, k + round(square.side / place.spacing)) for k in first)
+
+
+def test_cells_are_as_narrow_as_the_preset_asks_for_or_as_the_gaussians_allow(plan, views):
+    width = 8.0 / views[0].camera.fx
+    fine = windows.choose_windows(plan, views, replace(SETTINGS, max_gaussians=10**6))
+    assert fine.spacing == pytest.approx(SETTINGS.spacing * width, rel=0.02)
+    coarse = windows.choose_windows(plan, views, replace(SETTINGS, max_gaussians=2000))
+    area = sum(each.square.side**2 for each in coarse.windows)
+    assert area / coarse.spacing**2 <= 2000 and coarse.spacing > fine.spacing
+    assert sum(each.square.side**2 for each in fine.windows) >= area
+
+
+def test_a_window_lies_where_pixels_are_finest(views):
+    sand = build.plan_ground(made.maps(mixed=False, shrubs=False), True)
+    near = [photo(x, y, 3.0) for x in (9.0, 10.0) for y in (9.0, 10.0, 10.5)]
+    focus = windows.choose_windows(sand, [*views, *near], replace(SETTINGS, max_gaussians=5000))
+    (window,) = focus.windows
+    assert window.square.side < SIDE and window.square.west > 0 and window.square.south > 0
+
+
+def test_a_material_and_objects_are_cut_from_fitted_windows(plan, tmp_path):
+    field, grid = made.field(), made.grid()
+    whole = build.FocusedFields([(field, grid)], [True], plan.maps)
+    usual, found = build.find_materials(field, grid, 0), build.find_materials(field, grid, 0, None, whole)
+    assert [each.info.name for each in found.materials] == [each.info.name for each in usual.materials]
+    assert len(found.objects) == len(usual.objects) > 0
+    for ours, theirs in zip(found.objects, usual.objects, strict=True):
+        np.testing.assert_array_equal(ours.field.means, theirs.field.means)
+    assert found.tile_side == pytest.approx(usual.tile_side)
+    assert all(each.grid.cells == made.CELLS for each in found.materials)
+    windows.write_windows(whole.windows, [windows.FitWindow(Square(0.0, 0.0, SIDE), True)], plan.maps, tmp_path / "w")
+    read = windows.read_windows(tmp_path / "w")
+    assert read.tiled == [True] and read.maps.exemplar == plan.maps.exemplar
+    np.testing.assert_allclose(read.maps.colour, plan.maps.colour, atol=1e-6)
+    np.testing.assert_array_equal(read.maps.known, plan.maps.known)
+    np.testing.assert_array_equal(read.windows[0][0].means, field.means)
+
+
+def test_what_lies_in_no_window_is_left_out(plan):
+    field, grid = made.field(), made.grid()
+    part = replace(grid, first_row=grid.first_row + 64, cells=64)  # the north-west: two shrubs are in it whole
+    found = build.find_materials(field, grid, 0, None, build.FocusedFields([(field, part)], [True], plan.maps))
+    assert len(found.objects) < len(plan.classes.footprints)
+    assert found.materials[0].grid.cells == 64
+
+
+def test_sharper_maps_have_the_colours_of_the_photos():
+    field = made.field(shrubs=False)
+    seen = [photo(6.4, 6.4, 12.0, 512, lambda camera: np.clip(render(field, camera).colour, 0, 1).astype(np.float32))]
+    blurred = replace(made.maps(shrubs=False), colour=np.full((made.CELLS, made.CELLS, 3), 0.5))
+    maps = sharpen_maps(blurred, seen, 192)
+    assert maps.cells == 192 and maps.exemplar.spacing * 192 == pytest.approx(SIDE)
+    middle = np.s_[60:130, 60:130]
+    wanted = np.where(maps_of_truth(192)[middle][..., None], made.GRASS, made.SAND)
+    assert np.abs(maps.colour[middle] - wanted).mean() < 0.06
+
+
+def maps_of_truth(cells):
+    at = (np.arange(cells) * made.CELLS / cells).astype(int)
+    return made.true_materials()[np.ix_(at, at)] == 1
+
+
+def test_windows_that_overlap_are_one_and_far_things_have_their_own():
+    box = windows._Box
+    joined, tiled = windows._join_boxes(
+        [box(0, 0, 40), box(4, 4, 40)], [box(10, 10, 5), box(80, 80, 6), box(84, 84, 6)]
+    )
+    assert tiled == 1 and [each.side for each in joined] == [44, 6, 6]
+    assert [each.side for each in windows._merge_boxes([box(80, 80, 6), box(81, 82, 6)])] == [8]

@@ -1,0 +1,108 @@
+"""Windows of the ground that are fitted by themselves, with the draft around them held fixed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import ground as made
+
+from dav_gswt.field import concatenate_fields
+from dav_gswt.geometry.scene_frame import Square
+from dav_gswt.raster import make_rasterizer, render
+from dav_gswt.reconstruction import windows
+from dav_gswt.reconstruction.fitting import state, trainer
+from dav_gswt.reconstruction.fitting.descent import TrainingState, TrainingTask
+from dav_gswt.reconstruction.fitting.exposure import ExposureTracker
+from dav_gswt.reconstruction.fitting.plan import FitPlan, FitSettings, Schedule
+from dav_gswt.reconstruction.ground_constraints import GroundConstraints
+from dav_gswt.reconstruction.windows import Draft, FitWindow
+
+SETTINGS = FitSettings(fit_size=96, spacing=1.0, max_gaussians=4000, steps=40)
+WINDOW = FitWindow(Square(0.8, 0.8, 1.6), tiled=True)
+COARSE = made.grid(0.1)
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    blurred = replace(made.field(COARSE), sh=0 * made.field(COARSE).sh)
+    draft = Draft(blurred, COARSE, replace(made.FRAME, kind="synthetic"))
+    found = windows.fit_windows(draft, made.photos(4, 96), [WINDOW], 0.05, SETTINGS, np.random.default_rng(0))
+    return draft, found[0]
+
+
+def test_a_window_lies_in_its_square_in_whole_blocks_with_a_margin_and_the_heights_of_the_draft():
+    sloped = replace(COARSE, heights=0.1 * COARSE.centres[:, 0].reshape(COARSE.shape))
+    grid = windows.make_grid(sloped, WINDOW, 0.05)
+    west, south, side = grid.exemplar
+    assert grid.cells == 32 and side == pytest.approx(1.6) and (west, south) == pytest.approx((0.8, 0.8))
+    assert grid.first_row == grid.first_column == int(windows.MARGIN * COARSE.spacing / 0.05)
+    np.testing.assert_allclose(grid.heights.ravel(), 0.1 * grid.centres[:, 0], atol=1e-9)
+    assert windows.make_grid(sloped, replace(WINDOW, tiled=False), 0.047).cells == 34
+    corner = windows.make_grid(sloped, FitWindow(Square(0.0, 0.0, 1.6), True), 0.05)
+    assert corner.first_row == corner.first_column == 0 and corner.west == pytest.approx(0)
+
+
+def test_a_window_shows_the_photos_and_its_field_has_none_of_what_surrounds_it(fitted):
+    draft, own = fitted
+    grid, field = own.grid, own.field
+    assert grid.spacing == pytest.approx(0.05) and field.ground.sum() == grid.heights.size
+    assert grid.contains(field.means).all()
+    inside = windows.find_inside(grid, field) & field.ground
+    away = np.abs(field.base_colours - made.look(*field.means[:, :2].T))[inside].max(1)
+    assert np.median(away) < 0.05 < np.abs(0.5 - made.look(*field.means[:, :2].T))[inside].max(1).mean()
+
+
+def test_a_joined_field_is_the_window_inside_and_the_draft_outside(fitted):
+    draft, own = fitted
+    joined = windows.join_windows(draft, [own])
+    within = windows.find_inside(own.grid, joined)
+    assert within.sum() == windows.find_inside(own.grid, own.field).sum()
+    outside = draft.field[~windows.find_inside(own.grid, draft.field)]
+    np.testing.assert_array_equal(joined.means[~within], outside.means)
+    np.testing.assert_array_equal(joined.sh[~within], outside.sh)
+
+
+def test_frozen_gaussians_stay_to_the_bit_and_none_grow_beside_them():
+    grid, field = made.grid(), made.field()
+    around = replace(field[:50], means=field.means[:50] + np.array([0, 0, 0.3], np.float32))
+    start = concatenate_fields([field, around])
+    constraints = GroundConstraints(grid, np.full(grid.shape, 0.5), frozen=len(around))
+    assert constraints.frozen == slice(len(field), len(start)) and constraints.fixed == len(start)
+    plan = FitPlan(60, len(start) + 200)
+    fit = trainer.fit_field(start, made.photos(), plan, constraints, np.random.default_rng(0))
+    for name in ("means", "log_scales", "quats", "opacity_logits", "sh"):
+        np.testing.assert_array_equal(getattr(fit.field, name)[constraints.frozen], getattr(around, name))
+    run = TrainingState(state.from_field(start), np.random.default_rng(0), ExposureTracker(3), step=10)
+    run.errors = np.zeros(len(start), np.float32)
+    run.errors[constraints.frozen] = 1
+    trainer._grow(run, TrainingTask(made.photos(), plan, Schedule(plan, len(start)), constraints, make_rasterizer()))
+    assert len(run.state) == len(start)
+
+
+def test_a_cropped_view_shows_the_same_places_and_is_shrunk_where_it_is_finer_than_any_cell():
+    (view,) = made.photos(1, 96)
+    counts = np.zeros_like(view.weight)
+    counts[20:60, 30:90] = 1
+    view = replace(view, weight=counts)
+    cropped = windows.crop_view(view, np.array([1.6, 1.6, 0]), 1e-3)
+    assert cropped.image.shape == (40, 60, 3)
+    np.testing.assert_array_equal(cropped.image, view.image[20:60, 30:90])
+    seen = np.clip(render(made.field(), cropped.camera).colour, 0, 1)
+    np.testing.assert_allclose(seen, cropped.image, atol=1e-3)
+    small = windows.crop_view(view, np.array([1.6, 1.6, 0]), 2 * 4 / view.camera.fx)
+    assert small.image.shape[0] in (19, 20, 21) and small.weight.min() in (0, 1)
+    assert windows.crop_view(replace(view, weight=0 * counts), np.zeros(3), 1e-3) is None
+
+
+def test_pixels_are_as_wide_as_depth_over_focal_length():
+    views = made.photos(3)
+    width, count = windows.measure_pixel_widths(np.array([[1.6, 1.6, 0.0], [50.0, 0, 0]]), views)
+    depths = [view.camera.project(np.array([[1.6, 1.6, 0.0]]))[1][0] / view.camera.fx for view in views]
+    assert width[0] == pytest.approx(np.median(depths)) and count.tolist() == [3, 0] and np.isnan(width[1])
+
+
+def test_masks_count_where_a_view_looks_at_a_square():
+    view = made.photos(1)[0]
+    masked = windows.mask_to_squares([view], [(0.0, 0.0, 3.2), (10.0, 10.0, 1.0)])[0]
+    away = windows.mask_to_squares([view], [(10.0, 10.0, 1.0)])[0]
+    assert 0.3 < masked.weight.mean() <= 1 and not away.weight.any()
