@@ -29,7 +29,6 @@ from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model
 from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.photo_matching import PhotoFolder, match_photos_to_images
-from dav_gswt.photos.importers.points import triangulate_features
 from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.recognition import recognize_input
 from dav_gswt.photos.sfm.registration import undistort_image
@@ -47,10 +46,10 @@ def photos(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found_once():
     """Triangulates the features of the scene's photos once, since their cameras are the same in all formats."""
-    found = []
+    found, find_points = [], importers._find_points
 
     def triangulate(*arguments):
-        found.append(found[0] if found else triangulate_features(*arguments))
+        found.append(found[0] if found else find_points(*arguments))
         return found[0]
 
     return triangulate
@@ -67,7 +66,7 @@ def three(photos, found_once, tmp_path_factory):
         "opensfm": write_json(folder / "reconstruction.json", reconstruction()),
     }
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(importers, "triangulate_features", found_once)
+        patch.setattr(importers, "_find_points", found_once)
         return {kind: import_model(path, photos, OPTIONS) for kind, path in sources.items()}
 
 
@@ -226,7 +225,7 @@ def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path):
 
 
 def test_the_stage_goes_on_from_a_given_model(photos, found_once, tmp_path, monkeypatch):
-    monkeypatch.setattr(importers, "triangulate_features", found_once)
+    monkeypatch.setattr(importers, "_find_points", found_once)
     path = write_json(tmp_path / "r.json", reconstruction())
     facts = prepare_photos(photos, tmp_path / "out", OPTIONS, path)
     assert facts.registered == 8 and facts.relief < 0.02

@@ -265,7 +265,12 @@ def make_lens(camera: Camera) -> pycolmap.Camera:
 
 
 def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
-    """Write a COLMAP model (binary) into an existing folder; images are numbered from 1 in the model's order."""
+    """Write a COLMAP model (binary) into an existing folder."""
+    make_reconstruction(model).write(str(folder))
+
+
+def make_reconstruction(model: ColmapModel) -> pycolmap.Reconstruction:
+    """The model for pycolmap; images are numbered from 1 in the model's order."""
     silence_pycolmap()
     stored = pycolmap.Reconstruction()
     numbers: dict[tuple, int] = {}
@@ -288,4 +293,4 @@ def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
         track = [pycolmap.TrackElement(int(model.image_of[k]) + 1, int(place[k])) for k in range(a, b)]
         stored.add_point3D(point, pycolmap.Track(track), colour)
     stored.update_point_3d_errors()
-    stored.write(str(folder))
+    return stored
