@@ -31,7 +31,7 @@ from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.photo_matching import PhotoFolder, match_photos_to_images
 from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.recognition import recognize_input
-from dav_gswt.photos.sfm.registration import undistort_image
+from dav_gswt.photos.sfm.registration import undistort_pixels
 
 OPTIONS = replace(made.OPTIONS, features=500)
 
@@ -104,7 +104,11 @@ def test_photos_may_be_smaller_than_the_models_and_pictures_smaller_still(tmp_pa
     assert max(found.lenses[0].width, found.lenses[0].height) == 100
     assert max(found.model.cameras[0].width, found.model.cameras[0].height) <= 100
     assert reprojection_errors(found.model).max() < 1e-4
-    assert undistort_image(found, 0).shape == (found.model.cameras[0].height, found.model.cameras[0].width, 3)
+    assert undistort_pixels(found, 0, image_files.read_photo(found.sources[0])).shape == (
+        found.model.cameras[0].height,
+        found.model.cameras[0].width,
+        3,
+    )
 
 
 def test_photos_and_images_without_each_other_are_left_out_with_the_reason(tmp_path):

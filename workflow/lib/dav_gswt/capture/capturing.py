@@ -69,7 +69,7 @@ def take_requested(site: Site, poses: list[RequestedPose], remaining: Candidates
 def _undistort_stored(site: Site, pose: Pose, camera: Camera, folder: Path) -> CapturedPhoto:
     """Write a pose's oldest stored photo as its pinhole camera would have taken it."""
     stored, name = site.store.photos_of(camera)[0], f"{pose.name}.png"
-    picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera, turned=True)
+    picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera)
     image_files.write_png(folder / name, picture)
     distance = view_distance(camera, stored.camera, site.frame)
     return CapturedPhoto(name, pose, camera, stored.camera, distance, stored.taken)

@@ -38,7 +38,6 @@ def import_colmap(folder: Path) -> ImportedModel:
     kind = "bin" if _has_both(folder, "bin") else "txt"
     files = {part: folder / f"{part}.{kind}" for part in _PARTS}
     stored = _read_reconstruction(files)
-    checks.check_count(len(stored.images), str(files["images"]))
     cameras = {
         number: make_camera(c.model_name, c.width, c.height, tuple(c.params), f"{files['cameras']}: camera {number}")
         for number, c in sorted(stored.cameras.items())

@@ -137,11 +137,6 @@ def require_parallax(spread: Float[Array, "n"]) -> None:
         )
 
 
-def undistort_image(registered: Registration, index: int) -> Float32[Array, "h w 3"]:
-    """The picture of the model's image `index`: the photo as a pinhole camera would have taken it."""
-    return undistort_pixels(registered, index, image_files.read_photo(registered.sources[index]))
-
-
 def undistort_pixels(registered: Registration, index: int, photo: Float32[Array, "m n 3"]) -> Float32[Array, "h w 3"]:
     """The picture of the model's image `index`, of its photo.
 
