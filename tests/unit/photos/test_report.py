@@ -9,7 +9,6 @@ from fixtures import photos as synth
 from fixtures.frames import scene_frame
 
 from dav_gswt.geometry.scene_frame import FocalLength, LeftOutPhoto, SfmSign, SfmVerdict, Square
-from dav_gswt.photos.colmap_model import transform_model
 from dav_gswt.photos.photo_set import write_photo_folder
 from dav_gswt.photos.report import collect_facts, list_advice, write_report
 
@@ -19,7 +18,6 @@ FRAME = scene_frame(
     flying_height=1.0,
     exemplar=(-0.5, -0.5, 1.0),
     extent=(-1.0, -1.0, 1.0, 1.0),
-    photos_per_cell=3,
     relief=0.01,
     images=14,
     registered=12,
@@ -63,14 +61,14 @@ def test_the_page_needs_nothing_but_itself_and_escapes_names(made, root, tmp_pat
     text = (tmp_path / "a.html").read_text()
     assert text == (tmp_path / "b.html").read_text(), "equal photos give equal bytes"
     links = re.findall(r'(?:src|href)="([^"]*)"', text)
-    assert len(links) == 14 and all(link.startswith("data:image/") for link in links)
+    assert len(links) == 13 and all(link.startswith("data:image/") for link in links)
     assert "default-src 'none'" in text and not re.search(r"url\(|@import|<script|https?:", text)
     assert not {"<b>", "<i>"} & set(re.findall(r"<[^>]*>", text))
     for said in ("matches &lt;i&gt;no&lt;/i&gt;", "&lt;img src=", "&lt;b&gt;bold", "12 of 14 photos", "it is odd"):
         assert said in text
 
 
-def test_advice_names_weak_photos_and_how_much_few_photos_see(made, flown):
+def test_advice_names_weak_photos(made):
     found = collect_facts(made())
     assert found.weak == {
         "004.png": ["its points are 3.0 px off on average"],
@@ -78,10 +76,6 @@ def test_advice_names_weak_photos_and_how_much_few_photos_see(made, flown):
     }
     said = " ".join(list_advice(found))
     assert "doubtful: it is odd" in said and "1 of 14 photos were left out" in said and "004.png, 011.png" in said
-    assert "of the exemplar" not in said
-    south = replace(FRAME, exemplar=Square(-0.5, -0.95, 1.0), verdict=None, left_out=())
-    said = list_advice(collect_facts(made(south)))
-    assert "% of the exemplar is seen by fewer than 3 photos" in said[0]
     small = replace(FRAME, exemplar=Square(0.0, 0.0, 0.4))
     assert "only 0.40 flying heights wide" in list_advice(collect_facts(made(small)))[-1]
 
@@ -98,20 +92,9 @@ def test_the_page_says_which_ground_the_photos_miss(flown, root, tmp_path):
         assert ("seen by too few photos, at" in text.replace("square flying heights ", "")) == bool(blurred)
 
 
-def test_coverage_does_not_depend_on_the_unit(made, flown):
-    """A world in metres, 40 of them a flying height: the same photos see the same places."""
-    one = collect_facts(made())
-    metres = transform_model(flown, 40.0, np.eye(3), np.zeros(3))
-    frame = replace(FRAME, unit="metre", flying_height=40.0, exemplar=Square(-20.0, -20.0, 40.0))
-    two = collect_facts(made(frame, metres))
-    assert np.array_equal(one.cover.counts, two.cover.counts)
-    assert two.cover.cell == pytest.approx(40 * one.cover.cell)
-    assert two.cover.west == pytest.approx(40 * one.cover.west)
-
-
 def test_photos_that_only_test_do_not_count(made, flown):
     own = flown.image_of < 8
     sparse = replace(flown, **{k: getattr(flown, k)[own] for k in ("point_of", "image_of", "pixels")})
     frame = replace(FRAME, kind="synthetic", test=flown.names[8:], left_out=(), focal_ratio=None)
     found = collect_facts(made(frame, sparse))
-    assert found.cover.counts.max() <= 8 and found.tests == set(flown.names[8:]) and not found.tests & set(found.weak)
+    assert found.tests == set(flown.names[8:]) and not found.tests & set(found.weak)

@@ -37,7 +37,8 @@ HORIZON = 0.5  # share of a picture that must show ground within REACH
 REASONS = ("seen by no photo", "seen by too few photos", "seen from one side only", "seen too coarsely")
 COLOURS = ("#882255", "#d55e00", "#e69f00", "#56b4e9")
 WELL, BEYOND = -1, -2  # in place of a reason: seen well, not asked for
-GOOD, BACK = "#b8d8b8", "#ffffff"
+GOOD, BACK, MARK = "#b8d8b8", "#ffffff", "#d55e00"
+DOWN = 5.0  # degrees off straight down, within which a camera has no arrow
 LABELLED, LISTED = 20, 10  # gaps that have their number on the map, that are told of one by one
 
 
@@ -243,22 +244,14 @@ def list_gaps(fault: Int[Array, "rows columns"], surface: Surface) -> tuple[Gap,
         own = pieces[box] == piece
         counts = np.bincount(fault[box][own], minlength=len(REASONS)) * surface.cell**2
         start = corner + surface.cell * np.array([box[1].start, box[0].start])
-        rings = [
-            start + surface.cell * (ring[:, ::-1] - 0.5) for ring in find_contours(np.pad(own, 1).astype(float), 0.5)
-        ]
-        rings = sorted(rings, key=lambda ring: -abs(measure_ring(ring)))
-        turned = [ring if (measure_ring(ring) > 0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)]
+        outlines = find_contours(np.pad(own, 1).astype(float), 0.5, positive_orientation="low")
+        rings = [start + surface.cell * (line[:, ::-1] - 0.5) for line in outlines]
+        rings.sort(key=lambda ring: -np.ptp(ring, axis=0).max())  # the outer one first
         deep = np.unravel_index(ndimage.distance_transform_edt(np.pad(own, 1))[1:-1, 1:-1].argmax(), own.shape)
         middle = start + surface.cell * (np.array(deep[::-1]) + 0.5)
         areas = {reason: float(area) for reason, area in zip(REASONS, counts, strict=True) if area}
-        found.append(Gap(areas, tuple(turned), np.r_[middle, surface.find_heights(middle[None])]))
+        found.append(Gap(areas, tuple(rings), np.r_[middle, surface.find_heights(middle[None])]))
     return tuple(sorted(found, key=lambda gap: -gap.area))
-
-
-def measure_ring(ring: Float[Array, "n 2"]) -> float:
-    """The area inside a closed line, positive if it runs counterclockwise."""
-    x, y = (ring - ring[0]).T
-    return 0.5 * float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum())
 
 
 def plan_photos(gaps: Gaps, frame: SceneFrame, lens: Camera) -> list[Camera]:
@@ -350,9 +343,20 @@ def _format_place(at: Float[Array, "3"], frame: SceneFrame) -> str:
     return f", at {latitude:.6f}, {longitude:.6f}"
 
 
-def draw_gaps(gaps: Gaps, model: ColmapModel, frame: SceneFrame, unused: Collection[str] = ()):
-    """The map: ground by what is wrong with it, and where the photos were taken. unused: photos that do not count."""
+def draw_gaps(
+    gaps: Gaps,
+    model: ColmapModel,
+    frame: SceneFrame,
+    unused: Collection[str] = (),
+    tests: Collection[str] = (),
+    weak: Collection[str] = (),
+):
+    """The map: ground by what is wrong with it, the exemplar, and where the photos were taken and look.
+
+    unused: photos that do not count. tests: that only test. weak: that are weakly placed, and named.
+    """
     from matplotlib.colors import BoundaryNorm, ListedColormap  # not above: it loads for a second
+    from matplotlib.patches import Rectangle
 
     surface, unit = gaps.surface, "m" if frame.unit == "metre" else "flying heights"
     rows, columns = surface.heights.shape
@@ -373,25 +377,46 @@ def draw_gaps(gaps: Gaps, model: ColmapModel, frame: SceneFrame, unused: Collect
         interpolation="nearest",
     )
     axes.contour(x, y, np.where(here, surface.heights, np.nan), 8, colors="k", alpha=0.2, linewidths=0.5)
+    square = frame.exemplar
+    axes.add_patch(Rectangle((square.west, square.south), square.side, square.side, fill=False, ls="--", lw=1.5))
     marks = [axes.plot([], [], "s", color=colour, ms=9)[0] for colour in (GOOD, *COLOURS)]
     names = ["seen well", *REASONS]
-    for name, mark, out in (("photos", "k.", False), ("photos that do not count", "kx", True)):
-        chosen = places[[(photo in unused) == out for photo in model.names]]
-        if len(chosen):
-            marks += axes.plot(chosen[:, 0], chosen[:, 1], mark, ms=4)
+    used = {*model.names} - {*unused, *tests}
+    for name, mark, photos in (
+        ("photos", {"marker": "."}, used),
+        ("photos that do not count", {"marker": "x"}, unused),
+        ("test photos", {"marker": "o", "mfc": "w"}, tests),
+    ):
+        at = places[[photo in photos for photo in model.names]]
+        if len(at):
+            marks += axes.plot(*at.T, color="k", ls="", ms=4, **mark)
             names.append(name)
+    for name, camera in zip(model.names, model.cameras, strict=True):
+        _draw_direction(axes, camera, frame.flying_height)
+        if name in weak:
+            axes.annotate(name, tuple(camera.centre[:2]), (4, 4), textcoords="offset points", fontsize=7, color=MARK)
     for number, gap in enumerate(gaps.gaps[:LABELLED], 1):
         outline = {"boxstyle": "circle,pad=0.25", "fc": "w", "ec": "k", "lw": 0.8}
         axes.text(gap.middle[0], gap.middle[1], str(number), ha="center", va="center", fontsize=8, bbox=outline)
     figure.legend(marks, names, loc="outside lower center", ncols=4, fontsize=8, frameon=False)
     if frame.georeference:
-        draw_north(axes, frame.georeference)
+        _draw_north(axes, frame.georeference)
     axes.set(xlabel=f"x, {unit}", ylabel=f"y, {unit}", aspect="equal")
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     return figure
 
 
-def draw_north(axes, place: Georeference) -> None:
+def _draw_direction(axes, camera: Camera, unit: float) -> None:
+    """An arrow of at most half a flying height to where the middle of a picture looks; none if that is down."""
+    start, ahead = camera.centre[:2], find_aim_point(camera) - camera.centre[:2]
+    if camera.forward[2] > -0.1:  # it looks to the horizon
+        ahead = unit * camera.forward[:2]
+    if -camera.forward[2] < np.cos(np.radians(DOWN)):
+        ahead = ahead * min(1.0, 0.5 * unit / max(float(np.linalg.norm(ahead)), 1e-12))
+        axes.annotate("", start + ahead, start, arrowprops={"arrowstyle": "->", "shrinkA": 0})
+
+
+def _draw_north(axes, place: Georeference) -> None:
     """An arrow to the north in the corner of a map."""
     turn = np.radians(place.north)
     tip = np.array([0.93, 0.93]) + 0.07 * np.array([-np.sin(turn), np.cos(turn)])

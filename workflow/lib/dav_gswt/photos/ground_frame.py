@@ -131,7 +131,6 @@ def fit_ground_frame(
         flying_height=unit,
         exemplar=Square(unit * west, unit * south, unit * side),
         extent=extent,
-        photos_per_cell=need,
         relief=relief,
         georeference=_georeference(model, flat, about) if about else None,
     )

@@ -7,58 +7,41 @@ bytes.
 
 import base64
 import io
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from matplotlib import colormaps
-from matplotlib.patches import Rectangle
 from numpy import ndarray as Array
 
 from dav_gswt.files import atomic_file
-from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import figures, image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos import gaps, view_split
-from dav_gswt.photos.colmap_model import (
-    ColmapModel,
-    count_shared_points,
-    read_colmap_model,
-    reprojection_errors,
-    transform_model,
-)
-from dav_gswt.photos.ground_frame import Coverage, count_coverage
+from dav_gswt.photos.colmap_model import ColmapModel, count_shared_points, read_colmap_model, reprojection_errors
 from dav_gswt.photos.sharpness import find_blurred
-from dav_gswt.photos.view_split import find_aim_point
 from dav_gswt.templates import render_template
 
 LEAST_POINTS, LEAST_SHARE = 100, 0.2  # points that hold a photo: as a number, and as a share of the set's median
 WORST_ERROR = 2.0  # pixels: a photo's mean error, above which its place is doubtful or its lens is another
 LEAST_SIDE = 0.5  # flying heights: side of an exemplar with room for tiles that differ
-TOO_FEW = 0.02  # share of the exemplar that may be seen by fewer photos than are needed
-DOWN = 5.0  # degrees off straight down, within which a camera has no arrow
 THUMBNAIL = 200  # pixels of the longer side
 MASKED = np.array([0.85, 0.1, 0.5], np.float32)
-FEW, MARK = "#b3471f", "#d55e00"  # colours of ground that too few photos see, and of photos that are weakly placed
 
 
 @dataclass(frozen=True)
 class ReportFacts:
     """A scene's photos.
 
-    tests: names of those that only test. weak: reasons to doubt the place of others, by name. need: how many photos
-    must see a place. cover: in world units, without test photos. error: mean reprojection error in pixels; None where
-    it is unknown.
+    tests: names of those that only test. weak: reasons to doubt the place of others, by name. error: mean reprojection
+    error in pixels; None where it is unknown.
     """
 
     frame: SceneFrame
     model: ColmapModel
     tests: frozenset[str]
     weak: dict[str, list[str]]
-    need: int
-    cover: Coverage
     error: float | None
 
 
@@ -75,9 +58,8 @@ def write_report(folder: Path | str, template: Path | str, scene: str, out: Path
         "scene": scene,
         "summary": _summarize(found),
         "advice": list_advice(found),
-        "map": draw_map(found),
         "gaps": gaps.describe_ground(missed, frame) if missed else None,
-        "gaps_map": encode_figure(gaps.draw_gaps(missed, found.model, frame, blurred)) if missed else None,
+        "gaps_map": draw_map(found, missed, blurred) if missed else None,
         "blurred": blurred,
         "horizon": missed.horizon if missed else (),
         "facts": _list_facts(found),
@@ -95,16 +77,9 @@ def collect_facts(folder: Path | str) -> ReportFacts:
     """The facts of a photos/ folder. Raises: InputError: what it holds is not readable."""
     folder = Path(folder)
     frame, model = read_scene_frame(folder / "ground.json"), read_colmap_model(folder / "sparse")
-    tests, unit = frozenset(frame.test or ()), frame.flying_height
-    flat = transform_model(model, 1 / unit, np.eye(3), np.zeros(3))
-    cameras = tuple(c for name, c in zip(model.names, flat.cameras, strict=True) if name not in tests)
-    empty = Coverage(0.0, 0.0, 1.0, np.zeros((1, 1), int))
-    grid = count_coverage(cameras, flat.points) if len(flat.points) else empty
-    cover = replace(grid, west=unit * grid.west, south=unit * grid.south, cell=unit * grid.cell)
-    need = frame.photos_per_cell or (3 if len(cameras) >= 9 else 2)
-    off = reprojection_errors(model)
+    tests, off = frozenset(frame.test or ()), reprojection_errors(model)
     error = float(off.mean()) if frame.reprojection_error is None and len(off) else frame.reprojection_error
-    return ReportFacts(frame, model, tests, find_weaknesses(model, off, tests), need, cover, error)
+    return ReportFacts(frame, model, tests, find_weaknesses(model, off, tests), error)
 
 
 def find_missed_ground(found: ReportFacts, images: Path) -> tuple[gaps.Gaps | None, list[str]]:
@@ -157,11 +132,6 @@ def list_advice(found: ReportFacts) -> list[str]:
             f"{len(frame.left_out)} of {frame.images} photos were left out for the reasons below. Photos taken between "
             "them and the others can help."
         )
-    if (share := measure_sparse_share(found)) > TOO_FEW:
-        said.append(
-            f"{100 * share:.0f} % of the exemplar is seen by fewer than {found.need} photos (brown on the map): take "
-            "more photos of it."
-        )
     if weak := list(found.weak):
         names = ", ".join(weak[:5]) + (f" and {len(weak) - 5} more" if len(weak) > 5 else "")
         said.append(f"Weakly placed photos: {names}. If the field looks blurred there, leave them out.")
@@ -171,16 +141,6 @@ def list_advice(found: ReportFacts) -> list[str]:
             f"The exemplar is only {side:.2f} flying heights wide, so tiles repeat soon. Photograph more ground."
         )
     return said
-
-
-def measure_sparse_share(found: ReportFacts) -> float:
-    """The share of the exemplar that fewer photos see than are needed."""
-    square, cover = found.frame.exemplar, found.cover
-    rows, columns = cover.counts.shape
-    y = cover.south + (np.arange(rows) + 0.5) * cover.cell
-    x = cover.west + (np.arange(columns) + 0.5) * cover.cell
-    counts = cover.counts[np.ix_((y > square.south) & (y < square.north), (x > square.west) & (x < square.east))]
-    return float((counts < found.need).mean()) if counts.size else 1.0
 
 
 def _list_facts(found: ReportFacts) -> list[tuple[str, str]]:
@@ -196,54 +156,12 @@ def _list_facts(found: ReportFacts) -> list[tuple[str, str]]:
     return facts
 
 
-def draw_map(found: ReportFacts) -> str:
-    """The coverage of the ground from above, with the exemplar and the cameras, as a data URI.
-
-    Arrows point to where a camera looks. Weakly placed photos have their names, test photos are
-    hollow.
-    """
-    frame, cover = found.frame, found.cover
-    figure = figures.make_figure(8.0, 6.4)
-    axes = figure.subplots()
-    rows, columns = cover.counts.shape
-    box = (cover.west, cover.west + columns * cover.cell, cover.south, cover.south + rows * cover.cell)
-    counts, colours = np.ma.masked_equal(cover.counts, 0), colormaps["viridis"].with_extremes(under=FEW)
-    shown = axes.imshow(counts, colours, extent=box, origin="lower", interpolation="nearest")
-    shown.set_clim(found.need, max(int(cover.counts.max()), found.need + 1))
-    figure.colorbar(
-        shown, label=f"photos that see a place (at least {found.need} are needed)", shrink=0.7, extend="min"
-    )
-    square = frame.exemplar
-    side = Rectangle((square.west, square.south), square.side, square.side, fill=False, ls="--", lw=1.5, ec="k")
-    axes.add_patch(side)
-    for name, camera in zip(found.model.names, found.model.cameras, strict=True):
-        _draw_camera(axes, camera, MARK if name in found.weak else "k", name in found.tests, frame.flying_height)
-        if name in found.weak:
-            axes.annotate(name, tuple(camera.centre[:2]), (4, 4), textcoords="offset points", fontsize=7, color=MARK)
-    if frame.georeference:
-        gaps.draw_north(axes, frame.georeference)
-    unit = "m" if frame.unit == "metre" else "flying heights"
-    axes.set(xlabel=f"x, {unit}", ylabel=f"y, {unit}", aspect="equal")
-    axes.autoscale()
-    return encode_figure(figure)
-
-
-def encode_figure(figure) -> str:
-    """A figure as a PNG in a data URI."""
-    file = io.BytesIO()
+def draw_map(found: ReportFacts, missed: gaps.Gaps, blurred: list[str]) -> str:
+    """The map of the ground and of the cameras, as a data URI."""
+    unused = {*blurred, *missed.horizon} - found.tests
+    figure, file = gaps.draw_gaps(missed, found.model, found.frame, unused, found.tests, found.weak), io.BytesIO()
     figure.savefig(file, format="png", metadata={"Software": None})
     return _encode_uri(file.getvalue(), "png")
-
-
-def _draw_camera(axes, camera: Camera, colour: str, hollow: bool, unit: float) -> None:
-    """A dot, and an arrow of at most half a flying height to where the middle of the picture looks."""
-    start, ahead = camera.centre[:2], find_aim_point(camera) - camera.centre[:2]
-    if camera.forward[2] > -0.1:  # it looks to the horizon
-        ahead = unit * camera.forward[:2]
-    if -camera.forward[2] < np.cos(np.radians(DOWN)):
-        ahead = ahead * min(1.0, 0.5 * unit / max(float(np.linalg.norm(ahead)), 1e-12))
-        axes.annotate("", start + ahead, start, arrowprops={"arrowstyle": "->", "color": colour, "shrinkA": 0})
-    axes.plot(*start, "o", ms=5, color=colour, mfc="w" if hollow else colour)
 
 
 def make_thumbnail(path: Path) -> str:
