@@ -48,7 +48,6 @@ from dav_gswt.images import image_files
 from dav_gswt.photos import importers, photo_files
 from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
 from dav_gswt.photos.importers.colmap import import_colmap
-from dav_gswt.photos.importers.photo_matching import PhotoFolder
 from dav_gswt.photos.importers.splat_files import RECORD, read_splat
 from dav_gswt.prior import weights
 
@@ -154,7 +153,7 @@ def write_photos(folder: Path) -> None:
 def read_model(path: Path):
     """A camera model of another program, beside its photos."""
     write_photos(path.parent)
-    return importers._read_model(path, PhotoFolder(path.parent))
+    return importers._read_model(path)
 
 
 def is_model(model) -> bool:

@@ -54,16 +54,16 @@ def test_videos_of_live_photos_belong_to_their_photos(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("mark", "program", "model"),
+    ("marks", "program", "model"),
     [
-        ("sparse__0__cameras_dot_bin", "COLMAP", "sparse/0"),
-        ("transforms_dot_json", "nerfstudio", "transforms.json"),
-        ("opensfm__reconstruction_dot_json", "OpenSfM", "opensfm/reconstruction.json"),
+        (("sparse__0__cameras_dot_bin", "sparse__0__images_dot_bin"), "COLMAP", "sparse/0"),
+        (("transforms_dot_json",), "nerfstudio", "transforms.json"),
+        (("opensfm__reconstruction_dot_json",), "OpenSfM", "opensfm/reconstruction.json"),
     ],
 )
-def test_projects_of_other_programs(tmp_path, mark, program, model):
+def test_projects_of_other_programs(tmp_path, marks, program, model):
     photos(tmp_path / "images")
-    found = recognize_input([write(tmp_path, **{mark: b"x"})])
+    found = recognize_input([write(tmp_path, **dict.fromkeys(marks, b"x"))])
     assert found.about == f"3 photos with cameras of {program}"
     assert found.entry["model"] == str(tmp_path / model)
     assert found.entry["folder"] == str(tmp_path / "images" if program != "nerfstudio" else tmp_path)
@@ -105,6 +105,7 @@ def test_a_video_and_a_splat(tmp_path):
             {
                 "transforms_dot_json": b"{}",
                 "sparse__cameras_dot_txt": b"",
+                "sparse__images_dot_txt": b"",
                 **{f"images__{i}_dot_jpg": JPEG for i in range(3)},
             },
             "COLMAP .* and nerfstudio .*; say which with --model",

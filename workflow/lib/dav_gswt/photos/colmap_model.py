@@ -97,10 +97,7 @@ def reprojection_errors(model: ColmapModel) -> Float[Array, "m"]:
 
 def count_shared_points(model: ColmapModel) -> Int[Array, "images images"]:
     """How many points each pair of images sees in common; on the diagonal, how many each sees."""
-    shape = len(model.names), len(model.points)
-    sees = csr_array((np.ones(len(model.image_of), np.int64), (model.image_of, model.point_of)), shape=shape)
-    sees.data[:] = 1  # a point may be seen twice in one image
-    return (sees @ sees.T).toarray()
+    return _count_common(model.image_of, model.point_of, len(model.names))
 
 
 def group_images(model: ColmapModel, least: int) -> tuple[Int[Array, "images"], Int[Array, "groups groups"]]:
@@ -112,14 +109,19 @@ def group_images(model: ColmapModel, least: int) -> tuple[Int[Array, "images"], 
     ties = (np.bincount(model.point_of, minlength=len(model.points)) >= 3)[model.point_of]
     group, count = np.arange(len(model.names)), -1
     while True:
-        at = group[model.image_of[ties]], model.point_of[ties]
-        sees = csr_array((np.ones(len(at[0]), np.int64), at), shape=(group.max(initial=0) + 1, len(model.points)))
-        sees.data[:] = 1
-        shared = (sees @ sees.T).toarray()
+        shared = _count_common(group[model.image_of[ties]], model.point_of[ties], int(group.max(initial=0)) + 1)
         found, merged = connected_components(shared >= least, directed=False)
         if found == count:
             return group, shared
         group, count = merged[group], found
+
+
+def _count_common(rows: Int[Array, "m"], points: Int[Array, "m"], count: int) -> Int[Array, "count count"]:
+    """How many points each pair of `count` rows has in common."""
+    shape = count, points.max(initial=0) + 1
+    sees = csr_array((np.ones(len(rows), np.int64), (rows, points)), shape=shape)
+    sees.data[:] = 1  # a point may be seen twice in one image
+    return (sees @ sees.T).toarray()
 
 
 def triangulate_model(model: ColmapModel, names: Sequence[str]) -> ColmapModel:
@@ -138,9 +140,14 @@ def triangulate_model(model: ColmapModel, names: Sequence[str]) -> ColmapModel:
     part = select_points(part, np.bincount(part.point_of, minlength=len(part.points)) >= 2)
     points, spread = intersect_rays(part)
     part = replace(part, points=points)
-    good = spread >= 1 - np.cos(np.radians(LEAST_ANGLE))
-    np.logical_and.at(good, part.point_of, reprojection_errors(part) <= WORST_ERROR)
-    return select_points(part, good)
+    return drop_wrong_points(part, spread >= 1 - np.cos(np.radians(LEAST_ANGLE)))
+
+
+def drop_wrong_points(model: ColmapModel, good: Bool[Array, "n"]) -> ColmapModel:
+    """The model of its good points, without those that are off by more than WORST_ERROR in an image."""
+    good = good.copy()
+    np.logical_and.at(good, model.point_of, reprojection_errors(model) <= WORST_ERROR)
+    return select_points(model, good)
 
 
 def intersect_rays(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:

@@ -21,7 +21,8 @@ from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import figures
 from dav_gswt.photos.colmap_model import ColmapModel
-from dav_gswt.photos.view_split import find_aim_point
+from dav_gswt.photos.ground_frame import find_visible_points
+from dav_gswt.photos.view_split import find_aim_point, measure_picture_share
 
 FINE, MOST = 40, 400  # cells in a flying height, and along the longer side of the map at most
 NEED = 3  # photos that must see a place
@@ -128,7 +129,7 @@ def find_gaps(model: ColmapModel, frame: SceneFrame, blurred: Collection[str] = 
     """The gaps of a photo set over its ground. model: in the frame's world. blurred: photos that do not count."""
     reach = REACH * frame.flying_height
     pairs = [*zip(model.names, model.cameras, strict=True)]
-    horizon = tuple(name for name, camera in pairs if measure_ground_share(camera, reach) < HORIZON)
+    horizon = tuple(name for name, camera in pairs if _shows_horizon(camera, reach))
     cameras = [camera for name, camera in pairs if name not in {*blurred, *horizon}]
     surface = build_surface(model, frame, cameras or [*model.cameras])
     views = measure_cells(cameras, surface, reach)
@@ -148,12 +149,10 @@ def find_gaps(model: ColmapModel, frame: SceneFrame, blurred: Collection[str] = 
     )
 
 
-def measure_ground_share(camera: Camera, reach: float) -> float:
-    """The share of a picture that shows ground (z = 0) nearer than `reach`."""
-    origins, rays = camera.resized(16, 12).rays()
-    with np.errstate(divide="ignore"):
-        distance = origins[..., 2] / -rays[..., 2] * np.linalg.norm(rays, axis=-1)
-    return float(((distance > 0) & (distance < reach)).mean())
+def _shows_horizon(camera: Camera, reach: float) -> bool:
+    """Whether a picture shows more of the horizon than of the ground nearer than `reach`."""
+    x, y, _ = camera.centre.tolist()
+    return measure_picture_share(camera, (x - reach, y - reach, x + reach, y + reach)) < HORIZON
 
 
 def build_surface(model: ColmapModel, frame: SceneFrame, cameras: Sequence[Camera]) -> Surface:
@@ -204,9 +203,7 @@ def find_seen_cells(camera: Camera, surface: Surface, reach: float) -> Int[Array
     lies behind it if it rises above the line by more than half a cell, since heights are not exact.
     """
     points = surface.centres
-    at, depth = camera.project(points)
-    inside = (depth > 0) & (at > 0).all(1) & (at < [camera.width, camera.height]).all(1)
-    rows = np.flatnonzero(inside & (np.linalg.norm(points - camera.centre, axis=1) < reach))
+    rows = np.flatnonzero(find_visible_points(camera, points, reach))
     start, way = points[rows], camera.centre - points[rows]
     level = np.maximum(np.linalg.norm(way[:, :2], axis=1), 1e-9)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -19,14 +19,15 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import WORST_ERROR, ColmapModel, reprojection_errors, select_points
+from dav_gswt.photos.colmap_model import drop_wrong_points, reprojection_errors
 from dav_gswt.photos.importers.checks import LARGEST_JSON, ImportedModel, check_size
-from dav_gswt.photos.importers.colmap import find_colmap_folder, import_colmap
+from dav_gswt.photos.importers.colmap import import_colmap
 from dav_gswt.photos.importers.lens_models import QUARTER, camera_key, require_invertible
 from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.opensfm import import_opensfm
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder, match_photos_to_images
 from dav_gswt.photos.photo_listing import Source
+from dav_gswt.photos.recognition import find_colmap_folder
 from dav_gswt.photos.sfm.gps import GpsPositions
 from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS
 from dav_gswt.photos.sfm.registration import NEIGHBOURS, Registration, SfmOptions, replace_lenses
@@ -47,7 +48,7 @@ def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Regis
     Raises: InputError: not a model, damaged, one that is not read, or fewer than three photos have a camera in it.
     """
     path, photos = Path(path), PhotoFolder(folder)
-    given = _read_model(path, photos)
+    given = _read_model(path)
     placed, left_out = match_photos_to_images(given, photos, path)
     if len(placed) < LEAST_PHOTOS:
         raise InputError(
@@ -62,7 +63,7 @@ def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Regis
     model, lenses = replace_lenses(known, {p.key: (p.lens.width, p.lens.height) for p in placed}, options.side)
     for name, camera, lens in zip(model.names, model.cameras, lenses, strict=True):
         require_invertible(lens, camera, f"{path}: {sources[name].name}")
-    model = _drop_wrong_points(model)
+    model = drop_wrong_points(model, np.bincount(model.point_of, minlength=len(model.points)) > 0)
     if not len(model.points):
         raise InputError(
             f"{path}: under its cameras the photos share no point; either they are not those that the model was made "
@@ -80,7 +81,7 @@ def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Regis
     )
 
 
-def _read_model(path: Path, photos: PhotoFolder) -> ImportedModel:
+def _read_model(path: Path) -> ImportedModel:
     """What a file says, whichever kind it is of."""
     if path.is_dir():
         if model := find_colmap_folder(path):
@@ -92,7 +93,7 @@ def _read_model(path: Path, photos: PhotoFolder) -> ImportedModel:
     check_size(path, LARGEST_JSON)
     values = read_json(path)
     if isinstance(values, dict) and isinstance(values.get("frames"), list):
-        return import_nerfstudio(path, values, photos.stored_size)
+        return import_nerfstudio(path, values)
     if isinstance(values, list) and values and isinstance(values[0], dict) and "shots" in values[0]:
         return import_opensfm(path, values)
     raise InputError(
@@ -143,10 +144,3 @@ def _find_points(
         found = triangulate_features(known, Path(folder), NEIGHBOURS, options)
     found.transform(pycolmap.Sim3d(1.0, pycolmap.Rotation3d(), middle))
     return found
-
-
-def _drop_wrong_points(model: ColmapModel) -> ColmapModel:
-    """The model without points off by more than WORST_ERROR in an image, as rays beyond a lens's reach give."""
-    good = np.bincount(model.point_of, minlength=len(model.points)) > 0
-    np.logical_and.at(good, model.point_of, reprojection_errors(model) <= WORST_ERROR)
-    return select_points(model, good)

@@ -161,17 +161,10 @@ def select_photos(listing: PhotoListing) -> dict[str, Path]:
 
 def require_photos(listing: PhotoListing, names: Sequence[str], unreadable: Mapping[str, str]) -> None:
     """Raises: InputError: fewer photos than structure from motion needs, with what became of the others."""
-    if len(names) >= LEAST_PHOTOS:
-        return
-    if unreadable:
-        raise InputError(f"{next(iter(unreadable.values()))} (at least {LEAST_PHOTOS} photos are needed, better 20)")
-    if names:
-        only = " and ".join(names)
-        raise InputError(
-            f"{listing.where}: only {only}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20"
-        )
-    hint = f" ({listing.notes[0]})" if listing.notes else ""
-    raise InputError(f"{listing.where}: no photos in this folder{hint}; put .jpg, .png, .tif or .heic files into it")
+    if len(names) < LEAST_PHOTOS:
+        had = f"only {' and '.join(names)}" if names else "no photos"
+        reasons = "".join(f" ({reason})" for reason in [*unreadable.values(), *listing.notes][:1])
+        raise InputError(f"{listing.where}: {had}{reasons}; at least {LEAST_PHOTOS} photos are needed, better 20")
 
 
 def _describe_photos(paths: Mapping[str, Path], options: SfmOptions, unreadable: dict[str, str]) -> list[SfmPhoto]:
