@@ -185,19 +185,9 @@ def _open(video: Path | str) -> Iterator[InputContainer]:
 def _decode(video: Path | str, threads: int, report: bool = False) -> Iterator[tuple[int, av.VideoFrame]]:
     """The frames of a video with their numbers, up to its end or to where it is damaged. report: say how far it is.
 
-    The decoder stops at the first fault, and does not invent what is lost. If it then gives nothing, the fault is one
-    that cameras write, and it is told to be lenient.
+    The decoder invents what is lost, and says of which frames; of some faults that cameras write it only warns.
     Raises: InputError: it cannot be read, is too large or too long.
     """
-    for faults in ("explode", "careful"):
-        number = -1
-        for number, frame in enumerate(_decode_until(faults, video, threads, report)):
-            yield number, frame
-        if number >= 0:
-            break
-
-
-def _decode_until(faults: str, video: Path | str, threads: int, report: bool) -> Iterator[av.VideoFrame]:
     with _open(video) as container:
         streams = [s for s in container.streams.video if not s.disposition & Disposition.attached_pic]
         if not streams:
@@ -207,15 +197,19 @@ def _decode_until(faults: str, video: Path | str, threads: int, report: bool) ->
             raise InputError(f"{video}: {stream.width} x {stream.height} pixels are too many")
         context = stream.codec_context
         context.thread_type, context.thread_count = "FRAME", threads
-        context.options = {"err_detect": faults, "max_pixels": str(image_files.MAX_PIXELS)}
+        context.options = {"err_detect": "careful", "max_pixels": str(image_files.MAX_PIXELS)}
         _require_short(video, (container.duration or 0) / av.time_base)
         time, count = 0.0, 0
         with progress(range(stream.frames if report else 0), "read frames") as bar:
             try:
                 for frame in container.decode(stream):
+                    if frame.is_corrupt and count:
+                        break
+                    if frame.is_corrupt:  # before the first whole one
+                        continue
                     time, count = frame.time or time, count + 1
                     _require_short(video, time)
-                    yield frame
+                    yield count - 1, frame
                     bar.update(int(report))
                 whole = count >= WHOLE * stream.frames
             except (av.error.FFmpegError, OSError):
