@@ -38,7 +38,7 @@ HORIZON = 0.5  # share of a picture that must show ground within REACH
 REASONS = ("seen by no photo", "seen by too few photos", "seen from one side only", "seen too coarsely")
 COLOURS = ("#882255", "#d55e00", "#e69f00", "#56b4e9")
 WELL, BEYOND = -1, -2  # in place of a reason: seen well, not asked for
-GOOD, BACK, MARK = "#b8d8b8", "#ffffff", "#d55e00"
+GOOD, BACK = "#b8d8b8", "#ffffff"
 DOWN = 5.0  # degrees off straight down, within which a camera has no arrow
 LABELLED, LISTED = 20, 10  # gaps that have their number on the map, that are told of one by one
 
@@ -341,16 +341,11 @@ def _format_place(at: Float[Array, "3"], frame: SceneFrame) -> str:
 
 
 def draw_gaps(
-    gaps: Gaps,
-    model: ColmapModel,
-    frame: SceneFrame,
-    unused: Collection[str] = (),
-    tests: Collection[str] = (),
-    weak: Collection[str] = (),
+    gaps: Gaps, model: ColmapModel, frame: SceneFrame, unused: Collection[str] = (), tests: Collection[str] = ()
 ):
     """The map: ground by what is wrong with it, the exemplar, and where the photos were taken and look.
 
-    unused: photos that do not count. tests: that only test. weak: that are weakly placed, and named.
+    unused: photos that do not count. tests: that only test.
     """
     from matplotlib.colors import BoundaryNorm, ListedColormap  # not above: it loads for a second
     from matplotlib.patches import Rectangle
@@ -388,10 +383,8 @@ def draw_gaps(
         if len(at):
             marks += axes.plot(*at.T, color="k", ls="", ms=4, **mark)
             names.append(name)
-    for name, camera in zip(model.names, model.cameras, strict=True):
+    for camera in model.cameras:
         _draw_direction(axes, camera, frame.flying_height)
-        if name in weak:
-            axes.annotate(name, tuple(camera.centre[:2]), (4, 4), textcoords="offset points", fontsize=7, color=MARK)
     for number, gap in enumerate(gaps.gaps[:LABELLED], 1):
         outline = {"boxstyle": "circle,pad=0.25", "fc": "w", "ec": "k", "lw": 0.8}
         axes.text(gap.middle[0], gap.middle[1], str(number), ha="center", va="center", fontsize=8, bbox=outline)

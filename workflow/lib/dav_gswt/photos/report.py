@@ -11,20 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
-from numpy import ndarray as Array
 
 from dav_gswt.files import atomic_file
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import figures, image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos import gaps, view_split
-from dav_gswt.photos.colmap_model import ColmapModel, count_shared_points, read_colmap_model, reprojection_errors
+from dav_gswt.photos import gaps
+from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model, reprojection_errors
 from dav_gswt.photos.sharpness import find_blurred
 from dav_gswt.templates import render_template
 
-LEAST_POINTS, LEAST_SHARE = 100, 0.2  # points that hold a photo: as a number, and as a share of the set's median
-WORST_ERROR = 2.0  # pixels: a photo's mean error, above which its place is doubtful or its lens is another
 LEAST_SIDE = 0.5  # flying heights: side of an exemplar with room for tiles that differ
 THUMBNAIL = 200  # pixels of the longer side
 MASKED = np.array([0.85, 0.1, 0.5], np.float32)
@@ -34,14 +30,12 @@ MASKED = np.array([0.85, 0.1, 0.5], np.float32)
 class ReportFacts:
     """A scene's photos.
 
-    tests: names of those that only test. weak: reasons to doubt the place of others, by name. error: mean reprojection
-    error in pixels; None where it is unknown.
+    tests: names of those that only test. error: mean reprojection error in pixels; None where it is unknown.
     """
 
     frame: SceneFrame
     model: ColmapModel
     tests: frozenset[str]
-    weak: dict[str, list[str]]
     error: float | None
 
 
@@ -67,7 +61,6 @@ def write_report(folder: Path | str, template: Path | str, scene: str, out: Path
         "left_out": frame.left_out,
         "photos": pictures,
         "tests": found.tests,
-        "weak": found.weak,
     }
     with atomic_file(out) as part:
         part.write_text(render_template(template, values), encoding="utf-8")
@@ -79,7 +72,7 @@ def collect_facts(folder: Path | str) -> ReportFacts:
     frame, model = read_scene_frame(folder / "ground.json"), read_colmap_model(folder / "sparse")
     tests, off = frozenset(frame.test or ()), reprojection_errors(model)
     error = float(off.mean()) if frame.reprojection_error is None and len(off) else frame.reprojection_error
-    return ReportFacts(frame, model, tests, find_weaknesses(model, off, tests), error)
+    return ReportFacts(frame, model, tests, error)
 
 
 def find_missed_ground(found: ReportFacts, images: Path) -> tuple[gaps.Gaps | None, list[str]]:
@@ -88,27 +81,6 @@ def find_missed_ground(found: ReportFacts, images: Path) -> tuple[gaps.Gaps | No
     blurred = find_blurred([images / name for name in names], threads=1)
     blurred = [name for name, is_blurred in zip(names, blurred.tolist(), strict=True) if is_blurred]
     return gaps.find_gaps(found.model, found.frame, blurred) if len(found.model.points) else None, blurred
-
-
-def find_weaknesses(model: ColmapModel, off: Float[Array, "m"], tests: frozenset[str]) -> dict[str, list[str]]:
-    """What is weak about photos that do not only test, in words. off: reprojection errors of the observations."""
-    shared = count_shared_points(model)
-    points = np.diag(shared).copy()
-    np.fill_diagonal(shared, 0)
-    used = [i for i, name in enumerate(model.names) if name not in tests]
-    usual = float(np.median(points[used])) if used else 0.0
-    found = {}
-    for i in used:
-        own, said = off[model.image_of == i], []
-        if points[i] < max(LEAST_POINTS, LEAST_SHARE * usual):
-            said.append(f"sees only {points[i]} points; the median is {usual:.0f}")
-        if len(own) and not own.mean() <= WORST_ERROR:
-            said.append(f"its points are {own.mean():.1f} px off on average")
-        if shared[i].max() < view_split.LINK:
-            said.append(f"shares at most {shared[i].max()} points with any other photo")
-        if said:
-            found[model.names[i]] = said
-    return found
 
 
 def _summarize(found: ReportFacts) -> str:
@@ -132,9 +104,6 @@ def list_advice(found: ReportFacts) -> list[str]:
             f"{len(frame.left_out)} of {frame.images} photos were left out for the reasons below. Photos taken between "
             "them and the others can help."
         )
-    if weak := list(found.weak):
-        names = ", ".join(weak[:5]) + (f" and {len(weak) - 5} more" if len(weak) > 5 else "")
-        said.append(f"Weakly placed photos: {names}. If the field looks blurred there, leave them out.")
     side = frame.exemplar.side / frame.flying_height
     if side < LEAST_SIDE:
         said.append(
@@ -159,7 +128,7 @@ def _list_facts(found: ReportFacts) -> list[tuple[str, str]]:
 def draw_map(found: ReportFacts, missed: gaps.Gaps, blurred: list[str]) -> str:
     """The map of the ground and of the cameras, as a data URI."""
     unused = {*blurred, *missed.horizon} - found.tests
-    figure, file = gaps.draw_gaps(missed, found.model, found.frame, unused, found.tests, found.weak), io.BytesIO()
+    figure, file = gaps.draw_gaps(missed, found.model, found.frame, unused, found.tests), io.BytesIO()
     figure.savefig(file, format="png", metadata={"Software": None})
     return _encode_uri(file.getvalue(), "png")
 
