@@ -145,17 +145,6 @@ def is_header(found) -> bool:
     return right and (focal is None or 0 < focal < 100 * max(width, height))
 
 
-def write_photos(folder: Path) -> None:
-    for name in imported_models.SCENE.names:
-        image_files.write_png(folder / name, np.zeros((imported_models.HEIGHT, imported_models.WIDTH, 3)))
-
-
-def read_model(path: Path):
-    """A camera model of another program, beside its photos."""
-    write_photos(path.parent)
-    return importers._read_model(path)
-
-
 def is_model(model) -> bool:
     for shot in model.images:
         right = ".." not in shot.name.split("/") and np.abs(shot.rotation @ shot.rotation.T - np.eye(3)).max() < 1e-6
@@ -215,13 +204,13 @@ READERS = [
     Reader(
         "nerfstudio",
         lambda folder: write_json(folder / "model.json", imported_models.transforms()),
-        read_model,
+        importers._read_model,
         is_model,
     ),
     Reader(
         "OpenSfM",
         lambda folder: write_json(folder / "model.json", imported_models.reconstruction()),
-        read_model,
+        importers._read_model,
         is_model,
     ),
     Reader(

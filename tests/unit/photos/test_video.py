@@ -152,13 +152,6 @@ def test_a_video_of_a_phone_held_upright_gives_upright_frames(filmed, tmp_path):
         assert np.abs(after - np.rot90(before, -1)).mean() < 3  # a quarter to the right; JPEG's error differs
 
 
-def test_ten_bits_give_the_colours_of_eight(filmed, tmp_path):
-    eight = write_frames(filmed(name="8.mp4"), tmp_path / "8")
-    ten = write_frames(filmed(name="10.mp4", codec="libx265", pixels="yuv420p10le"), tmp_path / "10")
-    a, b = (np.asarray(Image.open(paths[0])).mean() for paths in (eight, ten))
-    assert len(ten) == len(eight) and a == pytest.approx(b, abs=2)
-
-
 def test_hdr_is_shown_as_bright_as_it_was(filmed, tmp_path):
     """HLG's middle is .598 of sRGB's white, and not .5."""
     plain = write_frames(filmed(name="8.mp4"), tmp_path / "8")

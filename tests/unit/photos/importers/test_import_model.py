@@ -111,19 +111,6 @@ def test_photos_may_be_smaller_than_the_models_and_pictures_smaller_still(tmp_pa
     )
 
 
-def test_photos_and_images_without_each_other_are_left_out_with_the_reason(tmp_path):
-    shoot(tmp_path / "photos")
-    (tmp_path / "photos" / "001.png").unlink()
-    (tmp_path / "photos" / "007.png").rename(tmp_path / "photos" / "other.png")
-    write_colmap(tmp_path / "m", sees=True)
-    found = import_model(tmp_path / "m", tmp_path / "photos", OPTIONS)
-    assert found.model.names == tuple(n for n in SCENE.names if n not in ("001.png", "007.png"))
-    assert set(dict(found.left_out)) == {"001.png", "007.png", "other.png"}
-    for i, camera in enumerate(found.model.cameras):
-        at = SCENE.names.index(found.model.names[i])
-        assert camera.translation == pytest.approx(SCENE.translations[at], abs=1e-9)
-
-
 def test_names_are_found_by_path_then_by_stem(tmp_path):
     files = ["a/1.jpg", "b/1.jpg", "b/2.png", "c/3.v2.jpg", "c/.hidden/4.jpg"]
     for name in files:

@@ -163,8 +163,9 @@ def require_photos(listing: PhotoListing, names: Sequence[str], unreadable: Mapp
     """Raises: InputError: fewer photos than structure from motion needs, with what became of the others."""
     if len(names) < LEAST_PHOTOS:
         had = f"only {' and '.join(names)}" if names else "no photos"
-        reasons = "".join(f" ({reason})" for reason in [*unreadable.values(), *listing.notes][:1])
-        raise InputError(f"{listing.where}: {had}{reasons}; at least {LEAST_PHOTOS} photos are needed, better 20")
+        notes = "".join(f" ({note})" for note in listing.notes)
+        problem = next(iter(unreadable.values()), f"{listing.where}: {had}{notes}")
+        raise InputError(f"{problem} (at least {LEAST_PHOTOS} overlapping photos are needed, better 20)")
 
 
 def _describe_photos(paths: Mapping[str, Path], options: SfmOptions, unreadable: dict[str, str]) -> list[SfmPhoto]:
