@@ -8,6 +8,7 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import av
@@ -16,9 +17,10 @@ import numpy as np
 from av.container import InputContainer
 from av.stream import Disposition
 from av.video.reformatter import ColorTrc
-from jaxtyping import Float, Float32, Int
+from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 from PIL import Image
+from scipy import fft
 from skimage.registration import phase_cross_correlation
 
 from dav_gswt.errors import InputError
@@ -26,11 +28,14 @@ from dav_gswt.files import atomic_folder
 from dav_gswt.images import image_files
 from dav_gswt.images.hdr import Curve, convert_hdr
 from dav_gswt.logs import progress
-from dav_gswt.photos.sharpness import find_threshold, measure_detail
+from dav_gswt.photos.sharpness import find_threshold
 
 _log = logging.getLogger(__name__)
 
 SIDE = 640  # pixels of the longer side at which frames are measured
+# Cycles a pixel there: waves of 4 to 10 pixels of a photo of 960, and of 20 to 60.
+FINE, COARSE = (0.15, 0.375), (0.025, 0.075)
+SECTORS = 8  # directions of waves
 SHRUNK = 4  # times coarser is the picture whose motion is measured
 MOST_A_SECOND = 15  # frames that are measured: more are hardly farther along
 MOST_FRAMES = 200
@@ -38,6 +43,7 @@ STEP = 0.15  # of a picture that the view moves on between chosen frames: five i
 LOOSE = 0.4  # a step between chosen frames above which they may not hang together
 LEAST_MOTION = 0.5  # pictures in all: less is a camera that stands still
 LEAST_FRAMES = 3
+BLUR = 0.25  # a frame with less than this share of the usual fine detail is blurred
 HOP = 0.1  # of a picture that the view moves on until frames are compared with a new one
 LONGEST = 3600.0  # seconds
 HDR: dict[int, Curve] = {ColorTrc.ARIB_STD_B67: "hlg", ColorTrc.SMPTE2084: "pq"}
@@ -94,6 +100,35 @@ def measure_frames(video: Path | str, threads: int = 1) -> FrameMeasures:
     return FrameMeasures(np.array(number), np.array(time), np.array(detail), np.array(moved))
 
 
+def measure_detail(grey: Float32[Array, "h w"]) -> float:
+    """The power of fine waves over that of coarse ones, in the direction that has least.
+
+    Motion blurs along one direction, a lens out of focus along all. Frames that show much the same are told apart more
+    clearly than by `sharpness.measure_detail`, which depends less on what is shown.
+    """
+    fine, coarse, sector = _split_waves(*grey.shape)
+    faded = (grey - grey.mean()) * _make_window(*grey.shape)
+    power = np.abs(fft.rfft2(faded)) ** 2
+    known = np.bincount(sector, power[fine], SECTORS) / np.maximum(np.bincount(sector, minlength=SECTORS), 1)
+    usual = float(power[coarse].mean()) if coarse.any() else 0.0
+    return float(known.min()) / usual if usual > 0 else 0.0
+
+
+@lru_cache(maxsize=1)
+def _split_waves(height: int, width: int) -> tuple[Bool[Array, "h k"], Bool[Array, "h k"], Int[Array, "_"]]:
+    """Which waves of a spectrum are fine, which are coarse, and in which of SECTORS directions each fine one runs."""
+    y, x = fft.fftfreq(height)[:, None], fft.rfftfreq(width)[None, :]
+    wave, angle = np.hypot(x, y), np.arctan2(y, x + 0 * y) % np.pi
+    fine, coarse = ((wave >= low) & (wave < high) for low, high in (FINE, COARSE))
+    return fine, coarse, np.minimum((angle[fine] * SECTORS / np.pi).astype(int), SECTORS - 1)
+
+
+@lru_cache(maxsize=2)
+def _make_window(height: int, width: int) -> Float32[Array, "h w"]:
+    """What lets a picture fade out towards its border."""
+    return np.outer(np.hanning(height), np.hanning(width)).astype(np.float32)
+
+
 class MotionMeter:
     """Measures how far the picture of a video has moved, frame by frame.
 
@@ -107,8 +142,7 @@ class MotionMeter:
 
     def follow(self, grey: Float32[Array, "h w"]) -> float:
         """The way up to the next frame, in pictures."""
-        height, width = grey.shape
-        faded = (grey - grey.mean()) * np.outer(np.hanning(height), np.hanning(width)).astype(np.float32)
+        faded = (grey - grey.mean()) * _make_window(*grey.shape)
         if not faded.any():  # a black frame
             return self._way
         if self._behind is None:
@@ -131,7 +165,7 @@ def choose_frames(measures: FrameMeasures, most: int = MOST_FRAMES) -> Int[Array
     """The sharpest frame of each stretch of the way, blurred ones left out; at most `most` stretches."""
     step = max(STEP, float(measures.moved.max()) / most)
     stretch = np.minimum((measures.moved / step).astype(int), most - 1)
-    sharp = measures.detail >= find_threshold(measures.detail)
+    sharp = measures.detail >= find_threshold(measures.detail, BLUR)
     chosen = []
     for number in np.unique(stretch[sharp]):
         among = np.flatnonzero(sharp & (stretch == number))
@@ -149,7 +183,7 @@ def _develop(frame: av.VideoFrame, threads: int) -> Image.Image:
 
 
 def _report_choice(video: Path | str, measures: FrameMeasures, chosen: Int[Array, "k"], most: int) -> None:
-    blurred = measures.detail < find_threshold(measures.detail)
+    blurred = measures.detail < find_threshold(measures.detail, BLUR)
     _log.info(
         "%s: %d frames chosen of %d that were measured, %d of which are blurred",
         *(video, len(chosen), len(blurred), blurred.sum()),
