@@ -10,7 +10,7 @@ from fixtures.frames import scene_frame
 
 from dav_gswt.geometry.scene_frame import FocalLength, LeftOutPhoto, SfmSign, SfmVerdict, Square
 from dav_gswt.photos.photo_set import write_photo_folder
-from dav_gswt.photos.report import collect_facts, list_advice, write_report
+from dav_gswt.photos.report import list_advice, write_report
 
 FRAME = scene_frame(
     kind="photos",
@@ -63,11 +63,11 @@ def test_the_page_needs_nothing_but_itself_and_escapes_names(made, root, tmp_pat
         assert said in text
 
 
-def test_advice_names_what_is_weak(made):
-    said = " ".join(list_advice(collect_facts(made())))
+def test_advice_names_what_is_weak():
+    said = " ".join(list_advice(FRAME))
     assert "doubtful: it is odd" in said and "1 of 14 photos were left out" in said
     small = replace(FRAME, exemplar=Square(0.0, 0.0, 0.4))
-    assert "only 0.40 flying heights wide" in list_advice(collect_facts(made(small)))[-1]
+    assert "only 0.40 flying heights wide" in list_advice(small)[-1]
 
 
 def test_the_page_says_which_ground_the_photos_miss(flown, root, tmp_path):
@@ -80,11 +80,3 @@ def test_the_page_says_which_ground_the_photos_miss(flown, root, tmp_path):
         text = (tmp_path / "a.html").read_text()
         assert ("Nothing is missing" in text, "Blurred: 001.png, 002.png" in text) == (not blurred, bool(blurred))
         assert ("seen by too few photos, at" in text.replace("square flying heights ", "")) == bool(blurred)
-
-
-def test_photos_that_only_test_do_not_count(made, flown):
-    own = flown.image_of < 8
-    sparse = replace(flown, **{k: getattr(flown, k)[own] for k in ("point_of", "image_of", "pixels")})
-    frame = replace(FRAME, kind="synthetic", test=flown.names[8:], left_out=(), focal_ratio=None)
-    found = collect_facts(made(frame, sparse))
-    assert found.tests == set(flown.names[8:])

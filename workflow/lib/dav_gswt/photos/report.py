@@ -7,7 +7,6 @@ bytes.
 
 import base64
 import io
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -26,76 +25,55 @@ THUMBNAIL = 200  # pixels of the longer side
 MASKED = np.array([0.85, 0.1, 0.5], np.float32)
 
 
-@dataclass(frozen=True)
-class ReportFacts:
-    """A scene's photos.
-
-    tests: names of those that only test. error: mean reprojection error in pixels; None where it is unknown.
-    """
-
-    frame: SceneFrame
-    model: ColmapModel
-    tests: frozenset[str]
-    error: float | None
-
-
 def write_report(folder: Path | str, template: Path | str, scene: str, out: Path | str) -> None:
     """Write the report on a photos/ folder (images/, sparse/, ground.json) to `out`.
 
     Raises: InputError: the folder is not readable, or the template uses a name that has no value.
     """
-    found = collect_facts(folder)
-    frame, names = found.frame, sorted(found.model.names, key=lambda name: name in found.tests)
-    pictures = {name: make_thumbnail(Path(folder) / "images" / name) for name in progress(names, "shrink photos")}
-    missed, blurred = find_missed_ground(found, Path(folder) / "images")
+    images = Path(folder) / "images"
+    frame, model = read_scene_frame(Path(folder) / "ground.json"), read_colmap_model(Path(folder) / "sparse")
+    tests = frame.test or ()
+    names = sorted(model.names, key=lambda name: name in tests)
+    pictures = {name: make_thumbnail(images / name) for name in progress(names, "shrink photos")}
+    missed, blurred = find_missed_ground(frame, model, images)
     values = {
         "scene": scene,
-        "summary": _summarize(found),
-        "advice": list_advice(found),
+        "summary": _summarize(frame, model),
+        "advice": list_advice(frame),
         "gaps": gaps.describe_ground(missed, frame) if missed else None,
-        "gaps_map": draw_map(found, missed, blurred) if missed else None,
+        "gaps_map": draw_map(frame, model, missed, blurred) if missed else None,
         "blurred": blurred,
         "horizon": missed.horizon if missed else (),
-        "facts": _list_facts(found),
+        "facts": _list_facts(frame, model),
         "verdict": frame.verdict,
         "left_out": frame.left_out,
         "photos": pictures,
-        "tests": found.tests,
+        "tests": tests,
     }
     with atomic_file(out) as part:
         part.write_text(render_template(template, values), encoding="utf-8")
 
 
-def collect_facts(folder: Path | str) -> ReportFacts:
-    """The facts of a photos/ folder. Raises: InputError: what it holds is not readable."""
-    folder = Path(folder)
-    frame, model = read_scene_frame(folder / "ground.json"), read_colmap_model(folder / "sparse")
-    tests, off = frozenset(frame.test or ()), reprojection_errors(model)
-    error = float(off.mean()) if frame.reprojection_error is None and len(off) else frame.reprojection_error
-    return ReportFacts(frame, model, tests, error)
-
-
-def find_missed_ground(found: ReportFacts, images: Path) -> tuple[gaps.Gaps | None, list[str]]:
+def find_missed_ground(frame: SceneFrame, model: ColmapModel, images: Path) -> tuple[gaps.Gaps | None, list[str]]:
     """The ground that all placed photos miss, None where no points are known; and the names of blurred photos."""
-    names = found.model.names
-    blurred = find_blurred([images / name for name in names], threads=1)
-    blurred = [name for name, is_blurred in zip(names, blurred.tolist(), strict=True) if is_blurred]
-    return gaps.find_gaps(found.model, found.frame, blurred) if len(found.model.points) else None, blurred
+    flags = find_blurred([images / name for name in model.names], threads=1)
+    blurred = [name for name, is_blurred in zip(model.names, flags.tolist(), strict=True) if is_blurred]
+    return gaps.find_gaps(model, frame, blurred) if len(model.points) else None, blurred
 
 
-def _summarize(found: ReportFacts) -> str:
-    frame, side = found.frame, f"{found.frame.exemplar.side:.2f} {found.frame.unit}s"
+def _summarize(frame: SceneFrame, model: ColmapModel) -> str:
+    side = f"{frame.exemplar.side:.2f} {frame.unit}s"
     if frame.kind == "synthetic":
-        tests, photos = len(found.tests), len(found.model.names)
+        tests, photos = len(frame.test or ()), len(model.names)
         first = f"{photos - tests} photos were rendered, and {tests} for testing; their cameras are exact."
     else:
         first = f"{frame.registered} of {frame.images} photos were placed."
     return f"{first} Tiles are cut from a square of ground that is {side} wide, the exemplar (dashed on the map)."
 
 
-def list_advice(found: ReportFacts) -> list[str]:
+def list_advice(frame: SceneFrame) -> list[str]:
     """What is weak about the set, and what to do about it."""
-    frame, said = found.frame, []
+    said = []
     if frame.verdict and frame.verdict.grade != "good":
         reasons = "; ".join(sign.reason for sign in frame.verdict.objections)
         said.append(f"The cameras are {frame.verdict.grade}: {reasons}.")
@@ -112,11 +90,13 @@ def list_advice(found: ReportFacts) -> list[str]:
     return said
 
 
-def _list_facts(found: ReportFacts) -> list[tuple[str, str]]:
+def _list_facts(frame: SceneFrame, model: ColmapModel) -> list[tuple[str, str]]:
     """Numbers that help to judge the set: names and values."""
-    frame, facts = found.frame, []
-    if found.error is not None:
-        facts.append(("Reprojection error", f"{found.error:.2f} px (good: below 1)"))
+    facts, error = [], frame.reprojection_error
+    if error is None and len(model.pixels):
+        error = float(reprojection_errors(model).mean())
+    if error is not None:
+        facts.append(("Reprojection error", f"{error:.2f} px (good: below 1)"))
     if frame.focal:
         ratio = f"{frame.focal_ratio:.3f} times EXIF's; " if frame.focal_ratio else ""
         facts.append(("Focal length", ratio + frame.focal.decision))
@@ -125,10 +105,10 @@ def _list_facts(found: ReportFacts) -> list[tuple[str, str]]:
     return facts
 
 
-def draw_map(found: ReportFacts, missed: gaps.Gaps, blurred: list[str]) -> str:
+def draw_map(frame: SceneFrame, model: ColmapModel, missed: gaps.Gaps, blurred: list[str]) -> str:
     """The map of the ground and of the cameras, as a data URI."""
-    unused = {*blurred, *missed.horizon} - found.tests
-    figure, file = gaps.draw_gaps(missed, found.model, found.frame, unused, found.tests), io.BytesIO()
+    tests, file = frame.test or (), io.BytesIO()
+    figure = gaps.draw_gaps(missed, model, frame, {*blurred, *missed.horizon} - {*tests}, tests)
     figure.savefig(file, format="png", metadata={"Software": None})
     return _encode_uri(file.getvalue(), "png")
 

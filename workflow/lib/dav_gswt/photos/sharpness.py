@@ -1,4 +1,4 @@
-"""Which photos of a set, or frames of a video, are blurred: those with much less fine detail than the sharp ones."""
+"""Which photos of a set are blurred: those with much less fine detail than the set's sharp ones."""
 
 from collections.abc import Sequence
 from functools import partial
