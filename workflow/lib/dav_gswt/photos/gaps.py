@@ -267,16 +267,15 @@ def plan_photos(gaps: Gaps, frame: SceneFrame, lens: Camera) -> list[Camera]:
     knots = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True))), -1).reshape(-1, 2)
     window = np.maximum(1, np.round(size[::-1] / surface.cell).astype(int))
     highest = replace(surface, heights=ndimage.maximum_filter(surface.heights, tuple(window)))
-    grounds, cameras, sees = highest.find_heights(knots * step), [], np.zeros((len(knots), len(missed)), bool)
-    for knot, ground, row in zip(knots * step, grounds, sees, strict=True):
+    cameras = []
+    for knot, ground in zip(knots * step, highest.find_heights(knots * step), strict=True):
         rotation, translation = look_at([*knot, ground + height], [*knot, ground])
         cameras.append(replace(lens, rotation=rotation, translation=translation))
-        near = np.flatnonzero((np.abs(at - knot) < size).all(1))
-        seen = find_seen_cells(cameras[-1], surface, REACH * height) if len(near) else []
-        row[near] = np.isin(missed[near], seen)
+    sees = np.stack([np.isin(missed, find_seen_cells(camera, surface, REACH * height)) for camera in cameras])
     chosen, left = [], np.full(len(missed), NEED)
     while True:
-        gain = np.where(np.isin(np.arange(len(knots)), chosen), 0, np.count_nonzero(sees & (left > 0), axis=1))
+        gain = np.count_nonzero(sees & (left > 0), axis=1)
+        gain[chosen] = 0
         if not gain.any():
             return [cameras[i] for i in sorted(chosen)]
         chosen.append(int(gain.argmax()))
@@ -374,14 +373,14 @@ def draw_gaps(
     marks = [axes.plot([], [], "s", color=colour, ms=9)[0] for colour in (GOOD, *COLOURS)]
     names = ["seen well", *REASONS]
     used = {*model.names} - {*unused, *tests}
-    for name, mark, photos in (
-        ("photos", {"marker": "."}, used),
-        ("photos that do not count", {"marker": "x"}, unused),
-        ("test photos", {"marker": "o", "mfc": "w"}, tests),
+    for name, mark, face, photos in (
+        ("photos", ".", "k", used),
+        ("photos that do not count", "x", "k", unused),
+        ("test photos", "o", "w", tests),
     ):
         at = places[[photo in photos for photo in model.names]]
         if len(at):
-            marks += axes.plot(*at.T, color="k", ls="", ms=4, **mark)
+            marks += axes.plot(at[:, 0], at[:, 1], color="k", ls="", ms=4, marker=mark, mfc=face)
             names.append(name)
     for camera in model.cameras:
         _draw_direction(axes, camera, frame.flying_height)

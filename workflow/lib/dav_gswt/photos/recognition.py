@@ -11,7 +11,7 @@ from dav_gswt.images.file_kinds import Kind, advise_conversion, detect_kind
 from dav_gswt.photos.photo_listing import PICTURES, PhotoListing, list_photos
 
 LEAST_PHOTOS = 3
-SPLATS: tuple[Kind, ...] = ("ply", "spz", "splat", "ksplat", "sog")
+SPLATS: tuple[Kind, ...] = ("ply", "spz", "spz4", "splat", "ksplat", "sog")
 COLMAP_PARTS = ("cameras", "images")
 OPENSFM_FILES = ("opensfm/reconstruction.json", "reconstruction.json")
 SPLAT_PROPERTY = re.compile(rb"property (float|float32|double|float64) f_dc_0\b")  # a .ply that holds Gaussians
