@@ -15,6 +15,8 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 
+pycolmap.logging.minloglevel = 2  # it reports every step of every photo on stderr; progress is reported instead
+
 WORST_ERROR = 4.0  # pixels: an observation farther from its point's projection is a wrong match
 LEAST_ANGLE = 1.5  # degrees between two rays, below which their crossing says nothing about depth
 
@@ -42,11 +44,6 @@ class ColmapModel:
         return self.cameras[self.names.index(name)]
 
 
-def silence_pycolmap() -> None:
-    """Stop pycolmap from reporting every step of every photo on stderr; progress is reported instead."""
-    pycolmap.logging.minloglevel = 2
-
-
 def bundle_adjust(
     stored: pycolmap.Reconstruction, refine_focal_length: bool = False, priors: Sequence[pycolmap.PosePrior] = ()
 ) -> None:
@@ -55,7 +52,6 @@ def bundle_adjust(
     With `priors`, positions of cameras, whose outliers are held back, lenses stay; without, two cameras hold the
     world's frame.
     """
-    silence_pycolmap()
     options = pycolmap.BundleAdjustmentOptions(
         refine_focal_length=refine_focal_length, refine_extra_params=not priors, print_summary=False
     )
@@ -218,7 +214,6 @@ def colour_points(model: ColmapModel, pictures: Sequence[Path]) -> Float32[Array
 
 def read_colmap_model(folder: Path | str) -> ColmapModel:
     """Read a COLMAP model of pinhole cameras, its images by name. Raises: InputError: missing, damaged, no pinhole."""
-    silence_pycolmap()
     try:
         stored = pycolmap.Reconstruction(str(folder))
     except Exception as error:  # the library raises what its C++ does, bare RuntimeErrors among it
@@ -278,7 +273,6 @@ def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
 
 def make_reconstruction(model: ColmapModel) -> pycolmap.Reconstruction:
     """The model for pycolmap; images are numbered from 1 in the model's order."""
-    silence_pycolmap()
     stored = pycolmap.Reconstruction()
     numbers: dict[tuple, int] = {}
     place = np.zeros(len(model.pixels), int)  # of an observation among those of its image

@@ -12,7 +12,6 @@ from pathlib import Path
 import pycolmap
 
 from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.photos.colmap_model import silence_pycolmap
 from dav_gswt.photos.importers import checks
 from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel
 from dav_gswt.photos.lenses import make_camera
@@ -42,7 +41,6 @@ def import_colmap(folder: Path) -> ImportedModel:
 
 def _read_reconstruction(files: dict[str, Path]) -> pycolmap.Reconstruction:
     """The model by pycolmap, from a folder of links to these files alone."""
-    silence_pycolmap()
     with tempfile.TemporaryDirectory(prefix="colmap-") as links:
         for part, path in files.items():
             link = Path(links) / path.name
