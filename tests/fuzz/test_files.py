@@ -48,6 +48,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos import importers, photo_files
 from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
 from dav_gswt.photos.importers.colmap import import_colmap
+from dav_gswt.photos.importers.photo_matching import PhotoFolder
 from dav_gswt.photos.importers.splat_files import RECORD, read_splat
 from dav_gswt.prior import weights
 
@@ -145,6 +146,17 @@ def is_header(found) -> bool:
     return right and (focal is None or 0 < focal < 100 * max(width, height))
 
 
+def write_photos(folder: Path) -> None:
+    for name in imported_models.SCENE.names:
+        image_files.write_png(folder / name, np.zeros((imported_models.HEIGHT, imported_models.WIDTH, 3)))
+
+
+def read_model(path: Path):
+    """A camera model of another program, beside its photos."""
+    write_photos(path.parent)
+    return importers._read_model(path, PhotoFolder(path.parent))
+
+
 def is_model(model) -> bool:
     for shot in model.images:
         right = ".." not in shot.name.split("/") and np.abs(shot.rotation @ shot.rotation.T - np.eye(3)).max() < 1e-6
@@ -204,13 +216,13 @@ READERS = [
     Reader(
         "nerfstudio",
         lambda folder: write_json(folder / "model.json", imported_models.transforms()),
-        importers._read_model,
+        read_model,
         is_model,
     ),
     Reader(
         "OpenSfM",
         lambda folder: write_json(folder / "model.json", imported_models.reconstruction()),
-        importers._read_model,
+        read_model,
         is_model,
     ),
     Reader(

@@ -144,7 +144,9 @@ def test_paths_of_another_machine_name_the_photos_of_the_folder(photos, tmp_path
     frames = [frame | {"file_path": path.format(frame["file_path"][2:])} for frame in transforms()["frames"]]
     frames[0]["file_path"] = f"{tmp_path}/secret.png"
     image_files.write_png(tmp_path / "secret.png", np.zeros((HEIGHT, WIDTH, 3)))
-    given = importers._read_model(write_json(tmp_path / "t.json", transforms() | {"frames": frames}))
+    given = importers._read_model(
+        write_json(tmp_path / "t.json", transforms() | {"frames": frames}), PhotoFolder(photos)
+    )
     placed, left_out = match_photos_to_images(given, PhotoFolder(photos), tmp_path)
     assert [place.path for place in placed] == [photos / name for name in SCENE.names[1:]]
     assert {name for name, _ in left_out} == {f"{tmp_path}/secret.png"[1:], "000.png"}
@@ -181,7 +183,7 @@ def test_a_project_is_recognised_and_its_photos_have_cameras(tmp_path, program):
     found = recognize_input([tmp_path])
     assert found.about == f"8 photos with cameras of {program}"
     folder = PhotoFolder(Path(found.entry["folder"]))
-    placed, _ = match_photos_to_images(importers._read_model(Path(found.entry["model"])), folder, tmp_path)
+    placed, _ = match_photos_to_images(importers._read_model(Path(found.entry["model"]), folder), folder, tmp_path)
     assert [place.path for place in placed] == [tmp_path / "images" / name for name in SCENE.names]
 
 
@@ -235,14 +237,30 @@ def test_of_several_reconstructions_the_largest_is_taken_and_a_reference_makes_i
     assert (found.positions.about.latitude, found.positions.about.metres_per_unit) == (48.1, 1.0)
     assert found.positions.at == pytest.approx(np.array([c.centre for c in found.model.cameras]))
     whole["reference_lla"] = dict.fromkeys(whole["reference_lla"], 0.0)  # what OpenSfM counts from without GPS
-    assert importers._read_model(write_json(tmp_path / "r.json", [whole])).about is None
+    assert importers._read_model(write_json(tmp_path / "r.json", [whole]), PhotoFolder(photos)).about is None
 
 
-def test_frames_may_have_intrinsics_of_their_own_and_a_field_of_view_instead():
+def read_transforms(values, photos):
+    return import_nerfstudio(Path("t.json"), values, PhotoFolder(photos).stored_size)
+
+
+def test_frames_may_have_intrinsics_of_their_own_and_a_field_of_view_instead(photos):
     values = transforms()
     angle = 2 * np.arctan(0.5 * WIDTH / 310.0)
     values["frames"][3] |= {"camera_angle_x": angle, "fl_y": 311.0, "cx": 150.0, "k1": 0.0, "camera_model": "OPENCV"}
-    given = import_nerfstudio(Path("t.json"), values)
+    given = read_transforms(values, photos)
     own = [310, 311, 150, *NUMBERS[3:4], 0, *NUMBERS[5:]]
     assert given.images[3].lens.params == pytest.approx(np.array(own))
     assert given.images[2].lens.params == pytest.approx(np.array(NUMBERS))
+
+
+def test_a_file_without_sizes_takes_those_of_the_photos(photos):
+    """Blender's scenes name no suffix."""
+    frames = transforms()["frames"]
+    for frame in frames:
+        frame["file_path"] = "./train/" + frame["file_path"].removesuffix(".png")
+    angle = 2 * np.arctan(0.5 * WIDTH / 300.0)
+    given = read_transforms({"camera_angle_x": angle, "frames": frames}, photos)
+    assert given.images[0].lens.model_name == "PINHOLE"
+    assert given.images[0].lens.params == pytest.approx(np.array([300, 300, WIDTH / 2, HEIGHT / 2]))
+    assert np.array([shot.translation for shot in given.images]) == pytest.approx(SCENE.translations)

@@ -126,6 +126,16 @@ def test_ground_on_which_nothing_stands_is_turned_as_usual_and_the_key_is_named(
     assert frame.source is not None and frame.source.axes[2] == pytest.approx([0, 1, 0], abs=0.01)
 
 
+def test_a_street_between_walls_lies_level(rng):
+    """The walls have more Gaussians than the street, which is level by the usual axes."""
+    street = ground_field(rng)[1000:5900]
+    walls = [replace(street, means=street.means[:, [2, 1, 0]] + np.float32([side, 0, 0.9])) for side in (-0.3, 0.3)]
+    street = replace(street, means=street.means * np.float32([0.3, 1, 1]))
+    whole = GaussianField.concatenate([street, *(wall[::2] for wall in walls)])
+    _, frame = fit_field_frame(whole, rng, usual=(0, 0, 1))
+    assert frame.source is not None and frame.source.axes[2] == pytest.approx([0, 0, 1], abs=0.1)
+
+
 def sky(rng, count, radius):
     """A hemisphere of opaque Gaussians above ground that has z up."""
     rays = rng.normal(size=(count, 3))

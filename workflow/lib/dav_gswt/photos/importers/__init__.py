@@ -48,7 +48,7 @@ def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Regis
     Raises: InputError: not a model, damaged, one that is not read, or fewer than three photos have a camera in it.
     """
     path, photos = Path(path), PhotoFolder(folder)
-    given = _read_model(path)
+    given = _read_model(path, photos)
     placed, left_out = match_photos_to_images(given, photos, path)
     if len(placed) < LEAST_PHOTOS:
         raise InputError(
@@ -81,7 +81,7 @@ def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Regis
     )
 
 
-def _read_model(path: Path) -> ImportedModel:
+def _read_model(path: Path, photos: PhotoFolder) -> ImportedModel:
     """What a file says, whichever kind it is of."""
     if path.is_dir():
         if model := find_colmap_folder(path):
@@ -93,7 +93,7 @@ def _read_model(path: Path) -> ImportedModel:
     check_size(path, LARGEST_JSON)
     values = read_json(path)
     if isinstance(values, dict) and isinstance(values.get("frames"), list):
-        return import_nerfstudio(path, values)
+        return import_nerfstudio(path, values, photos.stored_size)
     if isinstance(values, list) and values and isinstance(values[0], dict) and "shots" in values[0]:
         return import_opensfm(path, values)
     raise InputError(

@@ -5,7 +5,8 @@ not depend on them. Pixel centres are at half integers, as in COLMAP.
 """
 
 import math
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -36,8 +37,8 @@ class Intrinsics:
     """What the file says of a lens. camera_angle_x, camera_angle_y: fields of view, used where fl_x or fl_y is not
     given."""
 
-    w: float
-    h: float
+    w: float | None = None
+    h: float | None = None
     fl_x: float | None = None
     fl_y: float | None = None
     camera_angle_x: Angle | None = None
@@ -56,11 +57,11 @@ class Intrinsics:
     is_fisheye: bool = False
 
 
-def import_nerfstudio(path: Path, values: dict) -> ImportedModel:
+def import_nerfstudio(path: Path, values: dict, size_of: Callable[[str], tuple[int, int] | None]) -> ImportedModel:
     """The frames of the file. Points of `ply_file_path` are not read, as photos under known cameras
     give points.
 
-    Raises: InputError: with file, frame and key.
+    size_of: of a photo by its name, for files that give no size. Raises: InputError: with file, frame and key.
     """
     images, lens_of = [], {}
     for i, part in enumerate(values["frames"]):
@@ -72,6 +73,10 @@ def import_nerfstudio(path: Path, values: dict) -> ImportedModel:
         turn, centre = check_pose(np.array(frame.transform_matrix[:3]), f"{where}: transform_matrix")
         turn = turn * OPENGL
         said = _read_intrinsics(values, part, where)
+        if said.w is None or said.h is None:
+            if not (size := size_of(name)):
+                continue  # there is no such photo
+            said = replace(said, w=float(size[0]), h=float(size[1]))
         if said not in lens_of:
             lens_of[said] = _make_lens(said, where)
         images.append(ImportedImage(name, lens_of[said], turn.T, -turn.T @ centre))
@@ -90,6 +95,7 @@ def _read_intrinsics(values: dict, frame: dict, where: str) -> Intrinsics:
 
 def _make_lens(said: Intrinsics, where: str) -> pycolmap.Camera:
     """The lens that a frame's intrinsics describe."""
+    assert said.w is not None and said.h is not None
     width, height = round(said.w), round(said.h)
     fx = said.fl_x or (0.5 * width / math.tan(0.5 * said.camera_angle_x) if said.camera_angle_x else None)
     fy = said.fl_y or (0.5 * height / math.tan(0.5 * said.camera_angle_y) if said.camera_angle_y else fx)

@@ -61,6 +61,11 @@ class PhotoFolder:
         best = [photo for photo, rank in zip(found, ranks, strict=True) if rank == max(ranks)]
         return best[0] if len(best) == 1 else None
 
+    def stored_size(self, name: str) -> tuple[int, int] | None:
+        """Width and height of a photo as stored, without EXIF's orientation; None where there is no such photo."""
+        found = self.find(name)
+        return None if found is None else image_files.read_stored_size(self.photos[found])[:2]
+
 
 def _compare_paths(one: PurePosixPath, other: PurePosixPath) -> tuple[int, bool]:
     """How many of the last folders are equal, and whether the file names are."""

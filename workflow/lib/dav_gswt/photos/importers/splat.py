@@ -39,6 +39,7 @@ LEAST_SHARE = 0.1  # of what counts that the scene holds
 NOTED = 0.005  # share of dropped Gaussians from which a warning says so
 STANDS, TALL = 5.0, 0.2  # spreads of the ground above which a thing stands; share of the size at which it is capped
 SURE = 0.75  # share of what stands that must be on one side
+WALLS = 3.0  # times the spread of the best plane that a level one may have
 LARGEST = 0.5  # standard deviation of a Gaussian, as a share of the scene's size; larger ones are haze
 ROUGHEST = 0.1  # spread of the surface about its plane, as a share of the scene's size; above it there is no ground
 VIEW = 60.0  # degrees across the virtual camera's picture that the exemplar fills: it gives the flying height
@@ -195,9 +196,17 @@ def _find_ground(
 ) -> tuple[Float[Array, "3"], float, float]:
     """The plane of the ground, normal upwards, without a word on where up is: normal, offset and spread.
 
-    It is the plane that fits best. The side on which things stand is up, and in doubt the usual one.
+    It is the plane that fits best, unless one level by the usual axes fits nearly as well (a street between walls). The
+    side on which things stand is up, and in doubt the usual one.
     """
     normal, offset, spread = fit_plane(surface, rng)
+    if abs(normal @ usual) < np.sqrt(0.5) * np.linalg.norm(usual):
+        try:
+            level = fit_plane(surface, rng, usual)
+        except InputError:  # no plane of the sample is level
+            level = None
+        if level and level[2] <= min(WALLS * spread, ROUGHEST * size):
+            normal, offset, spread = level
     axis = int(np.abs(normal).argmax())
     towards = usual[axis] if abs(usual[axis]) > 0.5 * np.linalg.norm(usual) else 1.0
     if normal[axis] * towards < 0:
