@@ -5,14 +5,12 @@ Each case goes through what `make run` calls. Only the first job has to run for 
 
 import os
 import re
-import shutil
 import time
 
 import numpy as np
 import pytest
 from fixtures.runs import TINY, USUAL
 
-from dav_gswt.field import read_field, write_field
 from dav_gswt.files import read_json
 from dav_gswt.images import image_files
 
@@ -32,12 +30,6 @@ def noisy_photos(folder, count: int) -> None:
 def one_that_is_text(folder) -> None:
     noisy_photos(folder, 2)
     (folder / "3.jpg").write_text("this is no photo")
-
-
-def one_cut_short(folder) -> None:
-    noisy_photos(folder, 3)
-    whole = (folder / "1.png").read_bytes()
-    (folder / "1.png").write_bytes(whole[: len(whole) // 2])
 
 
 @pytest.fixture
@@ -71,7 +63,6 @@ PHOTOS = "{kind: photos, folder: photos, size: 320, start: 3, agent: replay, pre
     "fill, said",
     [
         pytest.param(one_that_is_text, "photos/3.jpg: ", id="not an image"),
-        pytest.param(one_cut_short, "photos/1.png: damaged or cut short", id="cut short"),
         pytest.param(
             lambda folder: noisy_photos(folder, 4),
             "photos: no two of the 4 photos show the same ground",
@@ -86,34 +77,11 @@ def test_photos_that_cannot_be_used_are_named(refused, tmp_path, fill, said):
     assert last.startswith(said) and ("; " in last or ": " in last.removeprefix(said))
 
 
-def half(folder, good) -> None:
-    whole = good.read_bytes()
-    (folder / "given.ply").write_bytes(whole[: len(whole) // 2])
-
-
-def with_nan(folder, good) -> None:
-    whole = read_field(good)
-    whole.means[7, 2] = np.nan
-    write_field(whole, folder / "given.ply")
-
-
-@pytest.mark.parametrize(
-    "break_it, said",
-    [
-        pytest.param(half, "given.ply: not a readable PLY .*early end-of-file", id="cut short"),
-        pytest.param(with_nan, "given.ply: .*7.*", id="not a number"),
-    ],
-)
-def test_a_field_that_cannot_be_used_is_named(refused, tiny, tmp_path, break_it, said):
-    break_it(tmp_path, tiny.round / "field.ply")
+def test_a_field_that_cannot_be_used_is_named(refused, tiny, tmp_path):
+    whole = (tiny.round / "field.ply").read_bytes()
+    (tmp_path / "given.ply").write_bytes(whole[: len(whole) // 2])
     last = refused("{kind: field, field: given.ply, up: [0, 0, 1], preset: draft, tiling: semantic}")[-1]
-    assert re.match(said, last)
-
-
-def test_a_field_on_its_side_says_what_to_give(refused, tiny, tmp_path):
-    shutil.copy(tiny.round / "field.ply", tmp_path / "given.ply")
-    last = refused("{kind: field, field: given.ply, up: [1, 0, 0], preset: draft, tiling: semantic}")[-1]
-    assert last.startswith("given.ply: ") and "up" in last
+    assert re.match("given.ply: not a readable PLY .*early end-of-file", last)
 
 
 @pytest.fixture

@@ -19,7 +19,6 @@ from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
-from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.view_split import ViewSplit
 
 WHEN = "2026-05-04T10:00:00"
@@ -70,14 +69,6 @@ def test_replay_takes_the_nearest_unused_photo_once_and_records_the_distance(sit
     back = read_capture_record(tmp_path)[0]
     assert (back.name, back.pose, back.distance, back.taken) == ("1.png", photos[0].pose, photos[0].distance, None)
     np.testing.assert_array_equal(back.camera.centre, photos[0].camera.centre)
-
-
-def test_a_rendered_scene_is_photographed_at_each_pose(site, tmp_path, monkeypatch):
-    monkeypatch.setattr(synthetic, "scene_from_config", lambda entry: None)
-    monkeypatch.setattr(synthetic, "render", lambda world, camera: np.full((8, 8, 3), camera.centre[0], np.float32))
-    photos = capture(site, "render", requested(0.0, 0.5))
-    assert [(photo.name, photo.pose.name) for photo in photos] == [("a0.png", "a0"), ("a1.png", "a1")]
-    assert image_files.read_photo(tmp_path / "capture/a1.png")[0, 0, 0] == pytest.approx(0.5, abs=0.01)
 
 
 def test_the_store_gives_a_poses_photos_back_and_no_others(tmp_path):

@@ -102,7 +102,6 @@ def test_each_pose_is_photographed_once_from_where_it_was_requested(shoot):
     [
         pytest.param(Faults(lost_in=0.004), id="bytes to it are lost"),
         pytest.param(Faults(lost_out=0.004), id="bytes from it are lost"),
-        pytest.param(Faults(late=0.08), id="answers are late"),
         pytest.param(Faults(twice=True), id="answers come twice"),
         pytest.param(Faults(garbage=b"\xff\x00*\xc3#\n! BOOT*0000\n" + 300 * b"x" + b"\n\n"), id="garbage"),
         pytest.param(Faults(camera="slow"), id="photos are written slowly"),

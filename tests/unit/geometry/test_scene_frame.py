@@ -20,7 +20,6 @@ PLACE = Georeference(47.1, 8.0, 430.0, 12.0, 2.5, slope=3.0)
 FRAME = scene_frame(
     (1.0, -2.0, 4.0),
     (-5.0, -6.0, 7.0, 8.0),
-    photos_per_cell=3,
     relief=0.01,
     georeference=PLACE,
     images=3,

@@ -10,7 +10,6 @@ from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import (
     colour_points,
-    count_shared_points,
     group_images,
     read_colmap_model,
     triangulate_model,
@@ -68,12 +67,6 @@ def test_colours_come_from_the_named_images_alone(flown, tmp_path):
     part = triangulate_model(flown, flown.names[:3])
     colours = colour_points(part, [tmp_path / name for name in part.names])
     assert colours == pytest.approx(np.full(colours.shape, 0.2), abs=1e-6)
-
-
-def test_pairs_share_the_points_that_both_see(flown):
-    shared = count_shared_points(flown)
-    sees = [set(flown.point_of[flown.image_of == i]) for i in range(9)]
-    assert shared.tolist() == [[len(a & b) for b in sees] for a in sees]
 
 
 def test_images_are_grouped_by_the_points_that_three_of_them_see(flown):

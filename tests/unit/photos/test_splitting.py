@@ -10,7 +10,6 @@ from fixtures.frames import scene_frame
 from dav_gswt.errors import InputError
 from dav_gswt.photos import view_split
 from dav_gswt.photos.view_split import (
-    SplitOptions,
     find_aim_point,
     measure_picture_share,
     measure_visible_share,
@@ -33,7 +32,7 @@ def first(model, count):
 
 
 def split(model, seed=0, start=8, frame=FRAME, test=None):
-    return split_views(model, frame, SplitOptions(start, test), np.random.default_rng(seed))
+    return split_views(model, frame, np.random.default_rng(seed), start, test)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ https://github.com/playcanvas/splat-transform, `read-ply` and `decompress-ply`.
 """
 
 import numpy as np
-from jaxtyping import Float32, UInt32
+from jaxtyping import Float, Float32, UInt32
 from numpy import ndarray as Array
 
 COLUMNS = ("packed_position", "packed_rotation", "packed_scale", "packed_color")
@@ -60,10 +60,13 @@ def _stretch(
 def _unpack_quats(words: UInt32[Array, "n"]) -> Float32[Array, "n 4"]:
     """w, x, y, z: which is largest (two bits), then the others in order."""
     small = (_split(words, (20, 10, 0), (10, 10, 10)) - np.float32(0.5)) * np.float32(np.sqrt(2))
-    largest = np.sqrt(np.maximum(1 - (small**2).sum(1), 0))
-    others = np.array([[k for k in range(4) if k != which] for which in range(4)])
-    quats = np.empty((len(words), 4), np.float32)
-    rows, which = np.arange(len(words)), words >> 30
-    quats[rows, which] = largest
+    return expand_smallest_three(words >> 30, small)
+
+
+def expand_smallest_three(which: UInt32[Array, "n"], small: Float[Array, "n 3"]) -> Float32[Array, "n 4"]:
+    """Unit vectors of four numbers, from the place of the largest one, which is positive, and the others in order."""
+    others = np.array([[k for k in range(4) if k != largest] for largest in range(4)])
+    quats, rows = np.empty((len(small), 4), np.float32), np.arange(len(small))
+    quats[rows, which] = np.sqrt(np.maximum(1 - (small**2).sum(1), 0))
     quats[rows[:, None], others[which]] = small
     return quats

@@ -29,10 +29,9 @@ from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model
 from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.photo_matching import PhotoFolder, match_photos_to_images
-from dav_gswt.photos.importers.points import triangulate_features
 from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.recognition import recognize_input
-from dav_gswt.photos.sfm.registration import undistort_image
+from dav_gswt.photos.sfm.registration import undistort_pixels
 
 OPTIONS = replace(made.OPTIONS, features=500)
 
@@ -47,10 +46,10 @@ def photos(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found_once():
     """Triangulates the features of the scene's photos once, since their cameras are the same in all formats."""
-    found = []
+    found, find_points = [], importers._find_points
 
     def triangulate(*arguments):
-        found.append(found[0] if found else triangulate_features(*arguments))
+        found.append(found[0] if found else find_points(*arguments))
         return found[0]
 
     return triangulate
@@ -67,7 +66,7 @@ def three(photos, found_once, tmp_path_factory):
         "opensfm": write_json(folder / "reconstruction.json", reconstruction()),
     }
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(importers, "triangulate_features", found_once)
+        patch.setattr(importers, "_find_points", found_once)
         return {kind: import_model(path, photos, OPTIONS) for kind, path in sources.items()}
 
 
@@ -105,20 +104,11 @@ def test_photos_may_be_smaller_than_the_models_and_pictures_smaller_still(tmp_pa
     assert max(found.lenses[0].width, found.lenses[0].height) == 100
     assert max(found.model.cameras[0].width, found.model.cameras[0].height) <= 100
     assert reprojection_errors(found.model).max() < 1e-4
-    assert undistort_image(found, 0).shape == (found.model.cameras[0].height, found.model.cameras[0].width, 3)
-
-
-def test_photos_and_images_without_each_other_are_left_out_with_the_reason(tmp_path):
-    shoot(tmp_path / "photos")
-    (tmp_path / "photos" / "001.png").unlink()
-    (tmp_path / "photos" / "007.png").rename(tmp_path / "photos" / "other.png")
-    write_colmap(tmp_path / "m", sees=True)
-    found = import_model(tmp_path / "m", tmp_path / "photos", OPTIONS)
-    assert found.model.names == tuple(n for n in SCENE.names if n not in ("001.png", "007.png"))
-    assert set(dict(found.left_out)) == {"001.png", "007.png", "other.png"}
-    for i, camera in enumerate(found.model.cameras):
-        at = SCENE.names.index(found.model.names[i])
-        assert camera.translation == pytest.approx(SCENE.translations[at], abs=1e-9)
+    assert undistort_pixels(found, 0, image_files.read_photo(found.sources[0])).shape == (
+        found.model.cameras[0].height,
+        found.model.cameras[0].width,
+        3,
+    )
 
 
 def test_names_are_found_by_path_then_by_stem(tmp_path):
@@ -226,7 +216,7 @@ def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path):
 
 
 def test_the_stage_goes_on_from_a_given_model(photos, found_once, tmp_path, monkeypatch):
-    monkeypatch.setattr(importers, "triangulate_features", found_once)
+    monkeypatch.setattr(importers, "_find_points", found_once)
     path = write_json(tmp_path / "r.json", reconstruction())
     facts = prepare_photos(photos, tmp_path / "out", OPTIONS, path)
     assert facts.registered == 8 and facts.relief < 0.02

@@ -42,14 +42,6 @@ def place(model, rng, noise):
     return dict(zip(model.names, true + rng.normal(0, noise, true.shape), strict=True))
 
 
-def test_heights_that_drift_along_a_line_do_not_say_where_up_is():
-    along = np.linspace(0, 200, 12)
-    drifting = np.c_[along, np.zeros(12), 60 + 12 * np.sin(along / 60)]
-    assert not gps.measure_spread(drifting)[1]
-    spread, says_up = gps.measure_spread(np.c_[along, 30 * np.cos(along), np.full(12, 60.0)])
-    assert says_up and spread == pytest.approx(np.hypot(along.std(), (30 * np.cos(along)).std()))
-
-
 def test_photos_along_a_line_or_at_one_place_are_not_placed(reconstruct):
     """Ten photos on 90 metres, receivers 2 metres off: about the line the positions say nothing."""
     rng = np.random.default_rng(0)

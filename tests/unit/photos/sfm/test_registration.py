@@ -18,7 +18,7 @@ from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
 from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.sfm import gps, mapping, registration
 from dav_gswt.photos.sfm.mapping import Approach
-from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_image
+from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_pixels
 
 HALF = 1.0  # of the made-up ground
 FILM = synth.FOCAL / np.hypot(synth.WIDTH, synth.HEIGHT) * 43.2666  # 35 mm equivalent of the made-up camera
@@ -202,7 +202,8 @@ def test_an_undistorted_picture_is_what_a_pinhole_camera_sees(tmp_path):
         cy=pinhole.principal_point_y, width=pinhole.width, height=pinhole.height,
     )  # fmt: skip
     one = replace(synth.model([flat], np.zeros((1, 3))), names=("a.png",))
-    seen = undistort_image(Registration(one, (tmp_path / "a.png",), (lens,), (), None, 0.0), 0)
+    found = Registration(one, (tmp_path / "a.png",), (lens,), (), None, 0.0)
+    seen = undistort_pixels(found, 0, image_files.read_photo(tmp_path / "a.png"))
     x, y = np.meshgrid(np.arange(flat.width) + 0.5, np.arange(flat.height) + 0.5)
     # 8 bits round by 1 / 510; cubic splines on waves of 100 pixels add less.
     assert seen == pytest.approx(scene((x - flat.cx) / flat.fx, (y - flat.cy) / flat.fy), abs=0.004)

@@ -69,11 +69,6 @@ def test_photos_left_out_though_they_match_are_tried_with_the_other_mapper(solut
     assert asked == [Approach("incremental"), Approach("global")] and found.best.num_reg_images() == 19
 
 
-def test_the_other_mapper_does_not_win_with_a_worse_model(solutions):
-    found, _ = solutions(verdict("good"), verdict("doubtful", "tilt"), placed=(14, 19), unsure=5)
-    assert found.best.num_reg_images() == 14
-
-
 def test_where_the_first_way_gives_no_model_others_are_tried(solutions, monkeypatch):
     monkeypatch.setattr(mapping, "_read_pairs", lambda _: [(0, 1, 50)])
     found, asked = solutions(None, verdict("doubtful", "tilt"), verdict("good"))

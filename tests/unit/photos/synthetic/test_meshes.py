@@ -33,17 +33,6 @@ def test_a_mesh_is_that_of_its_seed(name, golden):
     golden(name, *(EVERY[name](np.random.default_rng(seed)) for seed in (1, 2)))
 
 
-@pytest.mark.parametrize("name", PLANTS)
-def test_a_plant_stands_on_its_root_about_1_high_in_faces_of_one_colour(name):
-    for seed in range(2):
-        plant = PLANTS[name](np.random.default_rng(seed))
-        assert 0.5 < plant.vertices[:, 2].max() < 1.6
-        assert -0.6 < plant.vertices[:, 2].min() < 0  # leaves may droop below the root, on a slope
-        assert np.isfinite(plant.vertices).all() and plant.colours.min() > 0 and plant.colours.max() < 1
-        assert np.ptp(plant.colours[plant.faces], axis=1).max() == 0
-        assert plant.faces.min() == 0 and plant.faces.max() == len(plant.vertices) - 1
-
-
 @pytest.mark.parametrize("name", STONES)
 def test_a_stone_is_closed_outside_out_and_about_1_across(name):
     for seed in range(3):
@@ -54,11 +43,6 @@ def test_a_stone_is_closed_outside_out_and_about_1_across(name):
         assert 0 < (np.cross(a, b) * c).sum() / 6 < np.prod(spans)  # its volume, if closed and outside out
         assert np.cross(b - a, c - a).sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-5)  # closed
         assert stone.colours.min() > 0 and stone.colours.max() < 1
-
-
-def test_a_mesh_is_scaled_turned_and_moved():
-    one = meshes.Mesh(np.array([[1, 0, 0]], np.float32), np.zeros((0, 3), int), np.ones((1, 3), np.float32))
-    assert meshes.transform_mesh(one, (1, 2, 3), 2.0, np.pi / 2).vertices[0] == pytest.approx([1, 4, 3])
 
 
 def test_a_fresh_crater_has_its_depth_its_rim_and_an_end():

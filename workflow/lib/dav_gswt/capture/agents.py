@@ -21,32 +21,23 @@ class Agent:
             missing.
         kinds: of the scenes that the agent serves.
         device: whether a device or a person takes the photos: on this machine, and never twice.
-        keep_reachable: called with the scene's entry, its frame and candidates; returns those that can be reached.
-            None: all.
         pool: whether the candidates are photos that exist, all of which can be taken.
     """
 
     take: Callable[..., Any]
     kinds: tuple[str, ...]
     device: bool
-    keep_reachable: Callable[..., Any] | None
     pool: bool
 
 
 AGENTS: dict[str, Agent] = {}
 
 
-def agent(
-    name: str,
-    *kinds: str,
-    device: bool = True,
-    keep_reachable: Callable[..., Any] | None = None,
-    pool: bool = False,
-):
+def agent(name: str, *kinds: str, device: bool = True, pool: bool = False):
     """Register the decorated function as the one that takes an agent's photos; see `Agent`."""
 
     def register(take: Callable[..., Any]):
-        AGENTS[name] = Agent(take, kinds, device, keep_reachable, pool)
+        AGENTS[name] = Agent(take, kinds, device, pool)
         return take
 
     return register
@@ -89,13 +80,7 @@ def replay(site: Any, poses: list[Any], remaining: list[Any], folder: Path) -> l
     return photos
 
 
-def _within_rig(scene: Any, frame: Any, candidates: Any) -> Any:
-    from dav_gswt.capture.serial_rig import filter_reachable
-
-    return filter_reachable(scene, frame, candidates)
-
-
-@agent("serial", "photos", keep_reachable=_within_rig)
+@agent("serial", "photos")
 def serial(site: Any, missing: list[Any]) -> None:
     """A motorised camera rig on a serial port."""
     from dav_gswt.capture.serial_rig import take_photos
@@ -103,13 +88,7 @@ def serial(site: Any, missing: list[Any]) -> None:
     take_photos(site, missing)
 
 
-def _above_least_altitude(scene: Any, frame: Any, candidates: Any) -> Any:
-    from dav_gswt.capture.drone import filter_reachable
-
-    return filter_reachable(scene, frame, candidates)
-
-
-@agent("plan", "photos", keep_reachable=_above_least_altitude)
+@agent("plan", "photos")
 def plan(site: Any, missing: list[Any]) -> None:
     """A drone: its mission is written, its photos come through the drop folder."""
     from dav_gswt.capture.drone import take_photos

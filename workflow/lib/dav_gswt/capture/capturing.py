@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from dav_gswt.capture import drone, serial_rig
 from dav_gswt.capture.agents import AGENTS
 from dav_gswt.capture.site import RequestedPose, Site, view_distance
 from dav_gswt.field import GaussianField
@@ -18,6 +19,9 @@ from dav_gswt.views import candidates as pools
 from dav_gswt.views import feasibility
 from dav_gswt.views.candidates import Candidates
 
+# Of agents that cannot take photos everywhere: called with a scene's entry, its frame and candidates.
+REACHABLE = {"serial": serial_rig.filter_reachable, "plan": drone.filter_reachable}
+
 
 def filter_attainable(
     scene: dict, frame: SceneFrame, grid: Ground, field: GaussianField, candidates: Candidates
@@ -30,8 +34,8 @@ def filter_attainable(
     agent = AGENTS[scene["agent"]]
     if agent.pool:
         return candidates
-    if agent.keep_reachable:
-        candidates = agent.keep_reachable(scene, frame, candidates)
+    if keep_reachable := REACHABLE.get(scene["agent"]):
+        candidates = keep_reachable(scene, frame, candidates)
     return feasibility.filter_feasible(candidates, field, grid, frame.flying_height)
 
 
@@ -69,7 +73,7 @@ def take_requested(site: Site, poses: list[RequestedPose], remaining: Candidates
 def _undistort_stored(site: Site, pose: Pose, camera: Camera, folder: Path) -> CapturedPhoto:
     """Write a pose's oldest stored photo as its pinhole camera would have taken it."""
     stored, name = site.store.photos_of(camera)[0], f"{pose.name}.png"
-    picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera, turned=True)
+    picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera)
     image_files.write_png(folder / name, picture)
     distance = view_distance(camera, stored.camera, site.frame)
     return CapturedPhoto(name, pose, camera, stored.camera, distance, stored.taken)

@@ -85,16 +85,13 @@ def _check_level(
     """
     at = place.metres_per_unit * np.stack([camera.centre for _, camera in missing])
     off = np.linalg.norm(at[:, :2] - place.metres_per_unit * home, axis=1) * np.tan(np.radians(place.slope))
-    low, worst, drone = off > at[:, 2] / 2, float(off.max()), f"scenes.{site.name}.drone"
-    keys = ["clearance"] * (worst > clearance / 2) + ["min_altitude"] * bool(low.any())
-    if keys:
-        names = ", ".join(pose.name for (pose, _), short in zip(missing, low, strict=True) if short)
+    worst = float(off.max())
+    if worst > clearance / 2 or (off > at[:, 2] / 2).any():
         raise InputError(
             f"scenes.{site.name}: the ground slopes by {place.slope:.1f} degrees, so that altitudes of a mission over "
-            f"level ground would be wrong by up to {worst:.1f} m"
-            + (f", and of {names} by more than half" if names else "")
-            + f"; set {' and '.join(f'{drone}.{key} to {np.ceil(2 * worst):.0f} or more' for key in keys)} if there is "
-            "room to spare everywhere, or take agent: handheld"
+            f"level ground would be wrong by up to {worst:.1f} m; set scenes.{site.name}.drone.clearance and "
+            f"min_altitude to {np.ceil(2 * worst):.0f} or more if there is room to spare everywhere, or take agent: "
+            "handheld"
         )
 
 

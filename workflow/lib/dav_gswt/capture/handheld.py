@@ -40,11 +40,23 @@ FACING = 15.0  # degrees: largest angle past the middle that still counts as fac
 
 @dataclass(frozen=True)
 class Ruler:
-    """Formats lengths and directions of a scene. unit: the flying height in world units. metres: per world unit."""
+    """Formats lengths and directions of a scene."""
 
-    unit: float
-    metres: float | None
-    place: Georeference | None
+    frame: SceneFrame
+
+    @property
+    def unit(self) -> float:
+        """The flying height in world units."""
+        return self.frame.flying_height
+
+    @property
+    def place(self) -> Georeference | None:
+        return self.frame.georeference
+
+    @property
+    def metres(self) -> float | None:
+        """Metres per world unit, if they are known."""
+        return self.place.metres_per_unit if self.place else 1.0 if self.frame.unit == "metre" else None
 
     def format_length(self, length: float) -> str:
         """A length in world units as metres, or as flying heights if metres are not known."""
@@ -83,7 +95,7 @@ def write_shot_list(site: Site, missing: list[RequestedPose], field: GaussianFie
 
     Returns: the page.
     """
-    by, ground = make_ruler(site.frame), np.array([camera.centre[:2] for _, camera in missing])
+    by, ground = Ruler(site.frame), np.array([camera.centre[:2] for _, camera in missing])
     ordered = route.order_stops(ground)
     places = [missing[i] for i in ordered]
     view = place_map_camera([camera for _, camera in places], site.frame)
@@ -93,7 +105,7 @@ def write_shot_list(site: Site, missing: list[RequestedPose], field: GaussianFie
         image_files.write_png(part / "map.png", blank if field is None else _draw(field, view))
         cards = []
         for i, (pose, camera) in enumerate(places):
-            card = _describe_place(camera, places[i - 1][1] if i else None, i, view, site.frame, by)
+            card = _describe_place(camera, places[i - 1][1] if i else None, i, view, by)
             card |= {"name": pose.name, "picture": None}
             if field is not None:
                 card["picture"] = f"place_{i + 1:03d}.png"
@@ -108,7 +120,7 @@ def write_shot_list(site: Site, missing: list[RequestedPose], field: GaussianFie
             "metric": by.metres is not None,
             "near": f"{by.format_length(CLOSE * by.unit)} and {TURNED} degrees",
             "drop": drop_folder.make_drop_folder(site),
-            "map": _describe_map(view, site.frame, by),
+            "map": _describe_map(view, by),
             "cards": cards,
         }
         (part / "index.html").write_text(render_template(site.shot_list_template, values), encoding="utf-8")
@@ -133,9 +145,9 @@ def _draw(field: GaussianField, camera: Camera) -> Float32[Array, "h w 3"]:
     return np.clip(render(field, camera, BLANK).colour, 0, 1)
 
 
-def _describe_map(view: Camera, frame: SceneFrame, by: Ruler) -> dict[str, Any]:
+def _describe_map(view: Camera, by: Ruler) -> dict[str, Any]:
     """Where the template draws the exemplar, its middle, a scale and north."""
-    square = frame.exemplar
+    square = by.frame.exemplar
     corner, middle = view.project(np.array([[square.west, square.north, 0.0], square.centre]))[0].tolist()
     unit, name = (by.unit, "flying heights") if by.metres is None else (1 / by.metres, "m")
     fifth = view.width / view.fx / unit / 5
@@ -153,9 +165,7 @@ def _describe_map(view: Camera, frame: SceneFrame, by: Ruler) -> dict[str, Any]:
     }
 
 
-def _describe_place(
-    camera: Camera, before: Camera | None, i: int, view: Camera, frame: SceneFrame, by: Ruler
-) -> dict[str, Any]:
+def _describe_place(camera: Camera, before: Camera | None, i: int, view: Camera, by: Ruler) -> dict[str, Any]:
     """A place as the page shows it; turn: of its arrow on the map, degrees; None: the camera looks straight down."""
     steep = abs(tilt(camera)) >= STEEP
     return {
@@ -163,17 +173,10 @@ def _describe_place(
         "at": view.project(camera.centre[None])[0][0].tolist(),
         "turn": None if steep else float(np.degrees(np.arctan2(-camera.forward[1], camera.forward[0]))),
         "walk": "Start here." if before is None else f"From place {i}: {describe_walk(before, camera, by)}.",
-        "pose": describe_pose(camera, frame, by),
+        "pose": describe_pose(camera, by),
         "width": camera.width,
         "height": camera.height,
     }
-
-
-def make_ruler(frame: SceneFrame) -> Ruler:
-    """Build the ruler of a scene."""
-    place = frame.georeference
-    metres = place.metres_per_unit if place else 1.0 if frame.unit == "metre" else None
-    return Ruler(frame.flying_height, metres, place)
 
 
 def tilt(camera: Camera) -> float:
@@ -189,11 +192,11 @@ def describe_tilt(camera: Camera) -> str:
     return "level" if down == 0 else f"{'down' if down > 0 else 'up'} {abs(down)} degrees"
 
 
-def describe_facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
+def describe_facing(camera: Camera, by: Ruler) -> str:
     """Say which way to face, or where the picture's top is if the camera looks down."""
     if abs(tilt(camera)) >= STEEP:
         return f"turn the top of the picture to {by.format_direction(-camera.rotation[1][:2])}"
-    ahead, inwards = camera.forward[:2], (frame.exemplar.centre - camera.centre)[:2]
+    ahead, inwards = camera.forward[:2], (by.frame.exemplar.centre - camera.centre)[:2]
     towards = by.format_direction(ahead)
     across = ahead[0] * inwards[1] - ahead[1] * inwards[0]
     off = np.degrees(np.arctan2(abs(across), ahead @ inwards))
@@ -202,9 +205,9 @@ def describe_facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
     return f"face the middle, which is to {'the ' if by.place else ''}{towards}"
 
 
-def describe_pose(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
+def describe_pose(camera: Camera, by: Ruler) -> str:
     """Say where to stand, how high to hold the camera, and where it looks."""
-    out = (camera.centre - frame.exemplar.centre)[:2]
+    out = (camera.centre - by.frame.exemplar.centre)[:2]
     away, direction = float(np.linalg.norm(out)), by.format_direction(out)
     if away < HERE * by.unit:
         position = "Stand in the middle"
@@ -213,7 +216,7 @@ def describe_pose(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
     else:
         position = f"Stand {by.format_length(away)} from the middle, towards {direction}"
     up = f"camera {by.format_length(float(camera.centre[2]))} above the ground"
-    return f"{position}, {up}; {describe_facing(camera, frame, by)}; look {describe_tilt(camera)}."
+    return f"{position}, {up}; {describe_facing(camera, by)}; look {describe_tilt(camera)}."
 
 
 def describe_walk(a: Camera, b: Camera, by: Ruler) -> str:

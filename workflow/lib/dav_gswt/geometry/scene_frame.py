@@ -116,10 +116,9 @@ class SceneFrame:
 
     flying_height: median height of the cameras, in world units. exemplar: the square that tiles are made of. extent: of
     all ground that photos see. test, test_groups: names of photos that only test; None where the scene names none.
-    photos_per_cell: photos that must see ground of the exemplar. relief: spread of the points about the plane, in
-    flying heights. focal_ratio: the used focal length over EXIF's. reprojection_error: mean, pixels. points: of the
-    sparse model. verdict: on structure from motion. gaussians, removed, source: of an imported field. renderer:
-    versions of a synthetic scene's renderer.
+    relief: spread of the points about the plane, in flying heights. focal_ratio: the used focal length over EXIF's.
+    reprojection_error: mean, pixels. points: of the sparse model. verdict: on structure from motion. gaussians,
+    removed, source: of an imported field. renderer: versions of a synthetic scene's renderer.
     """
 
     kind: Literal["photos", "synthetic", "field"]
@@ -130,7 +129,6 @@ class SceneFrame:
     test: tuple[str, ...] | None = None
     test_groups: dict[str, tuple[str, ...]] | None = None
     georeference: Georeference | None = None
-    photos_per_cell: int | None = None
     relief: float | None = None
     images: int = 0
     registered: int = 0

@@ -3,9 +3,11 @@
 All are returned upright: what the file says of its orientation is applied, once.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
@@ -27,45 +29,42 @@ class Decoder:
     read_pixels: Callable[[Path], Float32[Array, "h w c"]]
 
 
-def _open_heif(path: Path):
+@contextmanager
+def _open_heif(path: Path) -> Iterator[Any]:
+    """An open image. Raises: InputError: it cannot be read."""
     import pillow_heif  # here, not above: most jobs read no such photo
     from PIL import Image
 
     pillow_heif.register_heif_opener(decode_threads=1)
-    return Image.open(path)
+    try:
+        with Image.open(path) as image:
+            yield image
+    except UNREADABLE as error:
+        raise _refuse(path, error) from error
 
 
 def _read_heif_size(path: Path) -> tuple[int, int]:
     from PIL import ExifTags
 
-    try:
-        with _open_heif(path) as image:
-            turned = image.getexif().get(ExifTags.Base.Orientation, 1) >= 5  # AVIF's; HEIC is upright already
-            width, height = image.size
-            return (height, width) if turned else (width, height)
-    except UNREADABLE as error:
-        raise _refuse(path, error) from error
+    with _open_heif(path) as image:
+        turned = image.getexif().get(ExifTags.Base.Orientation, 1) >= 5  # AVIF's; HEIC is upright already
+        width, height = image.size
+        return (height, width) if turned else (width, height)
 
 
 def _read_heif(path: Path) -> Float32[Array, "h w c"]:
     from PIL import ImageOps
 
-    try:
-        with _open_heif(path) as image:
-            upright = ImageOps.exif_transpose(image)
-            pixels = np.asarray(upright.convert("RGBA" if upright.has_transparency_data else "RGB"))
-    except UNREADABLE as error:
-        raise _refuse(path, error) from error
+    with _open_heif(path) as image:
+        upright = ImageOps.exif_transpose(image)
+        pixels = np.asarray(upright.convert("RGBA" if upright.has_transparency_data else "RGB"))
     return pixels.astype(np.float32) / 255
 
 
 def read_heif_exif(path: Path) -> bytes:
     """The EXIF of a HEIC, HEIF or AVIF as a TIFF; empty where there is none."""
-    try:
-        with _open_heif(path) as image:
-            return image.info.get("exif", b"").removeprefix(b"Exif\0\0")
-    except UNREADABLE as error:
-        raise _refuse(path, error) from error
+    with _open_heif(path) as image:
+        return image.info.get("exif", b"").removeprefix(b"Exif\0\0")
 
 
 def _open_raw(path: Path):

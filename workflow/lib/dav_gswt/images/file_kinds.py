@@ -5,7 +5,7 @@ import zipfile
 from pathlib import Path
 from typing import Literal
 
-Kind = Literal["photo", "heif", "raw", "video", "ply", "spz", "splat", "ksplat", "sog", "other"]
+Kind = Literal["photo", "heif", "raw", "video", "ply", "spz", "spz4", "splat", "ksplat", "sog", "other"]
 
 SUFFIXES = {".jpg", ".jpeg", ".jpe", ".jfif", ".png", ".tif", ".tiff", ".webp", ".jp2", ".jxl", ".bmp", ".ppm", ".tga"}
 HEIF_SUFFIXES = {".heic", ".heif", ".hif", ".avif"}
@@ -16,6 +16,11 @@ PHOTO_MAGIC = (*PHOTO_MAGIC, b"\0\0\0\x0cjP  ")
 RAW_SUFFIXES = {".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".raw"}  # most are TIFF by their bytes
 ATOMS = {b"moov", b"mdat", b"wide", b"free", b"skip"}  # a QuickTime file may begin with any of them
 BY_SUFFIX: dict[str, Kind] = {".splat": "splat", ".ksplat": "ksplat"}  # their first bytes tell nothing
+UNREAD: dict[Kind, str] = {
+    "ksplat": "a .ksplat (GaussianSplats3D)",
+    "sog": "a SOG (PlayCanvas)",
+    "spz4": "an SPZ of version 4 (versions 1 to 3 are read)",
+}
 CONVERTER = "npx @playcanvas/splat-transform"  # Node.js
 
 
@@ -37,8 +42,10 @@ def detect_kind(path: Path) -> Kind:
         return "photo"
     if head.startswith((b"ply\n", b"ply\r")):
         return "ply"
-    if head.startswith(b"\x1f\x8b") and suffix == ".spz" or head.startswith(b"NGSP"):
+    if head.startswith(b"\x1f\x8b") and suffix == ".spz":
         return "spz"
+    if head.startswith(b"NGSP"):
+        return "spz4"
     if head.startswith(b"PK\3\4"):
         return "sog" if _has_member(path, "meta.json") else "other"
     return BY_SUFFIX.get(suffix, "other")
@@ -46,17 +53,9 @@ def detect_kind(path: Path) -> Kind:
 
 def advise_conversion(path: Path, kind: Kind) -> str | None:
     """What a splat is that the library does not read, and the command that converts it; None if it reads this kind."""
-    names = {"ksplat": "a .ksplat (GaussianSplats3D)", "sog": "a SOG (PlayCanvas)"}
-    if kind == "spz" and _begins_with(path, b"NGSP"):
-        names["spz"] = "an SPZ of version 4 (versions 1 to 3 are read)"
     source = path / "meta.json" if path.is_dir() else path  # an unpacked SOG is a folder
     command = f"{CONVERTER} {shlex.quote(str(source))} {shlex.quote(f'{path.stem}.ply')}"
-    return f"is {names[kind]}; convert it: {command}" if kind in names else None
-
-
-def _begins_with(path: Path, magic: bytes) -> bool:
-    with path.open("rb") as file:
-        return file.read(len(magic)) == magic
+    return f"is {UNREAD[kind]}; convert it: {command}" if kind in UNREAD else None
 
 
 def _has_member(path: Path, name: str) -> bool:

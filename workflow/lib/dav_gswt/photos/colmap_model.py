@@ -15,6 +15,8 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 
+pycolmap.logging.minloglevel = 2  # it reports every step of every photo on stderr; progress is reported instead
+
 WORST_ERROR = 4.0  # pixels: an observation farther from its point's projection is a wrong match
 LEAST_ANGLE = 1.5  # degrees between two rays, below which their crossing says nothing about depth
 
@@ -42,11 +44,6 @@ class ColmapModel:
         return self.cameras[self.names.index(name)]
 
 
-def silence_pycolmap() -> None:
-    """Stop pycolmap from reporting every step of every photo on stderr; progress is reported instead."""
-    pycolmap.logging.minloglevel = 2
-
-
 def bundle_adjust(
     stored: pycolmap.Reconstruction, refine_focal_length: bool = False, priors: Sequence[pycolmap.PosePrior] = ()
 ) -> None:
@@ -55,7 +52,6 @@ def bundle_adjust(
     With `priors`, positions of cameras, whose outliers are held back, lenses stay; without, two cameras hold the
     world's frame.
     """
-    silence_pycolmap()
     options = pycolmap.BundleAdjustmentOptions(
         refine_focal_length=refine_focal_length, refine_extra_params=not priors, print_summary=False
     )
@@ -97,10 +93,7 @@ def reprojection_errors(model: ColmapModel) -> Float[Array, "m"]:
 
 def count_shared_points(model: ColmapModel) -> Int[Array, "images images"]:
     """How many points each pair of images sees in common; on the diagonal, how many each sees."""
-    shape = len(model.names), len(model.points)
-    sees = csr_array((np.ones(len(model.image_of), np.int64), (model.image_of, model.point_of)), shape=shape)
-    sees.data[:] = 1  # a point may be seen twice in one image
-    return (sees @ sees.T).toarray()
+    return _count_common(model.image_of, model.point_of, len(model.names))
 
 
 def group_images(model: ColmapModel, least: int) -> tuple[Int[Array, "images"], Int[Array, "groups groups"]]:
@@ -112,14 +105,19 @@ def group_images(model: ColmapModel, least: int) -> tuple[Int[Array, "images"], 
     ties = (np.bincount(model.point_of, minlength=len(model.points)) >= 3)[model.point_of]
     group, count = np.arange(len(model.names)), -1
     while True:
-        at = group[model.image_of[ties]], model.point_of[ties]
-        sees = csr_array((np.ones(len(at[0]), np.int64), at), shape=(group.max(initial=0) + 1, len(model.points)))
-        sees.data[:] = 1
-        shared = (sees @ sees.T).toarray()
+        shared = _count_common(group[model.image_of[ties]], model.point_of[ties], int(group.max(initial=0)) + 1)
         found, merged = connected_components(shared >= least, directed=False)
         if found == count:
             return group, shared
         group, count = merged[group], found
+
+
+def _count_common(rows: Int[Array, "m"], points: Int[Array, "m"], count: int) -> Int[Array, "count count"]:
+    """How many points each pair of `count` rows has in common."""
+    shape = count, points.max(initial=0) + 1
+    sees = csr_array((np.ones(len(rows), np.int64), (rows, points)), shape=shape)
+    sees.data[:] = 1  # a point may be seen twice in one image
+    return (sees @ sees.T).toarray()
 
 
 def triangulate_model(model: ColmapModel, names: Sequence[str]) -> ColmapModel:
@@ -138,9 +136,14 @@ def triangulate_model(model: ColmapModel, names: Sequence[str]) -> ColmapModel:
     part = select_points(part, np.bincount(part.point_of, minlength=len(part.points)) >= 2)
     points, spread = intersect_rays(part)
     part = replace(part, points=points)
-    good = spread >= 1 - np.cos(np.radians(LEAST_ANGLE))
-    np.logical_and.at(good, part.point_of, reprojection_errors(part) <= WORST_ERROR)
-    return select_points(part, good)
+    return drop_wrong_points(part, spread >= 1 - np.cos(np.radians(LEAST_ANGLE)))
+
+
+def drop_wrong_points(model: ColmapModel, good: Bool[Array, "n"]) -> ColmapModel:
+    """The model of its good points, without those that are off by more than WORST_ERROR in an image."""
+    good = good.copy()
+    np.logical_and.at(good, model.point_of, reprojection_errors(model) <= WORST_ERROR)
+    return select_points(model, good)
 
 
 def intersect_rays(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:
@@ -211,7 +214,6 @@ def colour_points(model: ColmapModel, pictures: Sequence[Path]) -> Float32[Array
 
 def read_colmap_model(folder: Path | str) -> ColmapModel:
     """Read a COLMAP model of pinhole cameras, its images by name. Raises: InputError: missing, damaged, no pinhole."""
-    silence_pycolmap()
     try:
         stored = pycolmap.Reconstruction(str(folder))
     except Exception as error:  # the library raises what its C++ does, bare RuntimeErrors among it
@@ -265,8 +267,12 @@ def make_lens(camera: Camera) -> pycolmap.Camera:
 
 
 def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
-    """Write a COLMAP model (binary) into an existing folder; images are numbered from 1 in the model's order."""
-    silence_pycolmap()
+    """Write a COLMAP model (binary) into an existing folder."""
+    make_reconstruction(model).write(str(folder))
+
+
+def make_reconstruction(model: ColmapModel) -> pycolmap.Reconstruction:
+    """The model for pycolmap; images are numbered from 1 in the model's order."""
     stored = pycolmap.Reconstruction()
     numbers: dict[tuple, int] = {}
     place = np.zeros(len(model.pixels), int)  # of an observation among those of its image
@@ -288,4 +294,4 @@ def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
         track = [pycolmap.TrackElement(int(model.image_of[k]) + 1, int(place[k])) for k in range(a, b)]
         stored.add_point3D(point, pycolmap.Track(track), colour)
     stored.update_point_3d_errors()
-    stored.write(str(folder))
+    return stored

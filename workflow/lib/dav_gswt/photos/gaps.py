@@ -21,7 +21,8 @@ from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import figures
 from dav_gswt.photos.colmap_model import ColmapModel
-from dav_gswt.photos.view_split import find_aim_point
+from dav_gswt.photos.ground_frame import find_visible_points
+from dav_gswt.photos.view_split import find_aim_point, measure_picture_share
 
 FINE, MOST = 40, 400  # cells in a flying height, and along the longer side of the map at most
 NEED = 3  # photos that must see a place
@@ -38,6 +39,7 @@ REASONS = ("seen by no photo", "seen by too few photos", "seen from one side onl
 COLOURS = ("#882255", "#d55e00", "#e69f00", "#56b4e9")
 WELL, BEYOND = -1, -2  # in place of a reason: seen well, not asked for
 GOOD, BACK = "#b8d8b8", "#ffffff"
+DOWN = 5.0  # degrees off straight down, within which a camera has no arrow
 LABELLED, LISTED = 20, 10  # gaps that have their number on the map, that are told of one by one
 
 
@@ -127,7 +129,7 @@ def find_gaps(model: ColmapModel, frame: SceneFrame, blurred: Collection[str] = 
     """The gaps of a photo set over its ground. model: in the frame's world. blurred: photos that do not count."""
     reach = REACH * frame.flying_height
     pairs = [*zip(model.names, model.cameras, strict=True)]
-    horizon = tuple(name for name, camera in pairs if measure_ground_share(camera, reach) < HORIZON)
+    horizon = tuple(name for name, camera in pairs if _shows_horizon(camera, reach))
     cameras = [camera for name, camera in pairs if name not in {*blurred, *horizon}]
     surface = build_surface(model, frame, cameras or [*model.cameras])
     views = measure_cells(cameras, surface, reach)
@@ -147,12 +149,10 @@ def find_gaps(model: ColmapModel, frame: SceneFrame, blurred: Collection[str] = 
     )
 
 
-def measure_ground_share(camera: Camera, reach: float) -> float:
-    """The share of a picture that shows ground (z = 0) nearer than `reach`."""
-    origins, rays = camera.resized(16, 12).rays()
-    with np.errstate(divide="ignore"):
-        distance = origins[..., 2] / -rays[..., 2] * np.linalg.norm(rays, axis=-1)
-    return float(((distance > 0) & (distance < reach)).mean())
+def _shows_horizon(camera: Camera, reach: float) -> bool:
+    """Whether a picture shows more of the horizon than of the ground nearer than `reach`."""
+    x, y, _ = camera.centre.tolist()
+    return measure_picture_share(camera, (x - reach, y - reach, x + reach, y + reach)) < HORIZON
 
 
 def build_surface(model: ColmapModel, frame: SceneFrame, cameras: Sequence[Camera]) -> Surface:
@@ -203,9 +203,7 @@ def find_seen_cells(camera: Camera, surface: Surface, reach: float) -> Int[Array
     lies behind it if it rises above the line by more than half a cell, since heights are not exact.
     """
     points = surface.centres
-    at, depth = camera.project(points)
-    inside = (depth > 0) & (at > 0).all(1) & (at < [camera.width, camera.height]).all(1)
-    rows = np.flatnonzero(inside & (np.linalg.norm(points - camera.centre, axis=1) < reach))
+    rows = np.flatnonzero(find_visible_points(camera, points, reach))
     start, way = points[rows], camera.centre - points[rows]
     level = np.maximum(np.linalg.norm(way[:, :2], axis=1), 1e-9)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -243,22 +241,14 @@ def list_gaps(fault: Int[Array, "rows columns"], surface: Surface) -> tuple[Gap,
         own = pieces[box] == piece
         counts = np.bincount(fault[box][own], minlength=len(REASONS)) * surface.cell**2
         start = corner + surface.cell * np.array([box[1].start, box[0].start])
-        rings = [
-            start + surface.cell * (ring[:, ::-1] - 0.5) for ring in find_contours(np.pad(own, 1).astype(float), 0.5)
-        ]
-        rings = sorted(rings, key=lambda ring: -abs(measure_ring(ring)))
-        turned = [ring if (measure_ring(ring) > 0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)]
+        outlines = find_contours(np.pad(own, 1).astype(float), 0.5, positive_orientation="low")
+        rings = [start + surface.cell * (line[:, ::-1] - 0.5) for line in outlines]
+        rings.sort(key=lambda ring: -np.ptp(ring, axis=0).max())  # the outer one first
         deep = np.unravel_index(ndimage.distance_transform_edt(np.pad(own, 1))[1:-1, 1:-1].argmax(), own.shape)
         middle = start + surface.cell * (np.array(deep[::-1]) + 0.5)
         areas = {reason: float(area) for reason, area in zip(REASONS, counts, strict=True) if area}
-        found.append(Gap(areas, tuple(turned), np.r_[middle, surface.find_heights(middle[None])]))
+        found.append(Gap(areas, tuple(rings), np.r_[middle, surface.find_heights(middle[None])]))
     return tuple(sorted(found, key=lambda gap: -gap.area))
-
-
-def measure_ring(ring: Float[Array, "n 2"]) -> float:
-    """The area inside a closed line, positive if it runs counterclockwise."""
-    x, y = (ring - ring[0]).T
-    return 0.5 * float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum())
 
 
 def plan_photos(gaps: Gaps, frame: SceneFrame, lens: Camera) -> list[Camera]:
@@ -277,16 +267,15 @@ def plan_photos(gaps: Gaps, frame: SceneFrame, lens: Camera) -> list[Camera]:
     knots = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True))), -1).reshape(-1, 2)
     window = np.maximum(1, np.round(size[::-1] / surface.cell).astype(int))
     highest = replace(surface, heights=ndimage.maximum_filter(surface.heights, tuple(window)))
-    grounds, cameras, sees = highest.find_heights(knots * step), [], np.zeros((len(knots), len(missed)), bool)
-    for knot, ground, row in zip(knots * step, grounds, sees, strict=True):
+    cameras = []
+    for knot, ground in zip(knots * step, highest.find_heights(knots * step), strict=True):
         rotation, translation = look_at([*knot, ground + height], [*knot, ground])
         cameras.append(replace(lens, rotation=rotation, translation=translation))
-        near = np.flatnonzero((np.abs(at - knot) < size).all(1))
-        seen = find_seen_cells(cameras[-1], surface, REACH * height) if len(near) else []
-        row[near] = np.isin(missed[near], seen)
+    sees = np.stack([np.isin(missed, find_seen_cells(camera, surface, REACH * height)) for camera in cameras])
     chosen, left = [], np.full(len(missed), NEED)
     while True:
-        gain = np.where(np.isin(np.arange(len(knots)), chosen), 0, np.count_nonzero(sees & (left > 0), axis=1))
+        gain = np.count_nonzero(sees & (left > 0), axis=1)
+        gain[chosen] = 0
         if not gain.any():
             return [cameras[i] for i in sorted(chosen)]
         chosen.append(int(gain.argmax()))
@@ -350,9 +339,15 @@ def _format_place(at: Float[Array, "3"], frame: SceneFrame) -> str:
     return f", at {latitude:.6f}, {longitude:.6f}"
 
 
-def draw_gaps(gaps: Gaps, model: ColmapModel, frame: SceneFrame, unused: Collection[str] = ()):
-    """The map: ground by what is wrong with it, and where the photos were taken. unused: photos that do not count."""
+def draw_gaps(
+    gaps: Gaps, model: ColmapModel, frame: SceneFrame, unused: Collection[str] = (), tests: Collection[str] = ()
+):
+    """The map: ground by what is wrong with it, the exemplar, and where the photos were taken and look.
+
+    unused: photos that do not count. tests: that only test.
+    """
     from matplotlib.colors import BoundaryNorm, ListedColormap  # not above: it loads for a second
+    from matplotlib.patches import Rectangle
 
     surface, unit = gaps.surface, "m" if frame.unit == "metre" else "flying heights"
     rows, columns = surface.heights.shape
@@ -373,25 +368,44 @@ def draw_gaps(gaps: Gaps, model: ColmapModel, frame: SceneFrame, unused: Collect
         interpolation="nearest",
     )
     axes.contour(x, y, np.where(here, surface.heights, np.nan), 8, colors="k", alpha=0.2, linewidths=0.5)
+    square = frame.exemplar
+    axes.add_patch(Rectangle((square.west, square.south), square.side, square.side, fill=False, ls="--", lw=1.5))
     marks = [axes.plot([], [], "s", color=colour, ms=9)[0] for colour in (GOOD, *COLOURS)]
     names = ["seen well", *REASONS]
-    for name, mark, out in (("photos", "k.", False), ("photos that do not count", "kx", True)):
-        chosen = places[[(photo in unused) == out for photo in model.names]]
-        if len(chosen):
-            marks += axes.plot(chosen[:, 0], chosen[:, 1], mark, ms=4)
+    used = {*model.names} - {*unused, *tests}
+    for name, mark, face, photos in (
+        ("photos", ".", "k", used),
+        ("photos that do not count", "x", "k", unused),
+        ("test photos", "o", "w", tests),
+    ):
+        at = places[[photo in photos for photo in model.names]]
+        if len(at):
+            marks += axes.plot(at[:, 0], at[:, 1], color="k", ls="", ms=4, marker=mark, mfc=face)
             names.append(name)
+    for camera in model.cameras:
+        _draw_direction(axes, camera, frame.flying_height)
     for number, gap in enumerate(gaps.gaps[:LABELLED], 1):
         outline = {"boxstyle": "circle,pad=0.25", "fc": "w", "ec": "k", "lw": 0.8}
         axes.text(gap.middle[0], gap.middle[1], str(number), ha="center", va="center", fontsize=8, bbox=outline)
     figure.legend(marks, names, loc="outside lower center", ncols=4, fontsize=8, frameon=False)
     if frame.georeference:
-        draw_north(axes, frame.georeference)
+        _draw_north(axes, frame.georeference)
     axes.set(xlabel=f"x, {unit}", ylabel=f"y, {unit}", aspect="equal")
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     return figure
 
 
-def draw_north(axes, place: Georeference) -> None:
+def _draw_direction(axes, camera: Camera, unit: float) -> None:
+    """An arrow of at most half a flying height to where the middle of a picture looks; none if that is down."""
+    start, ahead = camera.centre[:2], find_aim_point(camera) - camera.centre[:2]
+    if camera.forward[2] > -0.1:  # it looks to the horizon
+        ahead = unit * camera.forward[:2]
+    if -camera.forward[2] < np.cos(np.radians(DOWN)):
+        ahead = ahead * min(1.0, 0.5 * unit / max(float(np.linalg.norm(ahead)), 1e-12))
+        axes.annotate("", start + ahead, start, arrowprops={"arrowstyle": "->", "shrinkA": 0})
+
+
+def _draw_north(axes, place: Georeference) -> None:
     """An arrow to the north in the corner of a map."""
     turn = np.radians(place.north)
     tip = np.array([0.93, 0.93]) + 0.07 * np.array([-np.sin(turn), np.cos(turn)])

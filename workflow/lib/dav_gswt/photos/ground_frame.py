@@ -1,7 +1,7 @@
 """The ground frame: z up, the ground near z = 0, and the square of ground that is seen well enough."""
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -37,6 +37,13 @@ class Coverage:
     south: float
     cell: float
     counts: Int[Array, "rows columns"]
+
+    @property
+    def centres(self) -> Float[Array, "n 2"]:
+        rows, columns = self.counts.shape
+        x = self.west + (np.arange(columns) + 0.5) * self.cell
+        y = self.south + (np.arange(rows) + 0.5) * self.cell
+        return np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
 
 
 def fit_plane(
@@ -131,7 +138,6 @@ def fit_ground_frame(
         flying_height=unit,
         exemplar=Square(unit * west, unit * south, unit * side),
         extent=extent,
-        photos_per_cell=need,
         relief=relief,
         georeference=_georeference(model, flat, about) if about else None,
     )
@@ -161,20 +167,18 @@ def count_coverage(cameras: tuple[Camera, ...], points: Float[Array, "n 3"], cel
     low, high = low - NEAR, high + NEAR
     cell = float((high - low).max() / cells)
     columns, rows = np.maximum(1, np.ceil((high - low) / cell - 1e-9).astype(int))
-    x, y = np.meshgrid(low[0] + (np.arange(columns) + 0.5) * cell, low[1] + (np.arange(rows) + 0.5) * cell)
-    centres = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], 1)
-    counts = np.zeros(x.size, int)
-    for camera in cameras:
-        counts += find_visible_points(camera, centres)
-    return Coverage(float(low[0]), float(low[1]), cell, counts.reshape(rows, columns))
+    grid = Coverage(float(low[0]), float(low[1]), cell, np.zeros((rows, columns), int))
+    centres = np.c_[grid.centres, np.zeros(rows * columns)]
+    counts = sum(find_visible_points(camera, centres).astype(int) for camera in cameras)
+    return replace(grid, counts=np.reshape(counts, (rows, columns)))
 
 
-def find_visible_points(camera: Camera, points: Float[Array, "n 3"]) -> Bool[Array, "n"]:
-    """Which points lie inside the picture, before the camera and within REACH."""
+def find_visible_points(camera: Camera, points: Float[Array, "n 3"], reach: float = REACH) -> Bool[Array, "n"]:
+    """Which points lie inside the picture, before the camera and nearer than `reach`."""
     at, depth = camera.project(points)
     x, y = at.T
     away = points - camera.centre
-    near = np.einsum("ni,ni->n", away, away) < REACH**2
+    near = np.einsum("ni,ni->n", away, away) < reach**2
     return (depth > 0) & (x > 0) & (x < camera.width) & (y > 0) & (y < camera.height) & near
 
 
@@ -250,12 +254,8 @@ def _turn_model(model: ColmapModel, degrees: float) -> ColmapModel:
 
 def _well_seen(model: ColmapModel, grid: Coverage, need: int) -> Bool[Array, "rows columns"]:
     """Cells that enough photos see and that have a point nearby."""
-    rows, columns = grid.counts.shape
-    x = grid.west + (np.arange(columns) + 0.5) * grid.cell
-    y = grid.south + (np.arange(rows) + 0.5) * grid.cell
-    centres = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-    distance, _ = cKDTree(model.points[:, :2]).query(centres, distance_upper_bound=NEAR)
-    return (grid.counts >= need) & np.isfinite(distance).reshape(rows, columns)
+    distance, _ = cKDTree(model.points[:, :2]).query(grid.centres, distance_upper_bound=NEAR)
+    return (grid.counts >= need) & np.isfinite(distance).reshape(grid.counts.shape)
 
 
 def _find_square(model: ColmapModel, need: int, cells: int = CELLS) -> tuple[float, float, float]:

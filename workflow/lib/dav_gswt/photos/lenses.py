@@ -103,13 +103,13 @@ def make_camera(model: str, width: int, height: int, params: tuple[float, ...], 
 
 
 def undistort_scene_photo(
-    photo: Float32[Array, "h w 3"], folder: Path | str, camera: Camera, turned: bool = False
+    photo: Float32[Array, "h w 3"], folder: Path | str, camera: Camera
 ) -> Float32[Array, "r c 3"]:
     """The picture that the scene's pinhole `camera` would have taken, from a photo by the scene's lens.
 
-    turned: the camera may have been held upright where the scene's was not, or the other way round. Such a photo is
-    turned to the sensor's shape, by a quarter counterclockwise, which takes EXIF's usual turn back. A phone that looks
-    straight down writes any orientation.
+    The camera may have been held upright where the scene's was not, or the other way round. Such a photo is turned to
+    the sensor's shape, by a quarter counterclockwise, which takes EXIF's usual turn back. A phone that looks straight
+    down writes any orientation.
     Raises: InputError: a photo of another shape, or of a lens that the scene does not have.
     """
     lenses = read_lenses(folder)
@@ -119,12 +119,12 @@ def undistort_scene_photo(
             f"{folder}/lenses.json: has no lens of such a picture; take photos with the scene's own camera"
         )
     width, height = (own.camera.width, own.camera.height) if own else (camera.width, camera.height)
-    if turned and (photo.shape[0] > photo.shape[1]) != (height > width):
+    if (photo.shape[0] > photo.shape[1]) != (height > width):
         photo = np.rot90(photo)
     if abs(photo.shape[1] * height / (photo.shape[0] * width) - 1) > ASPECT:
         raise InputError(
             f"a photo of {photo.shape[1]} x {photo.shape[0]} pixels is not of the scene's camera "
-            f"({width} x {height}); take photos with the same camera, uncropped{'' if turned else ' and not turned'}"
+            f"({width} x {height}); take photos with the same camera, uncropped"
         )
     photo = image_files.shrink_image(photo, width, height)
     return undistort_photo(photo, own.camera, camera) if own else photo

@@ -123,7 +123,8 @@ def import_field(
     """
     given = read_splat(source)
     if given.sh_degree > 0:
-        splat.report_dropped_harmonics(given.sh_degree)
+        text = "view-dependent colour (degree %d) is dropped: the colour from all sides is kept"
+        _log.warning(text, given.sh_degree)
     usual = splat.UP_OF_SPZ if detect_kind(Path(source)) == "spz" else splat.UP
     try:
         entered, frame = splat.fit_field_frame(given.field, np.random.default_rng(seed), up, crop, given.origin, usual)

@@ -11,8 +11,8 @@ from dav_gswt.images.file_kinds import Kind, advise_conversion, detect_kind
 from dav_gswt.photos.photo_listing import PICTURES, PhotoListing, list_photos
 
 LEAST_PHOTOS = 3
-SPLATS: tuple[Kind, ...] = ("ply", "spz", "splat", "ksplat", "sog")
-COLMAP_FILES = ("cameras.bin", "cameras.txt")
+SPLATS: tuple[Kind, ...] = ("ply", "spz", "spz4", "splat", "ksplat", "sog")
+COLMAP_PARTS = ("cameras", "images")
 OPENSFM_FILES = ("opensfm/reconstruction.json", "reconstruction.json")
 SPLAT_PROPERTY = re.compile(rb"property (float|float32|double|float64) f_dc_0\b")  # a .ply that holds Gaussians
 PACKED_PROPERTY = b"packed_position"
@@ -121,17 +121,25 @@ def _recognize_folder(folder: Path, name: str, model: Path | None) -> Recognised
     return Recognised(entry, about, name)
 
 
+def find_colmap_folder(folder: Path) -> Path | None:
+    """The folder at or below this one that holds a COLMAP model, if any; of several the largest."""
+    below = sorted(folder.glob("[0-9]*")), sorted((folder / "sparse").glob("[0-9]*"))
+    places = [folder, folder / "sparse", *below[0], *below[1]]
+    found = [place for place in places if find_colmap_ending(place)]
+    return max(found, key=lambda place: (place / f"images.{find_colmap_ending(place)}").stat().st_size, default=None)
+
+
+def find_colmap_ending(folder: Path) -> str | None:
+    """Whether the files of a COLMAP model in a folder are `bin` or `txt`; None: there is none."""
+    kinds = (kind for kind in ("bin", "txt") if all((folder / f"{part}.{kind}").is_file() for part in COLMAP_PARTS))
+    return next(kinds, None)
+
+
 def _find_models(folder: Path) -> list[tuple[str, Path]]:
     """The camera models in a folder: the program, and what it wrote."""
-    models = []
-    if any((folder / name).is_file() for name in COLMAP_FILES):
-        models.append(("COLMAP", folder))
-    else:
-        sparse = [folder / "sparse", *sorted((folder / "sparse").glob("[0-9]*"))]
-        found = [place for place in sparse if any((place / name).is_file() for name in COLMAP_FILES)]
-        sizes = [sum(path.stat().st_size for path in place.glob("images.*")) for place in found]
-        models += [("COLMAP", found[sizes.index(max(sizes))])] if found else []
-    models += [("nerfstudio", folder / "transforms.json")] * (folder / "transforms.json").is_file()
+    colmap, nerfstudio = find_colmap_folder(folder), folder / "transforms.json"
+    models = [("COLMAP", colmap)] if colmap else []
+    models += [("nerfstudio", nerfstudio)] if nerfstudio.is_file() else []
     opensfm = [folder / name for name in OPENSFM_FILES if (folder / name).is_file()]
     return models + [("OpenSfM", place) for place in opensfm[:1]]
 

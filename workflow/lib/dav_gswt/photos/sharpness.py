@@ -38,9 +38,9 @@ def measure_detail(grey: Float32[Array, "h w"]) -> float:
     return min(shares)
 
 
-def find_threshold(detail: Float[Array, "n"]) -> float:
-    """The detail below which a picture of a set is blurred."""
-    return BLUR * float(np.percentile(detail, USUAL))
+def find_threshold(detail: Float[Array, "n"], blur: float = BLUR) -> float:
+    """The detail below which a picture of a set is blurred. blur: that share of the usual detail."""
+    return blur * float(np.percentile(detail, USUAL))
 
 
 def _contrast(grey: Float32[Array, "h w"], dy: int, dx: int) -> float:

@@ -8,6 +8,7 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import av
@@ -16,24 +17,24 @@ import numpy as np
 from av.container import InputContainer
 from av.stream import Disposition
 from av.video.reformatter import ColorTrc
-from jaxtyping import Complex64, Float, Float32, Int, UInt8
+from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 from PIL import Image
 from scipy import fft
+from skimage.registration import phase_cross_correlation
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder
 from dav_gswt.images import image_files
 from dav_gswt.images.hdr import Curve, convert_hdr
 from dav_gswt.logs import progress
+from dav_gswt.photos.sharpness import find_threshold
 
 _log = logging.getLogger(__name__)
 
 SIDE = 640  # pixels of the longer side at which frames are measured
-FINE, COARSE = (
-    (0.15, 0.375),
-    (0.025, 0.075),
-)  # cycles a pixel there: waves of 4 to 10 pixels of a photo of 960, and of 20 to 60
+# Cycles a pixel there: waves of 4 to 10 pixels of a photo of 960, and of 20 to 60.
+FINE, COARSE = (0.15, 0.375), (0.025, 0.075)
 SECTORS = 8  # directions of waves
 SHRUNK = 4  # times coarser is the picture whose motion is measured
 MOST_A_SECOND = 15  # frames that are measured: more are hardly farther along
@@ -43,7 +44,6 @@ LOOSE = 0.4  # a step between chosen frames above which they may not hang togeth
 LEAST_MOTION = 0.5  # pictures in all: less is a camera that stands still
 LEAST_FRAMES = 3
 BLUR = 0.25  # a frame with less than this share of the usual fine detail is blurred
-USUAL = 80  # percentile of all frames that is usual
 HOP = 0.1  # of a picture that the view moves on until frames are compared with a new one
 LONGEST = 3600.0  # seconds
 HDR: dict[int, Curve] = {ColorTrc.ARIB_STD_B67: "hlg", ColorTrc.SMPTE2084: "pq"}
@@ -54,7 +54,7 @@ FORMATS = "mov,mp4,m4a,3gp,3g2,mj2"  # no playlist, whose entries may be files a
 @dataclass(frozen=True)
 class FrameMeasures:
     """Of each measured frame: its number in the video, the time at which it is shown (seconds), its fine detail (see
-    `FrameMeter`), and how far the picture has moved so far, in pictures."""
+    `measure_detail`), and how far the picture has moved so far, in pictures."""
 
     number: Int[Array, "n"]
     time: Float[Array, "n"]
@@ -87,92 +87,90 @@ def write_frames(video: Path | str, out: Path | str, threads: int = 1, most: int
 
 def measure_frames(video: Path | str, threads: int = 1) -> FrameMeasures:
     """Detail and motion of the frames, of at most MOST_A_SECOND a second. Raises: InputError: as `write_frames`."""
-    rows, meter = [], None
+    rows, motion = [], MotionMeter()
     for number, frame in _decode(video, threads, report=True):
         time = float(number if frame.time is None else frame.time)
         if rows and 0 <= time - rows[-1][1] < 0.99 / MOST_A_SECOND:
             continue
-        meter = meter or FrameMeter(image_files.fit_size(frame.width, frame.height, SIDE))
-        shrunk = frame.reformat(*meter.size, "gray", interpolation="AREA", threads=threads)
-        rows.append((number, time, *meter.measure(shrunk.to_ndarray())))
+        detail = measure_detail(_shrink(frame, SIDE, threads))
+        rows.append((number, time, detail, motion.follow(_shrink(frame, SIDE // SHRUNK, threads))))
     if not rows:
         raise InputError(f"{video}: has no frame that can be read; copy it again, or export it as MP4")
     number, time, detail, moved = zip(*rows, strict=True)
     return FrameMeasures(np.array(number), np.array(time), np.array(detail), np.array(moved))
 
 
-class FrameMeter:
-    """Measures the frames of a video one after the other, by their spectra. size: width and height, pixels.
+def measure_detail(grey: Float32[Array, "h w"]) -> float:
+    """The power of fine waves over that of coarse ones, in the direction that has least.
 
-    Detail is the power of fine waves over that of coarse ones, in the direction that has least: motion blurs along one
-    direction, a lens out of focus along all. The way is the sum of shifts, each against a frame some way back and not
-    the one before: so slow motion counts, and a hand that trembles on the spot does not.
+    Motion blurs along one direction, a lens out of focus along all. Frames that show much the same are told apart more
+    clearly than by `sharpness.measure_detail`, which depends less on what is shown.
+    """
+    fine, coarse, sector = _split_waves(*grey.shape)
+    faded = (grey - grey.mean()) * _make_window(*grey.shape)
+    power = np.abs(fft.rfft2(faded)) ** 2
+    known = np.bincount(sector, power[fine], SECTORS) / np.maximum(np.bincount(sector, minlength=SECTORS), 1)
+    usual = float(power[coarse].mean()) if coarse.any() else 0.0
+    return float(known.min()) / usual if usual > 0 else 0.0
+
+
+@lru_cache(maxsize=1)
+def _split_waves(height: int, width: int) -> tuple[Bool[Array, "h k"], Bool[Array, "h k"], Int[Array, "_"]]:
+    """Which waves of a spectrum are fine, which are coarse, and in which of SECTORS directions each fine one runs."""
+    y, x = fft.fftfreq(height)[:, None], fft.rfftfreq(width)[None, :]
+    wave, angle = np.hypot(x, y), np.arctan2(y, x + 0 * y) % np.pi
+    fine, coarse = ((wave >= low) & (wave < high) for low, high in (FINE, COARSE))
+    return fine, coarse, np.minimum((angle[fine] * SECTORS / np.pi).astype(int), SECTORS - 1)
+
+
+@lru_cache(maxsize=2)
+def _make_window(height: int, width: int) -> Float32[Array, "h w"]:
+    """What lets a picture fade out towards its border."""
+    return np.outer(np.hanning(height), np.hanning(width)).astype(np.float32)
+
+
+class MotionMeter:
+    """Measures how far the picture of a video has moved, frame by frame.
+
+    The way is the sum of shifts, each against a frame some way back and not the one before: so slow motion counts, and
+    a hand that trembles on the spot does not.
     """
 
-    def __init__(self, size: tuple[int, int]):
-        self.size = size
-        width, height = size
-        y, x = fft.fftfreq(height)[:, None], fft.rfftfreq(width)[None, :]
-        wave, angle = np.hypot(x, y), np.arctan2(y, x + 0 * y) % np.pi
-        self._fine, self._coarse = ((wave >= low) & (wave < high) for low, high in (FINE, COARSE))
-        self._sector = np.minimum((angle[self._fine] * SECTORS / np.pi).astype(int), SECTORS - 1)
-        self._count = np.maximum(np.bincount(self._sector, minlength=SECTORS), 1)
-        self._window = np.outer(np.hanning(height), np.hanning(width)).astype(np.float32)
-        self._shape = max(height // SHRUNK // 2 * 2, 2), max(width // SHRUNK // 2 * 2, 2)
-        self._behind, self._way = None, 0.0
+    def __init__(self):
+        self._behind: Float32[Array, "h w"] | None = None
+        self._way = 0.0
 
-    def measure(self, grey: UInt8[Array, "h w"]) -> tuple[float, float]:
-        """The next frame's detail, and how far the picture has moved up to it, in pictures."""
-        values = grey.astype(np.float32)
-        spectrum = fft.rfft2((values - values.mean()) * self._window)
-        return self._measure_detail(np.abs(spectrum) ** 2), self._follow(spectrum)
-
-    def _measure_detail(self, power: Float32[Array, "h k"]) -> float:
-        fine = np.bincount(self._sector, power[self._fine], SECTORS) / self._count
-        coarse = float(power[self._coarse].mean()) if self._coarse.any() else 0.0
-        return float(fine.min()) / coarse if coarse > 0 else 0.0
-
-    def _follow(self, spectrum: Complex64[Array, "h k"]) -> float:
-        height, width = self._shape
-        rows = np.r_[: height // 2, -(height // 2) : 0]
-        shrunk = spectrum[rows, : width // 2 + 1]
+    def follow(self, grey: Float32[Array, "h w"]) -> float:
+        """The way up to the next frame, in pictures."""
+        faded = (grey - grey.mean()) * _make_window(*grey.shape)
+        if not faded.any():  # a black frame
+            return self._way
         if self._behind is None:
-            self._behind = shrunk
-        down, right = find_shift(self._behind, shrunk, self._shape)
-        shift = float(np.hypot(down / height, right / width))
+            self._behind = faded
+        moved, _, _ = phase_cross_correlation(self._behind, faded)
+        shift = float(np.linalg.norm(moved / grey.shape))
         if shift < HOP:
             return self._way + shift
-        self._behind, self._way = shrunk, self._way + shift
+        self._behind, self._way = faded, self._way + shift
         return self._way
 
 
-def find_threshold(detail: Float[Array, "n"]) -> float:
-    """The detail below which a frame is blurred."""
-    return BLUR * float(np.percentile(detail, USUAL))
+def _shrink(frame: av.VideoFrame, side: int, threads: int) -> Float32[Array, "h w"]:
+    """A frame in grey, at most `side` pixels along the longer side."""
+    size = image_files.fit_size(frame.width, frame.height, side)
+    return frame.reformat(*size, "gray", interpolation="AREA", threads=threads).to_ndarray().astype(np.float32)
 
 
 def choose_frames(measures: FrameMeasures, most: int = MOST_FRAMES) -> Int[Array, "k"]:
     """The sharpest frame of each stretch of the way, blurred ones left out; at most `most` stretches."""
     step = max(STEP, float(measures.moved.max()) / most)
     stretch = np.minimum((measures.moved / step).astype(int), most - 1)
-    sharp = measures.detail >= find_threshold(measures.detail)
+    sharp = measures.detail >= find_threshold(measures.detail, BLUR)
     chosen = []
     for number in np.unique(stretch[sharp]):
         among = np.flatnonzero(sharp & (stretch == number))
         chosen.append(among[measures.detail[among].argmax()])
     return np.array(sorted(chosen), int)
-
-
-def find_shift(a: Complex64[Array, "h k"], b: Complex64[Array, "h k"], shape: tuple[int, int]) -> tuple[float, float]:
-    """Rows and columns by which `b` has moved against `a`, from their spectra: the peak of phase correlation."""
-    cross = b * np.conj(a)
-    peak = fft.irfft2(cross / np.maximum(np.abs(cross), 1e-12), shape)
-    row, column = np.unravel_index(peak.argmax(), shape)
-    return _wrap(int(row), shape[0]), _wrap(int(column), shape[1])
-
-
-def _wrap(index: int, size: int) -> float:
-    return float(index - size if index > size / 2 else index)
 
 
 def _develop(frame: av.VideoFrame, threads: int) -> Image.Image:
@@ -185,7 +183,7 @@ def _develop(frame: av.VideoFrame, threads: int) -> Image.Image:
 
 
 def _report_choice(video: Path | str, measures: FrameMeasures, chosen: Int[Array, "k"], most: int) -> None:
-    blurred = measures.detail < find_threshold(measures.detail)
+    blurred = measures.detail < find_threshold(measures.detail, BLUR)
     _log.info(
         "%s: %d frames chosen of %d that were measured, %d of which are blurred",
         *(video, len(chosen), len(blurred), blurred.sum()),
@@ -221,19 +219,9 @@ def _open(video: Path | str) -> Iterator[InputContainer]:
 def _decode(video: Path | str, threads: int, report: bool = False) -> Iterator[tuple[int, av.VideoFrame]]:
     """The frames of a video with their numbers, up to its end or to where it is damaged. report: say how far it is.
 
-    The decoder stops at the first fault, and does not invent what is lost. If it then gives nothing, the fault is one
-    that cameras write, and it is told to be lenient.
+    The decoder invents what is lost, and says of which frames; of some faults that cameras write it only warns.
     Raises: InputError: it cannot be read, is too large or too long.
     """
-    for faults in ("explode", "careful"):
-        number = -1
-        for number, frame in enumerate(_decode_until(faults, video, threads, report)):
-            yield number, frame
-        if number >= 0:
-            break
-
-
-def _decode_until(faults: str, video: Path | str, threads: int, report: bool) -> Iterator[av.VideoFrame]:
     with _open(video) as container:
         streams = [s for s in container.streams.video if not s.disposition & Disposition.attached_pic]
         if not streams:
@@ -243,15 +231,19 @@ def _decode_until(faults: str, video: Path | str, threads: int, report: bool) ->
             raise InputError(f"{video}: {stream.width} x {stream.height} pixels are too many")
         context = stream.codec_context
         context.thread_type, context.thread_count = "FRAME", threads
-        context.options = {"err_detect": faults, "max_pixels": str(image_files.MAX_PIXELS)}
+        context.options = {"err_detect": "careful", "max_pixels": str(image_files.MAX_PIXELS)}
         _require_short(video, (container.duration or 0) / av.time_base)
         time, count = 0.0, 0
         with progress(range(stream.frames if report else 0), "read frames") as bar:
             try:
                 for frame in container.decode(stream):
+                    if frame.is_corrupt and count:
+                        break
+                    if frame.is_corrupt:  # before the first whole one
+                        continue
                     time, count = frame.time or time, count + 1
                     _require_short(video, time)
-                    yield frame
+                    yield count - 1, frame
                     bar.update(int(report))
                 whole = count >= WHOLE * stream.frames
             except (av.error.FFmpegError, OSError):

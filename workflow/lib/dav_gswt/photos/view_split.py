@@ -39,16 +39,6 @@ class ViewSplit:
     test: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class SplitOptions:
-    """start: photos of the first fit; None: all that are left. test: photos to set aside; None: one in ten, and none
-    of fewer than LEAST_WITH_TEST. whole: all ground counts, not only the exemplar."""
-
-    start: int | None = None
-    test: int | None = None
-    whole: bool = False
-
-
 def write_view_split(path: Path | str, split: ViewSplit) -> None:
     """Write views.json."""
     write_json(path, asdict(split))
@@ -59,8 +49,18 @@ def read_view_split(path: Path | str) -> ViewSplit:
     return read_record(path, ViewSplit, "make it again")
 
 
-def split_views(model: "ColmapModel", frame: SceneFrame, options: SplitOptions, rng: np.random.Generator) -> ViewSplit:
+def split_views(
+    model: "ColmapModel",
+    frame: SceneFrame,
+    rng: np.random.Generator,
+    start: int | None = None,
+    test: int | None = None,
+    whole: bool = False,
+) -> ViewSplit:
     """Names of the start views, the pool and the test views.
+
+    start: photos of the first fit; None: all that are left. test: photos to set aside; None: one in ten, and none of
+    fewer than LEAST_WITH_TEST. whole: all ground counts, not only the exemplar.
 
     Images that show too little of the exemplar, or with `whole` of all ground, take no part unless
     too few would remain. Test views are those that ground.json names, else the same for every seed.
@@ -69,23 +69,23 @@ def split_views(model: "ColmapModel", frame: SceneFrame, options: SplitOptions, 
     """
     if unknown := [name for name in frame.test or () if name not in model.names]:
         raise InputError(f"ground.json: test view {unknown[0]} is not among the images")
-    part = frame.extent if options.whole else frame.exemplar
+    part = frame.extent if whole else frame.exemplar
     ground = (part.west, part.south, part.east, part.north)
     sees = [i for i, camera in enumerate(model.cameras) if shows_enough(camera, ground)]
-    enough = len(sees) >= min((options.start or ENOUGH) + 2, ENOUGH)
+    enough = len(sees) >= min((start or ENOUGH) + 2, ENOUGH)
     among = sees if enough else list(range(len(model.names)))
     if frame.test is None:
-        test = choose_test_views(model, ground, among, options.test)
+        tests = choose_test_views(model, ground, among, test)
     else:
-        test = [model.names.index(name) for name in frame.test]
-    others = [i for i in among if i not in test]
+        tests = [model.names.index(name) for name in frame.test]
+    others = [i for i in among if i not in tests]
     if not others:
         raise InputError("every image is a test view; leave some to start from")
     if len(among) < len(model.names):
         _log.info("%d of %d images show enough of the ground to take part", len(among), len(model.names))
-    first = choose_start_views(model, others, options.start or len(others), rng)
+    first = choose_start_views(model, others, start or len(others), rng)
     pool = [i for i in others if i not in first]
-    return ViewSplit(*(tuple(model.names[i] for i in part) for part in (first, pool, test)))
+    return ViewSplit(*(tuple(model.names[i] for i in part) for part in (first, pool, tests)))
 
 
 def choose_test_views(model: "ColmapModel", ground: Bounds, among: list[int], count: int | None = None) -> list[int]:

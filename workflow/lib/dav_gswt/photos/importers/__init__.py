@@ -7,7 +7,9 @@ world of the model. A further format needs a reader that returns an `ImportedMod
 """
 
 import logging
+import tempfile
 from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -15,18 +17,21 @@ import pycolmap
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
-from dav_gswt.photos.colmap_model import WORST_ERROR, ColmapModel, reprojection_errors, select_points
+from dav_gswt.images import image_files
+from dav_gswt.logs import progress
+from dav_gswt.photos.colmap_model import drop_wrong_points, reprojection_errors
 from dav_gswt.photos.importers.checks import LARGEST_JSON, ImportedModel, check_size
-from dav_gswt.photos.importers.colmap import find_colmap_folder, import_colmap
+from dav_gswt.photos.importers.colmap import import_colmap
 from dav_gswt.photos.importers.lens_models import QUARTER, camera_key, require_invertible
 from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.opensfm import import_opensfm
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder, match_photos_to_images
-from dav_gswt.photos.importers.points import triangulate_features
 from dav_gswt.photos.photo_listing import Source
+from dav_gswt.photos.recognition import find_colmap_folder
 from dav_gswt.photos.sfm.gps import GpsPositions
 from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS
-from dav_gswt.photos.sfm.registration import Registration, SfmOptions, replace_lenses
+from dav_gswt.photos.sfm.registration import NEIGHBOURS, Registration, SfmOptions, replace_lenses
+from dav_gswt.photos.sfm.triangulation import triangulate_features
 
 __all__ = ["import_model"]
 
@@ -54,11 +59,11 @@ def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Regis
         _log.warning("%s is left out: %s", name, reason)
     known, sources = _place_photos(placed, given.points), {place.key: place.path for place in placed}
     if not known.num_points3D():
-        known = triangulate_features(known, sources, options)
+        known = _find_points(known, sources, options)
     model, lenses = replace_lenses(known, {p.key: (p.lens.width, p.lens.height) for p in placed}, options.side)
     for name, camera, lens in zip(model.names, model.cameras, lenses, strict=True):
         require_invertible(lens, camera, f"{path}: {sources[name].name}")
-    model = _drop_wrong_points(model)
+    model = drop_wrong_points(model, np.bincount(model.point_of, minlength=len(model.points)) > 0)
     if not len(model.points):
         raise InputError(
             f"{path}: under its cameras the photos share no point; either they are not those that the model was made "
@@ -122,8 +127,20 @@ def _place_photos(placed: list[MatchedPhoto], points: pycolmap.Reconstruction) -
     return known
 
 
-def _drop_wrong_points(model: ColmapModel) -> ColmapModel:
-    """The model without points off by more than WORST_ERROR in an image, as rays beyond a lens's reach give."""
-    good = np.bincount(model.point_of, minlength=len(model.points)) > 0
-    np.logical_and.at(good, model.point_of, reprojection_errors(model) <= WORST_ERROR)
-    return select_points(model, good)
+def _find_points(
+    known: pycolmap.Reconstruction, sources: Mapping[str, Path], options: SfmOptions
+) -> pycolmap.Reconstruction:
+    """The model with points from features of its photos; its lenses are shrunk to the size of the features."""
+    # The world is moved to the cameras' mean meanwhile: coordinates of a map projection run to millions.
+    middle = np.mean([image.projection_center() for image in known.images.values()], axis=0)
+    known.transform(pycolmap.Sim3d(1.0, pycolmap.Rotation3d(), -middle))
+    for camera in known.cameras.values():
+        camera.rescale(*image_files.fit_size(camera.width, camera.height, options.size))
+    with tempfile.TemporaryDirectory(prefix="pictures-") as folder:
+        for _, image in progress(sorted(known.images.items()), "read photos"):
+            photo, camera = image_files.read_photo(sources[image.name]), known.cameras[image.camera_id]
+            shrunk = image_files.shrink_image(photo, camera.width, camera.height)
+            image_files.write_png(Path(folder) / image.name, shrunk)
+        found = triangulate_features(known, Path(folder), NEIGHBOURS, options)
+    found.transform(pycolmap.Sim3d(1.0, pycolmap.Rotation3d(), middle))
+    return found

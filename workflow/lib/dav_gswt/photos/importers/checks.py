@@ -23,7 +23,6 @@ Record = TypeVar("Record")
 LARGEST_JSON = 1 << 28  # bytes; as Python objects a file takes about ten times its size
 LARGEST = 1 << 31  # bytes of any other file
 LONGEST_NAME = 1024
-MOST_IMAGES = 20_000
 ORTHONORMAL = 1e-3  # greatest entry of R R^T - I: files with few digits pass, sheared and scaled axes do not
 _DRIVE = re.compile(r"^[A-Za-z]:")
 
@@ -102,9 +101,3 @@ def check_image_name(value: str, where: str) -> str:
     if not "".join(kept).strip() or len(value) > LONGEST_NAME or not value.isprintable():
         raise InputError(f"{where}: {value[:80]!r} is no name of a picture; write its path below the photos' folder")
     return "/".join(kept)
-
-
-def check_count(images: int, where: str) -> None:
-    """Raises: InputError: more images than are read."""
-    if images > MOST_IMAGES:
-        raise InputError(f"{where}: {images} images; at most {MOST_IMAGES} are read: leave some out")

@@ -12,33 +12,21 @@ from pathlib import Path
 import pycolmap
 
 from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.photos.colmap_model import silence_pycolmap
 from dav_gswt.photos.importers import checks
 from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel
 from dav_gswt.photos.lenses import make_camera
+from dav_gswt.photos.recognition import find_colmap_ending
 
-_PLACES = ("", "sparse", "sparse/0", "0")  # where a model may be below the folder that is given
 _PARTS = ("cameras", "images", "points3D")
 _MODELS = {int(number): name for name, number in pycolmap.CameraModelId.__members__.items() if name != "INVALID"}
 _COUNTS = {k: len(pycolmap.Camera.create_from_model_name(1, n, 1.0, 1, 1).params) for k, n in _MODELS.items()}
 
 
-def find_colmap_folder(folder: Path) -> Path | None:
-    """The folder at or below this one that holds a model, if any."""
-    places = [folder / place for place in _PLACES]
-    return next((p for p in places if any(_has_both(p, kind) for kind in ("bin", "txt"))), None)
-
-
-def _has_both(folder: Path, kind: str) -> bool:
-    return all((folder / f"{part}.{kind}").is_file() for part in _PARTS[:2])
-
-
 def import_colmap(folder: Path) -> ImportedModel:
     """Read a model. Raises: InputError: damaged, or what it says cannot be."""
-    kind = "bin" if _has_both(folder, "bin") else "txt"
+    kind = find_colmap_ending(folder)
     files = {part: folder / f"{part}.{kind}" for part in _PARTS}
     stored = _read_reconstruction(files)
-    checks.check_count(len(stored.images), str(files["images"]))
     cameras = {
         number: make_camera(c.model_name, c.width, c.height, tuple(c.params), f"{files['cameras']}: camera {number}")
         for number, c in sorted(stored.cameras.items())
@@ -53,7 +41,6 @@ def import_colmap(folder: Path) -> ImportedModel:
 
 def _read_reconstruction(files: dict[str, Path]) -> pycolmap.Reconstruction:
     """The model by pycolmap, from a folder of links to these files alone."""
-    silence_pycolmap()
     with tempfile.TemporaryDirectory(prefix="colmap-") as links:
         for part, path in files.items():
             link = Path(links) / path.name

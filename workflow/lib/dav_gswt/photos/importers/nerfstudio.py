@@ -15,14 +15,7 @@ import pycolmap
 from pydantic import Field
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos.importers.checks import (
-    ImportedImage,
-    ImportedModel,
-    check_count,
-    check_image_name,
-    check_pose,
-    parse_part,
-)
+from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel, check_image_name, check_pose, parse_part
 from dav_gswt.photos.importers.lens_models import make_lens
 
 PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV")
@@ -70,7 +63,6 @@ def import_nerfstudio(path: Path, values: dict, size_of: Callable[[str], tuple[i
 
     size_of: of a photo by its name, for files that give no size. Raises: InputError: with file, frame and key.
     """
-    check_count(len(values["frames"]), str(path))
     images, lens_of = [], {}
     for i, part in enumerate(values["frames"]):
         frame = parse_part(part, Frame, f"{path}: frame {i}")

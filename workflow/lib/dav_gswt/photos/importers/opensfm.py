@@ -16,13 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.photos.importers.checks import (
-    ImportedImage,
-    ImportedModel,
-    check_count,
-    check_image_name,
-    parse_part,
-)
+from dav_gswt.photos.importers.checks import ImportedImage, ImportedModel, check_image_name, parse_part
 from dav_gswt.photos.importers.lens_models import make_lens
 
 _log = logging.getLogger(__name__)
@@ -81,7 +75,6 @@ def import_opensfm(path: Path, values: list[dict]) -> ImportedModel:
     chosen = max(parts, key=lambda part: len(part["shots"]), default={})
     if not isinstance(chosen.get("cameras"), dict):
         raise InputError(f"{path}: has no reconstruction with `shots` and `cameras`; export the file again")
-    check_count(len(chosen["shots"]), str(path))
     if len(parts) > 1:
         number = sum(len(part["shots"]) for part in parts) - len(chosen["shots"])
         _log.warning(

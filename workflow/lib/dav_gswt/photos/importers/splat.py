@@ -63,14 +63,11 @@ def fit_field_frame(
     largest square of opaque ground, is as large as can be; the origin is its middle. No camera is known, so the flying
     height, which is the unit, is a virtual one: from there a picture of VIEW degrees shows just the exemplar.
     crop: lowest and highest corner of the scene in the file; if it is None, the dense part is the scene.
-    origin: of the field's positions in the file. Only the colour that is the same from all sides is kept (degree 0).
+    field: of degree 0. origin: of its positions in the file.
     Raises: InputError: too few opaque Gaussians, positions too coarse for their sizes, or no ground.
     """
-    before, degree = len(field), field.sh_degree
+    before = len(field)
     origin = np.zeros(3) if origin is None else origin
-    if degree > 0:
-        report_dropped_harmonics(degree)
-        field = replace(field, sh=np.ascontiguousarray(field.sh[:, :1]))
     field = field[_select_scene(field, origin, crop)]
     field, relief, level, offset = _level_field(field, up, usual, rng)
     field, side, height, turn, middle = _center_on_exemplar(field)
@@ -91,11 +88,6 @@ def fit_field_frame(
     )
     _log.info("%d of %d Gaussians are kept; relief %.3f flying heights", len(field), before, relief)
     return field, frame
-
-
-def report_dropped_harmonics(degree: int) -> None:
-    """Say that the view-dependent colour is dropped."""
-    _log.warning("view-dependent colour (degree %d) is dropped: the colour from all sides is kept", degree)
 
 
 def _center_on_exemplar(

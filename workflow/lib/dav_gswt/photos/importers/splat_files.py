@@ -15,6 +15,7 @@ from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.field import Splats, build_field, read_ply, rgb_to_sh
 from dav_gswt.files import UNREADABLE
 from dav_gswt.images.file_kinds import advise_conversion, detect_kind
+from dav_gswt.packed_ply import expand_smallest_three
 
 SPZ_MAGIC, SPZ_HEADER, SPZ_SMALLEST, SPZ_COLOUR = 0x5053474E, 16, -10.0, 0.15
 MOST_PACKED = 1032  # times that gzip can make a file smaller
@@ -122,11 +123,6 @@ def _unpack_first_three(values: UInt8[Array, "n 3"]) -> Float32[Array, "n 4"]:
 
 def _unpack_smallest_three(words: Array) -> Float32[Array, "n 4"]:
     """w x y z from which of x, y, z, w is the largest (two bits), then the others in order: a sign and nine bits."""
-    rows, which = np.arange(len(words)), words >> 30
     digits = words[:, None] >> np.array([20, 10, 0], np.uint32) & 1023
     small = (digits & 511) * np.float32(np.sqrt(0.5) / 511) * np.where(digits & 512, -1, 1).astype(np.float32)
-    others = np.array([[k for k in range(4) if k != largest] for largest in range(4)])[which]
-    xyzw = np.empty((len(words), 4), np.float32)
-    xyzw[rows[:, None], others] = small
-    xyzw[rows, which] = np.sqrt(np.maximum(1 - (small**2).sum(1), 0))
-    return np.ascontiguousarray(xyzw[:, [3, 0, 1, 2]])
+    return np.ascontiguousarray(expand_smallest_three(words >> 30, small)[:, [3, 0, 1, 2]])

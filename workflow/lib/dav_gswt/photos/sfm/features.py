@@ -15,7 +15,6 @@ from scipy.cluster.vq import kmeans2, vq
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import silence_pycolmap
 
 _log = logging.getLogger(__name__)
 
@@ -110,7 +109,6 @@ def split_batches(items: list, size: int, what: str) -> Iterator[list]:
 
 def run_cancellable(work: Callable[[pycolmap.CancellationToken], Result]) -> Result:
     """Run a long call of COLMAP in a thread of its own, so that Ctrl-C can stop it."""
-    silence_pycolmap()
     token = pycolmap.CancellationToken()
     with ThreadPoolExecutor(1) as pool:
         job = pool.submit(work, token)

@@ -54,7 +54,7 @@ def localize_photos(photos: Path, paths: list[Path], seed: int = 0) -> list[Came
         numbers: list[int | None] = []
         for path in paths:
             try:
-                picture = undistort_scene_photo(image_files.read_photo(path), photos, pinhole, turned=True)
+                picture = undistort_scene_photo(image_files.read_photo(path), photos, pinhole)
             except (InputError, ValueError) as error:
                 _log.warning("%s: %s", path.name, error)
                 numbers.append(None)

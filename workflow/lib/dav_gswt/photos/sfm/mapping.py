@@ -191,10 +191,10 @@ def _solve(approach: Approach, scene: SfmScene, seed: int) -> SfmSolution:
 
 def require_motion(scene: SfmScene) -> None:
     """Raises: InputError: of most pairs of photos that match, the pictures are the same but for noise."""
-    moves = []
+    moves, pairs = [], _read_pairs(scene.database)
     with closing(pycolmap.Database.open(scene.database)) as store:
         places = [store.read_keypoints(i + 1)[:, :2].astype(float) for i in range(len(scene.photos))]
-        for one, two, inliers in _list_pairs(store):
+        for one, two, inliers in pairs:
             if inliers >= LEAST_INLIERS:
                 matches = store.read_two_view_geometry(one + 1, two + 1).inlier_matches
                 off = places[one][matches[:, 0]] - places[two][matches[:, 1]]
@@ -211,11 +211,7 @@ def require_motion(scene: SfmScene) -> None:
 def _read_pairs(database: Path) -> list[tuple[int, int, int]]:
     """The indices of the photos of each verified pair, and how many matches one rigid scene explains."""
     with closing(pycolmap.Database.open(database)) as store:
-        return _list_pairs(store)
-
-
-def _list_pairs(store: pycolmap.Database) -> list[tuple[int, int, int]]:
-    rows = list(zip(*store.read_two_view_geometry_num_inliers(), strict=True))
+        rows = list(zip(*store.read_two_view_geometry_num_inliers(), strict=True))
     pairs = ((*pycolmap.pair_id_to_image_pair(pair), inliers) for pair, inliers in rows)
     return [(one - 1, two - 1, inliers) for one, two, inliers in pairs]
 
@@ -256,16 +252,14 @@ def explain_left_out(
                 most[index] = max(most[index], inliers)
     out = []
     for index, photo in enumerate(photos):
-        if index not in placed:
-            unsure = f"it shares {most[index]} points with a placed photo, but its position stays unsure"
-            if index in loose:
-                unsure = f"only {loose[index]} points tie it to the other photos; take photos between them and it"
-            out.append(
-                (
-                    photo.path.name,
-                    unsure if most[index] or index in loose else "it matches no photo that could be placed",
-                )
-            )
+        if index in placed:
+            continue
+        reason = "it matches no photo that could be placed"
+        if index in loose:
+            reason = f"only {loose[index]} points tie it to the other photos; take photos between them and it"
+        elif most[index]:
+            reason = f"it shares {most[index]} points with a placed photo, but its position stays unsure"
+        out.append((photo.path.name, reason))
     return tuple(out), sum(count >= LEAST_INLIERS for count in most.values())
 
 

@@ -137,11 +137,6 @@ def require_parallax(spread: Float[Array, "n"]) -> None:
         )
 
 
-def undistort_image(registered: Registration, index: int) -> Float32[Array, "h w 3"]:
-    """The picture of the model's image `index`: the photo as a pinhole camera would have taken it."""
-    return undistort_pixels(registered, index, image_files.read_photo(registered.sources[index]))
-
-
 def undistort_pixels(registered: Registration, index: int, photo: Float32[Array, "m n 3"]) -> Float32[Array, "h w 3"]:
     """The picture of the model's image `index`, of its photo.
 
@@ -166,17 +161,11 @@ def select_photos(listing: PhotoListing) -> dict[str, Path]:
 
 def require_photos(listing: PhotoListing, names: Sequence[str], unreadable: Mapping[str, str]) -> None:
     """Raises: InputError: fewer photos than structure from motion needs, with what became of the others."""
-    if len(names) >= LEAST_PHOTOS:
-        return
-    if unreadable:
-        raise InputError(f"{next(iter(unreadable.values()))} (at least {LEAST_PHOTOS} photos are needed, better 20)")
-    if names:
-        only = " and ".join(names)
-        raise InputError(
-            f"{listing.where}: only {only}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20"
-        )
-    hint = f" ({listing.notes[0]})" if listing.notes else ""
-    raise InputError(f"{listing.where}: no photos in this folder{hint}; put .jpg, .png, .tif or .heic files into it")
+    if len(names) < LEAST_PHOTOS:
+        had = f"only {' and '.join(names)}" if names else "no photos"
+        notes = "".join(f" ({note})" for note in listing.notes)
+        problem = next(iter(unreadable.values()), f"{listing.where}: {had}{notes}")
+        raise InputError(f"{problem} (at least {LEAST_PHOTOS} overlapping photos are needed, better 20)")
 
 
 def _describe_photos(paths: Mapping[str, Path], options: SfmOptions, unreadable: dict[str, str]) -> list[SfmPhoto]:

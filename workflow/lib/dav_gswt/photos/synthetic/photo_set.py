@@ -1,20 +1,23 @@
 """The photo set of a synthetic scene: start and test views, and points triangulated with their exact poses."""
 
-import tempfile
-from contextlib import closing
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
-import pycolmap
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import ColmapModel, make_lens, model_from_reconstruction, write_colmap_model
-from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_photos
+from dav_gswt.photos.colmap_model import (
+    ColmapModel,
+    make_reconstruction,
+    model_from_reconstruction,
+    write_colmap_model,
+)
+from dav_gswt.photos.sfm.registration import SfmOptions
+from dav_gswt.photos.sfm.triangulation import triangulate_features
 from dav_gswt.photos.synthetic import mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 
@@ -57,43 +60,22 @@ def _name_views(kind: str, views: list[Camera]) -> list[tuple[str, Camera]]:
 
 def triangulate_points(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> ColmapModel:
     """Triangulate points of matched SIFT features of pictures with known cameras, which are not changed."""
-    names, cameras = (list(column) for column in zip(*shots, strict=True))
+    names, cameras = zip(*shots, strict=True)
     none = np.zeros(0, int)
-    known = ColmapModel(
-        tuple(names), tuple(cameras), np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
-    )
-    first = cameras[0]
-    lens = make_lens(first)
-    lens.has_prior_focal_length = True
-    with tempfile.TemporaryDirectory(prefix="points-") as scratch:
-        database, sparse = Path(scratch) / "database.db", Path(scratch) / "sparse"
-        sparse.mkdir()
-        with closing(pycolmap.Database.open(database)) as store:
-            numbers = enter_camera(store, lens)
-            for name in names:
-                enter_image(store, name, *numbers)
-        extract_features(folder, database, max(first.width, first.height), FEATURES, 1)
-        match_photos(len(names), database, NEIGHBOURS, 1, seed)
-        write_colmap_model(known, sparse)
-        options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed)
-        stored = pycolmap.triangulate_points(
-            pycolmap.Reconstruction(str(sparse)), database, folder, sparse, options=options
-        )
-        return model_from_reconstruction(stored)
+    empty = ColmapModel(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
+    known = make_reconstruction(empty)
+    for lens in known.cameras.values():
+        lens.has_prior_focal_length = True
+    options = SfmOptions(size=max(cameras[0].width, cameras[0].height), features=FEATURES, seed=seed)
+    return model_from_reconstruction(triangulate_features(known, folder, NEIGHBOURS, options))
 
 
-def add_cameras(found: ColmapModel, more: list[tuple[str, Camera]]) -> ColmapModel:
-    """The model with further images without observations; images are ordered by name."""
-    named = sorted([*zip(found.names, found.cameras, strict=True), *more], key=lambda pair: pair[0])
-    names = tuple(name for name, _ in named)
-    moved = np.array([names.index(name) for name in found.names])
-    image_of = moved[found.image_of]
-    order = np.lexsort((image_of, found.point_of))
+def add_cameras(found: ColmapModel, tests: list[tuple[str, Camera]]) -> ColmapModel:
+    """The model with further images without observations, whose names come first."""
+    names, cameras = zip(*tests, strict=True) if tests else ((), ())
     return replace(
         found,
-        names=names,
-        cameras=tuple(camera for _, camera in named),
-        point_of=found.point_of[order],
-        image_of=image_of[order],
-        pixels=found.pixels[order],
+        names=(*names, *found.names),
+        cameras=(*cameras, *found.cameras),
+        image_of=found.image_of + len(tests),
     )
