@@ -156,8 +156,8 @@ def test_a_second_export_has_the_same_bytes(cover_bundle, cover_terrain, sets, s
 
 
 def test_every_object_has_a_closed_hull_that_holds_what_is_drawn(exported, facts, cover_terrain):
-    i, j, _, _ = finite.list_cells(cover_terrain, AREA)
-    found = cover_terrain.scatter.instances_in(i, j)
+    cells = finite.list_cells(cover_terrain, AREA)
+    found = cover_terrain.scatter.instances_in(cells.i, cells.j)
     meshes = list(read_meshes(exported / "objects.glb"))
     assert len(meshes) == len(found) == facts["objects"] > 0
     bare = len(collect_cells(replace(cover_terrain, scatter=None, objects=[]), 0, -1, 6, 5, 0))

@@ -51,7 +51,7 @@ def test_too_much_is_refused_with_how_much_smaller_it_must_be(cover_terrain, mon
 
 def test_a_set_of_all_levels_is_counted_by_the_finest(cover_terrain, monkeypatch):
     area, both = Area(-1, -1, 3, 2), {name: FORMATS[name] for name in ("ply", "3dtiles")}
-    count = int(finite.count_cells(cover_terrain, area, 0).sum())
+    count = int(finite.count_cells(cover_terrain, finite.list_cells(cover_terrain, area), 0).sum())
     monkeypatch.setattr(terrain_files, "MAX_BYTES", count * both["3dtiles"].bytes)
     terrain_files.check_size(cover_terrain, area, 1, both)
     monkeypatch.setattr(terrain_files, "MAX_BYTES", count * both["3dtiles"].bytes - 1)

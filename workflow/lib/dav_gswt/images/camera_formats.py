@@ -4,6 +4,7 @@ All are returned upright: what the file says of its orientation is applied, once
 """
 
 from collections.abc import Callable
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,48 +28,47 @@ class Decoder:
     read_pixels: Callable[[Path], Float32[Array, "h w c"]]
 
 
+@contextmanager
 def _open_heif(path: Path):
+    """An open HEIC, HEIF or AVIF. Raises: InputError: it is not readable, also where the block finds that."""
     import pillow_heif  # here, not above: most jobs read no such photo
     from PIL import Image
 
     pillow_heif.register_heif_opener(decode_threads=1)
-    return Image.open(path)
+    try:
+        with Image.open(path) as image:
+            yield image
+    except UNREADABLE as error:
+        raise _refuse(path, error) from error
 
 
 def _read_heif_size(path: Path) -> tuple[int, int]:
     from PIL import ExifTags
 
-    try:
-        with _open_heif(path) as image:
-            turned = image.getexif().get(ExifTags.Base.Orientation, 1) >= 5  # AVIF's; HEIC is upright already
-            width, height = image.size
-            return (height, width) if turned else (width, height)
-    except UNREADABLE as error:
-        raise _refuse(path, error) from error
+    with _open_heif(path) as image:
+        turned = image.getexif().get(ExifTags.Base.Orientation, 1) >= 5  # AVIF's; HEIC is upright already
+        width, height = image.size
+        return (height, width) if turned else (width, height)
 
 
 def _read_heif(path: Path) -> Float32[Array, "h w c"]:
     from PIL import ImageOps
 
-    try:
-        with _open_heif(path) as image:
-            upright = ImageOps.exif_transpose(image)
-            pixels = np.asarray(upright.convert("RGBA" if upright.has_transparency_data else "RGB"))
-    except UNREADABLE as error:
-        raise _refuse(path, error) from error
+    with _open_heif(path) as image:
+        upright = ImageOps.exif_transpose(image)
+        pixels = np.asarray(upright.convert("RGBA" if upright.has_transparency_data else "RGB"))
     return pixels.astype(np.float32) / 255
 
 
 def read_heif_exif(path: Path) -> bytes:
     """The EXIF of a HEIC, HEIF or AVIF as a TIFF; empty where there is none."""
-    try:
-        with _open_heif(path) as image:
-            return image.info.get("exif", b"").removeprefix(b"Exif\0\0")
-    except UNREADABLE as error:
-        raise _refuse(path, error) from error
+    with _open_heif(path) as image:
+        return image.info.get("exif", b"").removeprefix(b"Exif\0\0")
 
 
+@contextmanager
 def _open_raw(path: Path):
+    """An open raw photo. Raises: InputError: as `_open_heif`."""
     try:
         import rawpy  # pyright: ignore[reportMissingImports]  an extra
     except ImportError as error:
@@ -77,8 +77,9 @@ def _open_raw(path: Path):
             "install -e '.[raw]'), or convert them to JPEG"
         ) from error
     try:
-        return rawpy.imread(str(path))
-    except (rawpy.LibRawError, *UNREADABLE) as error:
+        with rawpy.imread(str(path)) as raw:
+            yield raw
+    except Exception as error:  # LibRaw's errors have no common class but this
         raise _refuse(path, error) from error
 
 
@@ -91,10 +92,7 @@ def _read_raw_size(path: Path) -> tuple[int, int]:
 def _read_raw(path: Path) -> Float32[Array, "h w c"]:
     """Developed alike, so that photos of a set agree: the camera's white balance, no brightening by the picture."""
     with _open_raw(path) as raw:
-        try:
-            pixels = raw.postprocess(use_camera_wb=True, no_auto_bright=True, output_bps=16, gamma=SRGB)
-        except Exception as error:  # LibRaw's errors have no common class but this
-            raise _refuse(path, error) from error
+        pixels = raw.postprocess(use_camera_wb=True, no_auto_bright=True, output_bps=16, gamma=SRGB)
     return pixels.astype(np.float32) / 65535
 
 

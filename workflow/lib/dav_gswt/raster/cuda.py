@@ -48,15 +48,8 @@ class GsplatForward:
 class Rasterizer(interface.Rasterizer):
     """See `interface.Rasterizer`. device: where gsplat runs. threads: not used."""
 
-    def __init__(
-        self,
-        near: float = 0.01,
-        dilation: float = 0.3,
-        antialiased: bool = False,
-        threads: int | None = None,
-        device: str = "cuda",
-    ):
-        super().__init__(near, dilation, antialiased, threads)
+    def __init__(self, device: str = "cuda", **options: Any):
+        super().__init__(**options)
         self.device = torch.device(device)
 
     def draw(self, given: dict[str, Tensor], camera: Camera) -> GsplatForward:

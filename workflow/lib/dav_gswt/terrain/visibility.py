@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
 from dav_gswt.field import Rows
@@ -116,6 +116,11 @@ def active_range(terrain: EndlessTerrain, nearest: Floats, farthest: Floats) -> 
 
 def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Ints:
     """Number of Gaussians in each cell, and of the objects whose feet lie in it, over its active levels."""
+    return (count_levels(terrain, cells) * active_levels(terrain, cells)).sum(0)
+
+
+def count_levels(terrain: EndlessTerrain, cells: GridCells) -> Int[Array, "levels n"]:
+    """Number of Gaussians in each cell, and of the objects whose feet lie in it, at each level."""
     levels, each = range(len(terrain.switches)), terrain.tiles_each
     kinds = 1 if terrain.classes is None else terrain.classes.materials
     sizes = np.array([[len(terrain.tiles[level, t]) for t in range(kinds * each)] for level in levels], np.int64)
@@ -128,7 +133,7 @@ def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Ints:
         owner = np.array([index[cell] for cell in zip(found.i.tolist(), found.j.tolist(), strict=True)], int)
         sizes = np.array([[len(fields[level]) for fields in terrain.objects] for level in levels])
         counts += np.array([np.bincount(owner, size[found.number], len(cells)) for size in sizes]).astype(np.int64)
-    return (counts * active_levels(terrain, cells)).sum(0)
+    return counts
 
 
 def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int) -> GridCells:
