@@ -6,7 +6,7 @@ Tolerances: some hundred float32 roundings a pixel (6e-8 each), 1e-5. See test_b
 import numpy as np
 import pytest
 import torch
-from fixtures.raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, oracle_answers, relative
+from fixtures.raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, oracle_answers, pixel_middles, relative
 
 from dav_gswt.raster import cpu, harmonics, oracle
 
@@ -69,7 +69,6 @@ def test_no_pixel_of_a_thin_or_tilted_splat_is_left_out(raster):
     arrays["opacity_logits"] = rng.uniform(-5, -3, 200).astype(np.float32)  # so faint that no pixel is ever full
     tensors = {name: torch.tensor(values, dtype=torch.float64) for name, values in arrays.items()}
     splats = oracle.project(**tensors, camera=camera)
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    wanted = int((oracle.weights(splats.shapes, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1))) > 0).sum())
+    wanted = int((oracle.weights(splats.shapes, pixel_middles(camera)) > 0).sum())
     raster.forward(**arrays, camera=camera)
     assert wanted > 10_000 and abs(raster.count_pairs() - wanted) <= 1e-4 * wanted + 1

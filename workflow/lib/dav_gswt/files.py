@@ -168,9 +168,7 @@ def parse_record(values, kind: type[Record]) -> Record:
         raise ValueError(": ".join(filter(None, (where, first["msg"])))) from None
 
 
-@cache
-def _adapter(kind: type) -> TypeAdapter:
-    return TypeAdapter(kind)
+_adapter = cache(TypeAdapter)
 
 
 def require_file_name(name) -> str:

@@ -96,7 +96,9 @@ class Rasterizer(interface.Rasterizer):
 
     def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Any]:
         given = {name: upload(array, self.device) for name, array in vars(gaussians).items()}
-        if not all(bool(tensor.isfinite().all()) for tensor in given.values()) or _has_zero(given["quats"]):
+        if not all(bool(tensor.isfinite().all()) for tensor in given.values()) or (
+            len(gaussians.means) and bool((given["quats"].abs().amax(1) < interface.TINY).any())
+        ):
             gaussians.check_values()
         last = self.draw(given, camera)
         picture = last.picture.detach()[0]
@@ -163,10 +165,6 @@ def download(tensor: Tensor) -> Array:
     """A tensor as an array, through memory that the device writes to by itself."""
     on_host = torch.empty(tensor.shape, dtype=tensor.dtype, pin_memory=tensor.is_cuda)
     return on_host.copy_(tensor.detach()).numpy()
-
-
-def _has_zero(quats: Float32[Tensor, "n 4"]) -> bool:
-    return len(quats) > 0 and bool((quats.abs().amax(1) < interface.TINY).any())
 
 
 def list_pairs(
