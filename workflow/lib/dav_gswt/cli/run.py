@@ -46,8 +46,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    overlays = select_overlays(quietly=options.view) + options.configfile
-    given = load_config(overlays, {"scene": options.scene} if options.scene else {})
+    overlays = select_overlays() + options.configfile
+    changes = {"scene": options.scene} if options.scene else {}
+    given = check_config(add_scene_files(read_config([CONFIG, *overlays], changes), SCENES))
     if not options.view:
         return run(given, options.cores, overlays)
     if not (pages := list_pages(given)):
@@ -57,19 +58,9 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def load_config(overlays: list[Path], changes: dict | None = None) -> dict:
-    """The config of this folder with all defaults, as the workflow reads it."""
-    return check_config(add_scene_files(read_config([CONFIG, *overlays], changes), SCENES))
-
-
-def select_overlays(quietly: bool) -> list[Path]:
-    """The config files to read before the user's: a smaller size where PyTorch renders. Printed unless `quietly`."""
-    if backends.select_backend() != "torch":
-        return []
-    if not quietly:
-        why = backends.explain_unavailable("cpu") or f"{backends.VARIABLE} asks for it"
-        print(f"PyTorch renders, many times slower, so at a smaller size ({SMALLER}): {why}", flush=True)
-    return [SMALLER]
+def select_overlays(root: Path = Path()) -> list[Path]:
+    """The config files of a workflow to read before the user's: a smaller size where PyTorch renders."""
+    return [root / SMALLER] if backends.select_backend() == "torch" else []
 
 
 def run(given: dict, cores: int, overlays: list[Path]) -> int:
@@ -96,6 +87,9 @@ def run_workflow(
             "program into a folder without them"
         )
     os.environ.update(replace_missing_user(folder))
+    if backends.select_backend() == "torch":
+        why = backends.explain_unavailable("cpu") or f"{backends.VARIABLE} asks for it"
+        print(f"PyTorch renders, many times slower, so at a smaller size ({SMALLER}): {why}", flush=True)
     snakemake = [sys.executable, "-m", "snakemake", "--config", f"scene={scene}"]
     if root != Path():
         profile = root / "workflow/profiles/default"  # Snakemake finds it in a clone, beside the Snakefile
