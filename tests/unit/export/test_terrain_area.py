@@ -3,7 +3,6 @@
 import re
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
@@ -23,11 +22,6 @@ from dav_gswt.terrain.finite import Area
 )
 def test_cells_lie_about_the_centre(centre, columns, expected):
     assert terrain_files.choose_area({"columns": columns, "rows": 2, "centre": centre}) == expected
-
-
-def test_the_origin_is_the_middle(cover_terrain):
-    side = cover_terrain.side
-    np.testing.assert_allclose(terrain_files.find_origin(cover_terrain, Area(3, 2, 3, 2)), [4.5 * side, 3 * side, 0])
 
 
 @pytest.mark.parametrize("level, limit", [(0, 20_000), (1, None)])

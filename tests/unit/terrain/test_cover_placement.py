@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixtures.land_covers import GRASS, SAND, SIDE, TILES, cover_content
+from fixtures.land_covers import GRASS, SAND, SIDE, cover_content
 from fixtures.terrains import HILLS, SKY, walking
 from scipy.spatial.transform import Rotation
 
@@ -53,15 +53,6 @@ def test_a_picture_shows_both_materials_without_a_gap_and_the_objects(cover, bar
     changed = np.abs(image - full).max(-1) > 0.05
     assert 0.001 < changed.mean() < 0.3
     assert full[changed].mean(0) == pytest.approx([0.2, 0.35, 0.15], abs=0.1)
-
-
-def test_a_budget_counts_the_tiles_of_all_materials_in_a_cell(bare, seen):
-    cells = seen[1]
-    pure = replace(cells, materials=np.ones(len(cells), int), tile=cells.tile % TILES)
-    both = replace(pure, materials=np.full(len(cells), 3))
-    grass = replace(pure, materials=np.full(len(cells), 2), tile=cells.tile % TILES + TILES)
-    counts = [visibility.count_gaussians(bare, each) for each in (pure, grass, both)]
-    np.testing.assert_array_equal(counts[0] + counts[1], counts[2])
 
 
 def test_an_object_is_turned_and_scaled_about_its_foot(cover):
