@@ -95,7 +95,7 @@ def train_autoencoder(
         true = pictures[rows].float() / 255
         posterior = _find_posterior(network, true)
         latent = posterior.mean + posterior.std * torch.randn(posterior.mean.shape, generator=rng)
-        decoded = (network.autoencoder.decode(latent) + 1) / 2
+        decoded = (network.autoencoder.decoder(latent) + 1) / 2
         return (decoded - true).abs().mean() + KL_WEIGHT * posterior.kl().mean()
 
     _start_with_small_variances(network)
@@ -109,7 +109,7 @@ def train_autoencoder(
 
 def _find_posterior(network: Network, planes: Float[Tensor, "n 5 s s"]) -> DiagonalGaussianDistribution:
     """The encoder's normal distribution of unscaled latents of pictures."""
-    return DiagonalGaussianDistribution(network.autoencoder.encode(2 * planes - 1))
+    return DiagonalGaussianDistribution(network.autoencoder.encoder(2 * planes - 1))
 
 
 def train_denoiser(network: Network, examples: EncodedExamples, plan: TrainingPlan, checkpoint: Path) -> list[float]:

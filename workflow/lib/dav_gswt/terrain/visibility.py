@@ -136,13 +136,6 @@ def count_levels(terrain: EndlessTerrain, cells: GridCells) -> Int[Array, "level
     return counts
 
 
-def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int) -> GridCells:
-    """The nearest cells whose Gaussians stay within a budget."""
-    nearest_first = np.argsort(cells.nearest, kind="stable")
-    count = np.cumsum(count_gaussians(terrain, cells)[nearest_first])
-    return cells[np.sort(nearest_first[count <= budget])]
-
-
 def coarsen_to_budget(
     terrain: EndlessTerrain, camera: Camera, budget: int, cells: GridCells | None = None
 ) -> EndlessTerrain:
