@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from dav_gswt import field as fields
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
-from dav_gswt.files import read_json, write_json
 from dav_gswt.geometry.poses import pose_offset
 from dav_gswt.images import image_files
 from dav_gswt.inspect import plot, readers
@@ -203,11 +202,3 @@ def test_gaussians_have_the_patch_of_their_cell(cut):
     for i in np.flatnonzero(inside)[::97]:
         x, y = (some.means[i, :2] / cut.spacing).astype(int)
         assert tuple(found[i]) == readers.PATCH_COLOURS[cut.labels[3][y, x]]
-
-
-def test_tiles_that_are_not_what_seams_json_says_are_refused(tree, tmp_path):
-    told = read_json(tree.tiles / "seams.json")
-    (tmp_path / "tiles").symlink_to(tree.tiles / "tiles")
-    write_json(tmp_path / "seams.json", told | {"side": 99.0})
-    with pytest.raises(InputError, match="labels.npz is not a map of each tile"):
-        readers.read_scene(tmp_path, MOST)
