@@ -11,7 +11,6 @@ Each call of the interface copies arrays to the GPU and back, and `adam` runs on
 GPU (`reconstruction.fitting.device_descent`): it calls `draw`, `differentiate` and `contribute`.
 """
 
-import warnings
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -156,9 +155,7 @@ def find_visible(last: GsplatForward) -> Bool[Tensor, "n"]:
 
 def upload(array: Array, device: torch.device) -> Tensor:
     """An array on the device."""
-    with warnings.catch_warnings():  # of arrays that cannot be written to: nobody does
-        warnings.simplefilter("ignore")
-        return torch.as_tensor(array).to(device)
+    return torch.tensor(array).to(device)
 
 
 def download(tensor: Tensor) -> Array:

@@ -41,9 +41,9 @@ def list_remaining(
         listed = list_poses(scene, frame, synthetic.lens(scene["size"]))
     else:
         known = read_colmap_model(model_folder)
-        at = dict(zip(known.names, known.cameras, strict=True))
         if scene["agent"] == "replay":
-            listed = [(pose_of_camera(name, at[name], frame), at[name]) for name in split.pool]
+            shown = [(name, known.camera(name)) for name in split.pool]
+            listed = [(pose_of_camera(name, camera, frame), camera) for name, camera in shown]
         else:
             listed = list_poses(scene, frame, find_main_camera(known.cameras))
     # a photo taken in place of another is used too
@@ -111,6 +111,5 @@ def _with_lens(camera: Camera, lens: Camera) -> Camera:
 def read_captured_cameras(model_folder: Path | str, split: ViewSplit, captures: list) -> list[Camera]:
     """Read the cameras of all photos so far."""
     known = read_colmap_model(model_folder)
-    at = dict(zip(known.names, known.cameras, strict=True))
-    start = [at[name] for name in split.start]
+    start = [known.camera(name) for name in split.start]
     return start + [photo.camera for folder in captures for photo in read_capture_record(folder)]
