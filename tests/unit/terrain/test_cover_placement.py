@@ -12,7 +12,6 @@ from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.lod.merge import compute_covariances
 from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain import endless, placement, stills, visibility
-from dav_gswt.terrain.scatter import Instances
 
 MAGENTA = [1.0, 0.0, 1.0]
 
@@ -64,14 +63,6 @@ def test_an_object_is_turned_and_scaled_about_its_foot(cover):
     assert made.means == pytest.approx(1.1 * source.means @ turn.T + foot, abs=1e-5)
     expected = 1.1**2 * turn @ compute_covariances(source) @ turn.T
     assert compute_covariances(made) == pytest.approx(expected, rel=1e-4, abs=1e-9)
-
-
-def test_every_visible_foot_is_drawn_once(cover, seen):
-    _, cells, things = seen
-    drawn = Instances.concatenate(list(things.values()))
-    every = cover.scatter.instances_in(cells.i, cells.j)
-    assert len(drawn) == len(every) > 20
-    assert sorted(drawn.u.tolist()) == sorted(every.u.tolist())
 
 
 def test_an_object_is_drawn_with_the_last_of_the_cells_that_it_touches(cover, seen):
