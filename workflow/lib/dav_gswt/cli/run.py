@@ -255,21 +255,14 @@ def list_pages(given: dict) -> list[Path]:
     return sorted((path.parent for path in found), key=lambda path: path.stat().st_mtime, reverse=True)
 
 
-def link_latest(scene: str, folder: Path) -> Path:
-    """Let results/latest/SCENE lead to the folder of a round."""
-    link = Path(RESULTS, "latest", scene)
-    link.parent.mkdir(parents=True, exist_ok=True)
-    with suppress(FileNotFoundError):
-        link.unlink()
-    link.symlink_to(os.path.relpath(folder, link.parent), target_is_directory=True)
-    return link
-
-
 def report_result(given: dict, done: str, overlays: list[Path]) -> None:
-    """Print what was made, where it is, and what to type next."""
+    """Print what was made, where it is, and what to type next; results/latest/SCENE leads there."""
     page = list_pages(given)[0]
-    latest = link_latest(given["scene"], page.parents[3])
-    terrain, bundle, tiles = (latest / path.relative_to(page.parents[3]) for path in list(page.parents)[:3])
+    latest, folder = Path(RESULTS, "latest", given["scene"]), page.parents[3]  # the folder of a round
+    latest.parent.mkdir(parents=True, exist_ok=True)
+    latest.unlink(missing_ok=True)
+    latest.symlink_to(os.path.relpath(folder, latest.parent), target_is_directory=True)
+    terrain, bundle, tiles = (latest / path.relative_to(folder) for path in list(page.parents)[:3])
     page = terrain / page.name
     usual = given["scene"] == read_config([CONFIG])["scene"] and not set(overlays) - {SMALLER}
     size = sum(path.stat().st_size for path in page.rglob("*") if path.is_file())
