@@ -99,7 +99,7 @@ docs: .venv/installed-docs
 
 # docs/reference/config.md and policies.md, and the schema: made from the config models
 reference: .venv/installed
-	@$(BIN)/python -m dav_gswt.config.reference
+	@$(BIN)/python workflow/reference.py
 
 SOURCES := pyproject.toml requirements.lock $(wildcard workflow/lib/dav_gswt/raster/core/*)
 # a set-up that had to do without a compiler is done again as soon as there is one

@@ -322,11 +322,11 @@ def height_map(wildcards):
     file = config["heights"].get("file")
     if not file:
         return {}
-    from dav_gswt.terrain.heights import check_height_map  # here, not above: most plans need none
+    from dav_gswt.terrain.heights import read_height_map  # here, not above: most plans need none
 
     found = existing(file, "heights.file")
     try:
-        check_height_map(found)
+        read_height_map(found)
     except InputError as error:
         raise WorkflowError(f"config: heights.file: {error}") from None
     return {"map": found}

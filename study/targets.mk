@@ -1,6 +1,6 @@
 # Targets of the study, which the project's Makefile includes.
 OPENSPLAT ?= opensplat
-STUDY := PYTHONPATH=study:tests $(BIN)/python
+STUDY := PYTHONPATH=study:tests:workflow $(BIN)/python
 .PHONY: test-study lint-study bench-study compare claims prior
 
 # about 15 minutes: the tests of the study

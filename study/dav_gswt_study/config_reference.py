@@ -1,6 +1,7 @@
-"""Write the reference of the study's keys: `python -m dav_gswt_study.config_reference`."""
+"""Write the reference of the study's keys: `make claims`."""
 
-from dav_gswt.config.reference import describe_tables, write_files
+from reference import describe_tables, write_files  # workflow/reference.py
+
 from dav_gswt_study.config import StudyConfig
 
 HEAD = "# The study's keys\n\nKeys of `study:`, in `study/config.yaml`. Made by `make claims`."

@@ -37,11 +37,6 @@ def test_the_name_of_a_file_is_no_path():
             files.require_file_name(name)
 
 
-def test_the_digest_is_that_of_the_bytes(tmp_path):
-    (tmp_path / "a").write_bytes(b"abc")
-    assert digest_files(tmp_path / "a").startswith("ba7816bf8f01cfea")  # FIPS 180-2, example B.1
-
-
 @pytest.mark.parametrize("write", [atomic_file, atomic_folder])
 def test_a_full_disk_is_told_with_the_name_of_what_was_written(tmp_path, write):
     """The system's calls on open files know no name."""

@@ -62,15 +62,6 @@ def test_the_terminal_has_warnings_and_progress_and_the_log_has_all(tmp_path, ca
     assert "a detail" not in shown and "a warning" in shown and "count: 3/3" in shown
 
 
-def test_progress_tells_how_far_and_how_long(tmp_path, caplog):
-    caplog.set_level(logging.INFO)
-    assert list(logs.progress(range(3), "count", every=0.0)) == [0, 1, 2]
-    assert "count: 3/3" in caplog.text and "left" in caplog.text
-    caplog.clear()
-    assert list(logs.progress(range(3), "count")) == [0, 1, 2]
-    assert not caplog.text  # a loop that ends at once says nothing
-
-
 def test_a_log_on_a_full_disk_leaves_the_terminal_its_messages(capfd):
     with logs.logging_to("/dev/full"):
         logging.warning("a message")

@@ -59,13 +59,6 @@ def test_settings_that_a_policy_does_not_read_have_one_spelling(policy, spelled)
     assert (branch["prior"], branch["p_drop"], branch["lam"]) == spelled
 
 
-@pytest.mark.parametrize("agent, policy", [("replay", "farthest"), ("render", "coverage-error")])
-def test_auto_is_a_policy_by_where_photos_come_from(agent, policy):
-    scenes = {"sand": CONFIG["scenes"]["sand"] | {"agent": agent}}
-    assert encode_branch(CONFIG | {"policy": "auto", "scenes": scenes}, "sand")["policy"] == policy
-    assert encode_branch(CONFIG | {"scenes": scenes}, "sand")["policy"] == "w2-lpips"
-
-
 def test_where_all_photos_start_and_none_can_be_taken_there_are_no_rounds():
     def rounds(**entry) -> int:
         scenes = {"sand": CONFIG["scenes"]["sand"] | entry}

@@ -3,9 +3,11 @@
 import re
 from collections import Counter
 
+import numpy as np
 import pytest
 from fixtures.runs import TINY, USUAL
 
+from dav_gswt.images import image_files
 from dav_gswt.views.policies import POLICY_NAMES, PRIOR_POLICIES, ZERO_SETTINGS
 
 DRAFT = "results/desert/seed0/draft"
@@ -102,6 +104,16 @@ def test_a_finished_field_goes_from_field_to_terrain(planned, tmp_path):
     plan = planned(tmp_path, "--config", "scene=finished", configs=(USUAL, TINY))
     assert plan["import_field"] == plan["prepare_external_field"] == plan["make_page"] == plan["render_terrain"] == 1
     assert not plan["fit_coarse"] and not plan["copy_coarse_field"]
+
+
+def test_a_height_map_of_the_config_is_an_input_of_the_page_if_it_can_be_read(planned, snakemake, tmp_path):
+    image_files.write_grey16(tmp_path / "hills.png", np.zeros((4, 5), np.uint16))
+    (tmp_path / "hills.yaml").write_text("heights: {kind: image, file: hills.png, width: 9, height: 2}\n")
+    configs = (USUAL, TINY, tmp_path / "hills.yaml")
+    assert planned(tmp_path, configs=configs)["make_page"] == 1
+    (tmp_path / "hills.png").write_bytes(b"no picture")
+    done = snakemake(tmp_path, "--dry-run", configs=configs, check=False)
+    assert "config: heights.file: " in done.stdout
 
 
 def test_the_frames_of_a_video_are_chosen_before_they_are_registered(planned, tmp_path):

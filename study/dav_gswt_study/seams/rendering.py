@@ -141,7 +141,7 @@ def describe_cell(terrain: EndlessTerrain, eye: Float[Array, "3"], cell: tuple[i
     tile, materials = visibility.choose_tiles(terrain, i, j)
     at = (int(np.floor(eye[0] / terrain.side)), int(np.floor(eye[1] / terrain.side)))
     close = draw_order.in_near_block(i, j, at)
-    cells = visibility.GridCells(i, j, tile, materials, close, *visibility.measure_distances(terrain, i, j, eye))
+    cells = visibility.GridCells(i, j, tile, materials, close, *visibility.bound_cells(terrain, i, j, eye)[2:])
     levels = np.flatnonzero(visibility.active_levels(terrain, cells)[:, 0]).tolist()
     parts = {level: terrain.tiles[level, int(tile[0])][:0] for level in levels}
     direction = placement.cell_direction(terrain, *cell, int(tile[0]), eye)

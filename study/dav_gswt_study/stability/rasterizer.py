@@ -1,7 +1,7 @@
 """Checks of the rasterizer in use against the float64 oracle, at the extremes of its inputs."""
 
 import numpy as np
-from fixtures.raster_scenes import random_cloud
+from fixtures.raster_scenes import draw_by_oracle, random_cloud
 from numpy import ndarray as Array
 
 from dav_gswt.geometry import cameras
@@ -28,13 +28,8 @@ def render(arrays: Arrays, camera: Camera, near: float = 0.01, antialiased: bool
 def render_reference(arrays: Arrays, camera: Camera, near: float = 0.01, antialiased: bool = False) -> Array:
     import torch
 
-    from dav_gswt.raster import oracle
-
-    gaussians = (torch.tensor(arrays[name], dtype=torch.float64) for name in PARAMETERS)
-    means, log_scales, quats, opacity_logits, colours = gaussians
-    colour, alpha, _ = oracle.forward(
-        means, log_scales, quats, opacity_logits, colours, camera, near=near, antialiased=antialiased
-    )
+    gaussians = {name: torch.tensor(arrays[name], dtype=torch.float64) for name in PARAMETERS}
+    colour, alpha, _ = draw_by_oracle(gaussians, camera, near=near, antialiased=antialiased)
     return torch.cat([colour, alpha[..., None]], -1).numpy()
 
 
@@ -112,13 +107,11 @@ def _gradients_reference(arrays: Arrays, camera: Camera) -> Array:
 def _oracle_gradients(arrays: Arrays, camera: Camera) -> Arrays:
     import torch
 
-    from dav_gswt.raster import oracle
-
-    leaves = [torch.tensor(arrays[name], dtype=torch.float64, requires_grad=True) for name in PARAMETERS]
-    means, log_scales, quats, opacity_logits, colours = leaves
-    colour, _, _ = oracle.forward(means, log_scales, quats, opacity_logits, colours, camera)
+    leaves = {name: torch.tensor(arrays[name], dtype=torch.float64, requires_grad=True) for name in PARAMETERS}
+    colour, _, _ = draw_by_oracle(leaves, camera)
     loss = (colour * torch.from_numpy(_output_gradient()).double()).sum()
-    return {name: g.numpy() for name, g in zip(PARAMETERS, torch.autograd.grad(loss, leaves), strict=True)}
+    gradients = torch.autograd.grad(loss, list(leaves.values()))
+    return {name: g.numpy() for name, g in zip(PARAMETERS, gradients, strict=True)}
 
 
 def _output_gradient() -> Array:

@@ -19,7 +19,7 @@ from scipy.ndimage import gaussian_filter
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import render
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.finite import Area, list_grid, place_block
+from dav_gswt.terrain.finite import Area, list_cells, place_block
 
 TILES = 20  # a side of the picture
 PIXELS = 32  # a side of a tile
@@ -51,7 +51,7 @@ def render_from_above(
     strips = []
     for row in range(0, tiles, STRIP):
         rows = min(STRIP, tiles - row)
-        cells = list_grid(terrain, Area(-1, row - 1, tiles + 2, rows + 2))  # what reaches over the edges, too
+        cells = list_cells(terrain, Area(-1, row - 1, tiles + 2, rows + 2))  # what reaches over the edges, too
         field = place_block(terrain, cells, level, np.array([-terrain.side, (row - 1) * terrain.side, 0.0]))()
         top = float(field.means[:, 2].max()) + 10 * terrain.side
         camera = cameras.top_down(terrain.side, terrain.side, tiles * pixels, rows * pixels, step, top)

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from fixtures.land_covers import SIDE, TILES, cover_content, shrub
 
-from dav_gswt.bundle import build, gswt
-from dav_gswt.bundle.build import BundleOptions
+from dav_gswt.bundle import gswt
 
 
 def first(thing):
@@ -61,9 +60,3 @@ def test_an_object_wider_than_a_tile_is_left_out(content):
     assert gswt.bake_objects(other, 7) is content.tiles[0].fields  # it stands on the second material
     fields = gswt.bake_objects(replace(content, objects=[first(shrub(2.5, 0.2))]), 7)
     assert [len(f) for f in fields[0]] == [len(f) for f in content.tiles[0].fields[0]]
-
-
-def test_the_archive_has_the_first_material_with_its_objects(content, baked, tmp_path):
-    build.write_bundle(content, tmp_path / "b", BundleOptions(tau=0.5, salt=7), {})
-    gswt.write_gswt(baked, SIDE, tmp_path / "baked.zip")
-    assert (tmp_path / "b/gswt.zip").read_bytes() == (tmp_path / "baked.zip").read_bytes()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fixtures.tile_sets import report_of
 
-from dav_gswt.bundle import build, gswt, level_distances, manifest, store
+from dav_gswt.bundle import build, level_distances, manifest, store
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
@@ -131,15 +131,6 @@ def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
     assert not (tmp_path / "b").exists() and not (tmp_path / ".b.part").exists()
 
 
-def test_the_archive_lacks_levels_that_its_renderer_could_not_take(tiles, tmp_path, monkeypatch, caplog):
-    sizes = [sum(len(field) for field in level) for level in tiles.fields]
-    monkeypatch.setattr(gswt, "MAX_SPLATS", sum(sizes[1:]))
-    gswt.write_gswt(tiles.fields, SIDE, tmp_path / "gswt.zip")
-    with zipfile.ZipFile(tmp_path / "gswt.zip") as archive:
-        assert archive.namelist() == [f"lod0_tile_{t:02d}.ply" for t in range(16)]
-    assert "lacks the finest 1 of" in caplog.text
-
-
 def test_a_new_bundle_replaces_the_old_one_and_leaves_its_neighbours(tiles, tmp_path):
     out = tmp_path / "b"
     (out / "chunks").mkdir(parents=True)
@@ -216,10 +207,6 @@ def test_a_manifest_as_large_as_no_manifest_is_not_read(copy_of, monkeypatch):
     monkeypatch.setattr(manifest, "MAX_BYTES", 1000)
     with pytest.raises(InputError, match="bytes are no manifest"):
         store.read_bundle(copy_of)
-
-
-def test_the_schema_is_that_of_the_manifest(root):
-    assert (root / "workflow/schemas/davgswt.schema.json").read_text() == manifest.make_schema()
 
 
 @pytest.mark.parametrize(

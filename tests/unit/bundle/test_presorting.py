@@ -69,15 +69,6 @@ def test_so_many_splats_as_two_bytes_count_need_four():
     assert found.dtype == np.uint32 and found[0, 0] == 65535 and (np.sort(found[0]) == np.arange(65536)).all()
 
 
-def test_a_picture_in_its_own_order_is_the_rasterizer_s():
-    field, along = ground(1), orders.unit_vectors(np.radians([37.0]), np.radians(45.0))[0]
-    exact, same, backwards = (
-        direction_search.render_in_order(field, SIDE, along, 0.01, o) for o in (None, along, -along)
-    )
-    assert (exact == same).all() and exact.max() > 0.5
-    assert np.abs(backwards - exact).max() > 0.1
-
-
 def test_one_colour_needs_the_fewest_directions():
     rings = direction_search.search_directions([ground(0, colours=0.0)], SIDE, 40.0)
     assert rings == DirectionRings((20.0,), 2 * direction_search.MIN_AZIMUTHS)

@@ -5,10 +5,12 @@ import json
 
 import pytest
 import yaml
+from fixtures.frames import scene_frame
 
 import dav_gswt
 from dav_gswt.cli import judgement, main, make
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.scene_frame import LeftOutPhoto, SfmSign, SfmVerdict, write_scene_frame
 
 JPEG = b"\xff\xd8\xff\xe0" + b"0" * 40
 
@@ -106,14 +108,15 @@ def test_view_finds_a_terrain_by_its_input_and_the_newest_one(folder):
 
 
 def test_the_judgement_says_what_was_found_how_good_it_is_and_what_would_help(tmp_path):
-    ground = {"kind": "photos", "images": 5, "registered": 4, "left_out": [{"name": "a.jpg", "reason": "blurred"}]}
-    ground["verdict"] = {"signs": [{"name": "tilt", "grade": "doubtful", "reason": "photos look aside"}]}
+    verdict = SfmVerdict("doubtful", (SfmSign("tilt", "doubtful", "photos look aside"),))
+    about = {"images": 5, "registered": 4, "left_out": (LeftOutPhoto("a.jpg", "blurred"),), "verdict": verdict}
     weak = {"grade": "marginal", "reason": "too little of it was photographed"}
     materials = {"excluded": 0.07, "objects": [{}], "materials": [{"share": 0.4, "verdict": weak}]}
     materials["materials"].append({"share": 0.6, "verdict": {"grade": "good", "reason": ""}})
     metrics = {"psnr": 20.0, "psnr_colour_corrected": 26.0, "test_views": [{}, {}]}
     paths = [tmp_path / name for name in ("ground.json", "materials.json", "metrics.json")]
-    for path, value in zip(paths, (ground, materials, metrics), strict=True):
+    write_scene_frame(paths[0], scene_frame(kind="photos", **about))
+    for path, value in zip(paths[1:], (materials, metrics), strict=True):
         path.write_text(json.dumps(value))
     said = judgement.judge_terrain(*paths)
     assert said == [

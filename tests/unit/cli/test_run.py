@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from fixtures.configs import checked_config
 
 from dav_gswt.cli import run
 from dav_gswt.errors import InputError
@@ -21,11 +22,11 @@ def without_core(monkeypatch):
 
 
 def test_where_the_core_is_missing_a_smaller_size_is_printed_and_used(without_core, root, monkeypatch, capsys):
-    assert run.select_overlays(quietly=False) == [run.SMALLER]
+    assert run.select_overlays(root) == [root / run.SMALLER]
+    monkeypatch.setattr(run, "follow", lambda command, folder: (1, 0))
+    run.run_workflow("desert", 1, [])
     assert "slower" in (said := capsys.readouterr().out) and "it was not built" in said
-    assert run.select_overlays(quietly=True) == [run.SMALLER] and not capsys.readouterr().out
-    monkeypatch.chdir(root)
-    usual, small = (run.load_config(files)["presets"] for files in ([], [run.SMALLER]))
+    usual, small = (checked_config(*files)["presets"] for files in ((), (run.SMALLER,)))
     assert all(small[name]["max_gaussians"] < usual[name]["max_gaussians"] for name in usual)
 
 

@@ -149,15 +149,9 @@ def test_images_hold_the_heights_from_the_north(exported, facts, surface):
     assert known["north_west"] == pytest.approx([-3 * 4.0, 2.5 * 4.0])
 
 
-def test_a_second_export_has_the_same_bytes(cover_bundle, cover_terrain, sets, settings, exported, tmp_path):
-    ground_files.export_ground(cover_terrain, cover_bundle.manifest, sets, settings, tmp_path / "out")
-    for path in exported.iterdir():
-        assert (tmp_path / "out" / path.name).read_bytes() == path.read_bytes(), path.name
-
-
 def test_every_object_has_a_closed_hull_that_holds_what_is_drawn(exported, facts, cover_terrain):
-    i, j, _, _ = finite.list_cells(cover_terrain, AREA)
-    found = cover_terrain.scatter.instances_in(i, j)
+    cells = finite.list_cells(cover_terrain, AREA)
+    found = cover_terrain.scatter.instances_in(cells.i, cells.j)
     meshes = list(read_meshes(exported / "objects.glb"))
     assert len(meshes) == len(found) == facts["objects"] > 0
     bare = len(collect_cells(replace(cover_terrain, scatter=None, objects=[]), 0, -1, 6, 5, 0))
@@ -179,13 +173,6 @@ def test_a_hull_reaches_one_deviation_of_what_is_solid():
     points = ground_surface.find_outermost(replace(ball, opacity_logits=np.float32([4, -4])))
     np.testing.assert_allclose(np.linalg.norm((points - [1, 2, 3]) / [0.3, 0.2, 0.1], axis=1), 1, rtol=1e-5)
     np.testing.assert_allclose(np.ptp(points, axis=0), [0.6, 0.4, 0.2], atol=0.015)
-
-
-def test_what_is_flat_has_no_hull(cover_terrain):
-    leaf = gaussians([[0.0, 0, 0]], LEAF, [0.3, 0.2, 1e-12])
-    flat = replace(cover_terrain, objects=[[leaf] * 2], heights=endless.FlatSurface())
-    assert cover_terrain.scatter is not None
-    assert not list(ground_surface.collect_hulls(flat, AREA, find_origin(flat, AREA)))
 
 
 def test_mujoco_loads_the_model_and_its_rays_meet_the_heights(exported, facts, surface):

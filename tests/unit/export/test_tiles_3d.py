@@ -1,22 +1,18 @@
 """3D Tiles: the rules of the specification, every Gaussian of every level once, the place on the globe."""
 
 import json
-from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from fixtures.finite_cells import collect_cells
-from fixtures.random_field import random_field
 from fixtures.splat_files import read_glb_spz
 from pyproj import Transformer
 
 from dav_gswt.export import tiles_3d
 from dav_gswt.export.axes import Y_UP, turn_field
-from dav_gswt.export.spool import ExportJob, Spool
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.terrain.finite import Area
 
 PLACE = Georeference(47.1, 11.3, 600.0, 20.0, metres_per_unit=1.5)
 
@@ -101,22 +97,3 @@ def test_a_level_is_refined_where_its_gaussians_lie_more_than_a_pixel_apart_and_
     tiles = cover_terrain.tiles | {(2, 0): cover_terrain.tiles[0, 0]}  # with more Gaussians than the finer one
     errors = tiles_3d.measure_errors(replace(cover_terrain, tiles=tiles, switches=[1.0, 2.0, np.inf]))
     assert errors == [0.0, expected, expected]
-
-
-def test_what_has_no_gaussian_has_no_tile(cover_terrain, tmp_path):
-    """A cell without Gaussians at any level, and one that has them at the finest alone."""
-
-    @contextmanager
-    def place(area, level):
-        with Spool(tmp_path / f"spool{level}_{area.west}_{area.columns}") as spool:
-            spool.append(random_field(0 if area.west == 0 or level else 5))
-        yield spool
-
-    with Spool(tmp_path / "spool") as nothing:
-        about = ({"unit": "metre"}, cover_terrain, Area(0, 0, 4, 1), place, None)
-        job = ExportJob(nothing, *about)
-        assert tiles_3d.write_tileset(job, tmp_path / "out") == 3 * 5
-    root = json.loads((tmp_path / "out/tileset.json").read_text())["root"]
-    west, east = root["children"]
-    assert "content" not in west and [tile["content"]["uri"] for tile in west["children"]] == ["0/1_0.glb"]
-    assert "content" not in east and len(east["children"]) == 2

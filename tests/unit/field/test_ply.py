@@ -1,6 +1,5 @@
 """PLY files: a round trip is exact, files of other programs are read, broken ones raise errors that name the file."""
 
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from fixtures.random_field import random_field
 from plyfile import PlyData, PlyElement
 
-from dav_gswt import field as field_files
 from dav_gswt.errors import InputError
 from dav_gswt.field import (
     HEADER_BYTES,
@@ -243,20 +241,6 @@ def test_doubles_far_from_0_are_counted_from_an_origin(tmp_path):
     assert (splats.origin == np.round(splats.origin)).all() and np.abs(splats.field.means).max() < 10
     here = read_ply(with_doubles(tmp_path / "b.ply", 50, near))
     assert not here.origin.any() and here.field.means == pytest.approx(near, abs=1e-6)
-
-
-def test_harmonics_that_are_not_wanted_take_no_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr(field_files, "BLOCK", 1 << 16)
-    write_field(random_field(8000, degree=3), tmp_path / "a.ply", plain=True)
-    size = (tmp_path / "a.ply").stat().st_size
-    read_ply(tmp_path / "a.ply", harmonics=False)  # what is imported once
-    tracemalloc.start()
-    splats = read_ply(tmp_path / "a.ply", harmonics=False)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert splats.sh_degree == 3 and splats.field.sh.shape == (8000, 1, 3)
-    assert np.array_equal(splats.field.sh, read_field(tmp_path / "a.ply").sh[:, :1])
-    assert peak < 0.7 * size  # columns of 14 numbers of 62, and as much again on the way
 
 
 BOUNDS = [f"{end}_{part}{axis}" for part in ("", "scale_") for end in ("min", "max") for axis in "xyz"]

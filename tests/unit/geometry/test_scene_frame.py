@@ -11,7 +11,6 @@ from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import (
     FocalLength,
     LeftOutPhoto,
-    Square,
     read_scene_frame,
     write_scene_frame,
 )
@@ -35,12 +34,6 @@ FRAME = scene_frame(
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "ground.json"
-
-
-def test_a_square_by_hand():
-    square = Square(1.0, -2.0, 4.0)
-    assert (square.east, square.north) == (5.0, 2.0)
-    assert square.centre.tolist() == [3.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import OpenImageIO as oiio
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.images import figures, image_files
+from dav_gswt.images import image_files
 from dav_gswt.images.figures import encode_jpeg
 
 GENERATOR = np.random.default_rng(0)
@@ -170,20 +170,6 @@ def test_an_image_that_cannot_be_written_is_named_with_the_remedy(write, tmp_pat
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_sheet_shows_every_picture_in_its_row(tmp_path):
-    """Two rows of two: each quarter has the colour of its own picture."""
-    colours = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0]], np.float32)
-    for number, colour in enumerate(colours):
-        image_files.write_png(tmp_path / f"{number}.png", np.broadcast_to(colour, (40, 80, 3)))
-    rows = {name: [tmp_path / f"{k + n}.png" for n in (0, 1)] for k, name in ((0, "upper"), (2, "lower"))}
-    figures.save_figure(figures.draw_sheet(rows, ["left", "right"], tall=1.0), tmp_path / "sheet.png")
-    shown = image_files.read_photo(tmp_path / "sheet.png")
-    high, wide = (n // 4 for n in shown.shape[:2])
-    found = [shown[y * high, x * wide] for y in (1, 3) for x in (1, 3)]
-    np.testing.assert_allclose(found, colours, atol=0.02)
-    assert shown.shape[1] > 1.8 * shown.shape[0]
 
 
 def test_colours_of_a_jpeg_stay_and_values_beyond_are_clipped(tmp_path):

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from dav_gswt import field as fields
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
-from dav_gswt.files import read_json, write_json
 from dav_gswt.geometry.poses import pose_offset
 from dav_gswt.images import image_files
 from dav_gswt.inspect import plot, readers
@@ -139,15 +138,6 @@ def test_parts_channels_grounds_and_headers_that_do_not_fit_are_refused(tree, tm
             readers.read_scene(path, MOST, **options)
 
 
-def test_a_folder_of_materials_shows_its_map_whose_holes_are_grey(tmp_path):
-    layers = {"material": np.array([[np.inf, 1], [2, 3]], np.float32), "object": np.eye(2, dtype=np.float32)}
-    image_files.write_exr(tmp_path / "materials.exr", layers, {"west": "0.0"})
-    (tmp_path / "materials.json").touch()
-    shown = readers.read_scene(tmp_path, MOST)
-    assert shown.notes == ["parts: 1; pictures: 2 of 2; grey: not a number"]
-    np.testing.assert_array_equal(shown.meshes[0][1]["texture"].to_array()[0, 0], [150, 150, 150])
-
-
 def test_candidates_stand_where_they_are_in_the_policy_s_colours_and_the_chosen_are_marked_in_order(tree):
     shown, by_scores = (readers.read_scene(p, MOST) for p in (tree.round / "poses.json", tree.scored / "scores.csv"))
     at = result_tree.MIDDLE + np.array([pose_offset(pose) for pose in POSES])
@@ -212,11 +202,3 @@ def test_gaussians_have_the_patch_of_their_cell(cut):
     for i in np.flatnonzero(inside)[::97]:
         x, y = (some.means[i, :2] / cut.spacing).astype(int)
         assert tuple(found[i]) == readers.PATCH_COLOURS[cut.labels[3][y, x]]
-
-
-def test_tiles_that_are_not_what_seams_json_says_are_refused(tree, tmp_path):
-    told = read_json(tree.tiles / "seams.json")
-    (tmp_path / "tiles").symlink_to(tree.tiles / "tiles")
-    write_json(tmp_path / "seams.json", told | {"side": 99.0})
-    with pytest.raises(InputError, match="labels.npz is not a map of each tile"):
-        readers.read_scene(tmp_path, MOST)

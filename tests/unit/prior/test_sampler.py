@@ -3,7 +3,7 @@ import pytest
 import torch
 from diffusers import DDIMScheduler, UNet2DConditionModel
 
-from dav_gswt.prior import dropout, sampler
+from dav_gswt.prior import sampler
 from dav_gswt.prior.sampler import Sampling
 
 SHAPE = (4, 8, 8)
@@ -28,7 +28,7 @@ def network():
 
 @pytest.fixture(scope="module")
 def layers(network):
-    return dropout.replace_dropout(network)
+    return sampler.replace_dropout(network)
 
 
 def drawn(network, layers, views=3, m=4, p=0.2, steps=3, seed=1, batch=8, common=True):

@@ -13,7 +13,7 @@ from diffusers import AutoencoderKL, UNet2DConditionModel
 from safetensors.torch import load_file, save_file
 
 from dav_gswt.errors import InputError
-from dav_gswt.prior import dropout, zero123
+from dav_gswt.prior import sampler, zero123
 from dav_gswt.prior.interface import Condition, Prior
 from dav_gswt.prior.zero123 import LATENT, SIZE, Zero123, remove_white
 
@@ -149,7 +149,7 @@ def test_a_sample_has_one_mask_with_and_without_the_photo(prior):
     found = []
     for guidance in (1.0, 3.0):
         one = Zero123(prior.networks, guidance)
-        with torch.inference_mode(), dropout.hold_masks(one.networks.layers, 3, 0.4, 0):
+        with torch.inference_mode(), sampler.hold_masks(one.networks.layers, 3, 0.4, 0):
             found.append(one._predict_noise(noise, torch.tensor(500), *nothing))
     torch.testing.assert_close(*found, atol=1e-5, rtol=0)
 

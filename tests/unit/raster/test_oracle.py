@@ -6,7 +6,9 @@ Tolerances: some hundred float32 roundings a pixel (6e-8 each), 1e-5. See test_b
 import numpy as np
 import pytest
 import torch
-from fixtures.raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, oracle_answers, relative
+from fixtures.raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, oracle_answers, pixel_middles, relative
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from dav_gswt.raster import cpu, harmonics, oracle
 
@@ -20,13 +22,6 @@ def assert_drawn_alike(raster, arrays, camera, gradients, answered, names=NAMES,
     found = raster.backward(*gradients)
     for name in names:
         assert relative(getattr(found, name), wanted[name]) < tolerance, name
-
-
-@pytest.mark.parametrize("channels", [1, 5, 9])
-def test_any_number_of_channels_is_drawn_and_taken_back(raster, channels):
-    arrays, camera = gaussians(120, channels=channels), CAMERAS["pinhole"]
-    gradients = image_gradients(camera, channels)
-    assert_drawn_alike(raster, arrays, camera, gradients, oracle_answers(arrays, camera, gradients))
 
 
 @pytest.mark.parametrize("logit", [8.0, 20.0])
@@ -69,7 +64,27 @@ def test_no_pixel_of_a_thin_or_tilted_splat_is_left_out(raster):
     arrays["opacity_logits"] = rng.uniform(-5, -3, 200).astype(np.float32)  # so faint that no pixel is ever full
     tensors = {name: torch.tensor(values, dtype=torch.float64) for name, values in arrays.items()}
     splats = oracle.project(**tensors, camera=camera)
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    wanted = int((oracle.weights(splats.shapes, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1))) > 0).sum())
+    wanted = int((oracle.weights(splats.shapes, pixel_middles(camera)) > 0).sum())
     raster.forward(**arrays, camera=camera)
     assert wanted > 10_000 and abs(raster.count_pairs() - wanted) <= 1e-4 * wanted + 1
+
+
+@settings(max_examples=20, derandomize=True)
+@given(
+    st.booleans(),
+    st.sampled_from(sorted(CAMERAS)),
+    st.integers(0, 1 << 16),
+    st.lists(st.tuples(*[st.floats(-12, 6)] * 3), min_size=1, max_size=4),
+)
+def test_scales_from_1e_12_to_1e6_are_drawn_as_the_oracle_draws_them(antialiased, view, seed, sizes):
+    """Needles too. Along one terms of some 1e4 cancel in the exponent: alpha is off by up to 1e-2 where it is steep."""
+    arrays, camera = gaussians(len(sizes), seed), CAMERAS[view]
+    arrays["log_scales"] = (np.log(10) * np.array(sizes)).astype(np.float32)
+    gradients = image_gradients(camera, 3)
+    (colour, alpha, _), _ = oracle_answers(arrays, camera, gradients, antialiased=antialiased)
+    raster = cpu.Rasterizer(antialiased=antialiased)
+    seen = raster.forward(**arrays, camera=camera)
+    for found, wanted in ((seen.colour, colour), (seen.alpha, alpha)):
+        assert np.abs(found - wanted).max() < 2e-2
+        assert np.abs(found - wanted).mean() < 1e-4
+    assert all(np.isfinite(g).all() for g in vars(raster.backward(*gradients)).values() if g is not None)

@@ -1,7 +1,6 @@
 """Classes: the numbers shared with the page, bounds of cells, what reaches over a border, and painted places."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from fixtures.land_covers import SIDE, gaussians, two_classes
 
 from dav_gswt.bundle.land_cover import ClassesEntry, find_run_fault
 from dav_gswt.files import parse_record
-from dav_gswt.terrain.classes import LATTICE, Classes, Painted
+from dav_gswt.terrain.classes import LATTICE, Classes
 from dav_gswt.terrain.heights import FlatSurface, Hills
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "classes.json").read_text())["terrains"]
@@ -61,25 +60,6 @@ def test_every_place_keeps_the_disc_of_a_material(amplitude):
         sand, grass = (classes.keep(i, j, discs, np.full(200, m)) for m in (0, 1))
         assert (sand | grass).all()
         assert not (sand & grass).any(), "flat discs of both at one place: a blend"
-
-
-def lattice(low, high):
-    i, j = np.mgrid[low:high, low:high].astype(np.int64)
-    return i.ravel(), j.ravel()
-
-
-@pytest.mark.parametrize("shift", [(0, 0), (-8, 3), (8 * 10**5, -17)])
-def test_weights_are_those_of_a_sum_over_all_points(shift):
-    rng = np.random.default_rng(1)
-    points = {(int(i), int(j)): int(m) for i, j, m in rng.integers(0, [20, 20, 3], (150, 3)) + [*shift, 0]}
-    i, j = lattice(-4, 24)
-    i, j = i + shift[0], j + shift[1]
-    expected = np.zeros((len(i), 3), int)
-    spread = {-2: 1, -1: 4, 0: 6, 1: 4, 2: 1}
-    for (x, y), material in points.items():
-        expected[:, material] += [spread.get(a - x, 0) * spread.get(b - y, 0) for a, b in zip(i, j, strict=True)]
-    painted = Painted(replace(two_classes(), painted=[[x, y, 1, m] for (x, y), m in points.items()]))
-    assert (painted.weights_at(i, j, 3) == expected).all()
 
 
 @pytest.mark.parametrize(

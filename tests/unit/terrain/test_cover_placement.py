@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixtures.land_covers import GRASS, SAND, SIDE, TILES, cover_content
+from fixtures.land_covers import GRASS, SAND, SIDE, cover_content
 from fixtures.terrains import HILLS, SKY, walking
 from scipy.spatial.transform import Rotation
 
@@ -12,7 +12,6 @@ from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.lod.merge import compute_covariances
 from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain import endless, placement, stills, visibility
-from dav_gswt.terrain.scatter import Instances
 
 MAGENTA = [1.0, 0.0, 1.0]
 
@@ -55,15 +54,6 @@ def test_a_picture_shows_both_materials_without_a_gap_and_the_objects(cover, bar
     assert full[changed].mean(0) == pytest.approx([0.2, 0.35, 0.15], abs=0.1)
 
 
-def test_a_budget_counts_the_tiles_of_all_materials_in_a_cell(bare, seen):
-    cells = seen[1]
-    pure = replace(cells, materials=np.ones(len(cells), int), tile=cells.tile % TILES)
-    both = replace(pure, materials=np.full(len(cells), 3))
-    grass = replace(pure, materials=np.full(len(cells), 2), tile=cells.tile % TILES + TILES)
-    counts = [visibility.count_gaussians(bare, each) for each in (pure, grass, both)]
-    np.testing.assert_array_equal(counts[0] + counts[1], counts[2])
-
-
 def test_an_object_is_turned_and_scaled_about_its_foot(cover):
     source = cover.objects[0][0]
     n, foot = len(source), np.array([3.0, 4.0, 0.5])
@@ -73,14 +63,6 @@ def test_an_object_is_turned_and_scaled_about_its_foot(cover):
     assert made.means == pytest.approx(1.1 * source.means @ turn.T + foot, abs=1e-5)
     expected = 1.1**2 * turn @ compute_covariances(source) @ turn.T
     assert compute_covariances(made) == pytest.approx(expected, rel=1e-4, abs=1e-9)
-
-
-def test_every_visible_foot_is_drawn_once(cover, seen):
-    _, cells, things = seen
-    drawn = Instances.concatenate(list(things.values()))
-    every = cover.scatter.instances_in(cells.i, cells.j)
-    assert len(drawn) == len(every) > 20
-    assert sorted(drawn.u.tolist()) == sorted(every.u.tolist())
 
 
 def test_an_object_is_drawn_with_the_last_of_the_cells_that_it_touches(cover, seen):

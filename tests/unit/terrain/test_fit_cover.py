@@ -93,10 +93,3 @@ def test_every_object_has_its_density_in_another_window():
     counts = np.bincount(scatter.instances_in(i, j).number) / (40 * 40 * SIDE**2 * np.array([0.4, 0.6]))
     # the window has about 1000 and 900 things, and a share of ground of its own
     assert counts == pytest.approx([0.1, 0.06], rel=0.15)
-
-
-def test_objects_may_stand_on_the_only_material():
-    content = replace(cover_content(), classes=None)
-    one = replace(content, tiles=content.tiles[:1], materials=[replace(content.materials[0], share=1.0)])
-    made = fit_cover(replace(one, objects=[shrub(0.3, 0.2, 0)]), 7)
-    assert made.classes is None and made.scatter is not None and 0 < made.probabilities[0] <= 1

@@ -77,9 +77,3 @@ def test_a_cell_has_the_same_things_in_every_window(request, scatter, west):
         alone = replace(scatter).instances_in(np.array([i]), np.array([-3]))
         mine = whole[(whole.i == i) & (whole.j == -3)]
         assert sorted(alone.u.tolist()) == sorted(mine.u.tolist())
-
-
-def test_something_wider_than_a_tile_keeps_its_distance():
-    scatter = Scatter(ScatterEntry(1, 0.0, 0.0, 1), [thing(2.5 * SIDE, 0, 0.6)], SIDE)
-    places = places_of(window_of(scatter))
-    assert len(places) > 5 and len(cKDTree(places).query_pairs(5 * SIDE)) == 0

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixtures.terrains import MAGENTA, SKY, two_level_terrain
+from fixtures.terrains import MAGENTA, two_level_terrain
 
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.errors import InputError
 from dav_gswt.terrain import finite, planet, sphere, stills
-from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.heights import QUARTER, FlatSurface, Sphere, make_sphere, require_plain_cover
 from dav_gswt.terrain.sphere import FACES, FaceCells, bend, directions, frame_at, is_covered
 from dav_gswt.terrain.stills import camera_on
@@ -51,13 +50,6 @@ def test_bends_are_those_shared_with_the_page(entry):
 def all_cells(ball: Sphere):
     cells = FaceCells(*(v.ravel() for v in np.mgrid[:6, -1 : ball.cells + 1, -1 : ball.cells + 1]))
     return cells[is_covered(ball, cells)]
-
-
-def locate(ball: Sphere, points):
-    """The faces under points, and the places on them in cells."""
-    face = np.argmax(points @ FACES[:, 2].T, axis=1)
-    along = np.einsum("nc,nkc->nk", points, FACES[face])
-    return face, (np.arctan2(along[:, :2], along[:, 2:]) / QUARTER + 0.5) * ball.cells
 
 
 @pytest.fixture(scope="module")
@@ -100,22 +92,6 @@ def test_no_cell_of_which_something_shows_is_lost(tiles, point, height):
                 for row in np.flatnonzero(inside & ahead).tolist():
                     assert (int(face[row]), int(i[row]), int(j[row])) in found
         assert (cells.nearest <= cells.farthest).all()
-
-
-@pytest.mark.parametrize("salt", [0, 7])
-def test_colours_agree_across_every_edge_without_a_turn(salt):
-    """The cell beyond an edge is found by geometry; the east of odd faces and the north of even ones are turned."""
-    ball, crossed = make_sphere(4.0, 4.0), 0
-    cells = FaceCells(*np.mgrid[:6, : ball.cells, : ball.cells].reshape(3, -1))
-    for (east, north), (here, there) in {(1, 0): (1, 3), (0, 1): (2, 0)}.items():
-        over = ball.tangents(cells.i + 0.5 + 0.501 * east, cells.j + 0.5 + 0.501 * north)
-        face, place = locate(ball, directions(cells.face, over))
-        straight = (face == cells.face) | (cells.face % 2 == north)
-        crossed += (face != cells.face)[straight].sum()
-        beyond = FaceCells(face, *np.floor(place).astype(int).T)
-        mine, other = (sphere.tiles_on(ball, some[straight], salt, 2) for some in (cells, beyond))
-        assert ((mine >> here & 1) == (other >> there & 1)).all()
-    assert crossed == 6 * ball.cells
 
 
 def count_owners(ball: Sphere, points, salt: int):
@@ -181,20 +157,6 @@ def test_the_ground_has_no_holes(tiles, radius, point, height, pitch):
     terrain = replace(tiles, heights=make_sphere(radius, SIDE))
     picture = stills.render_view(terrain, camera_over(terrain, point, height, pitch), PINK, MAGENTA)
     assert through(picture).max() < 0.1  # opaque discs' deviation is 0.7 of their spacing, stretched to 1.26
-
-
-def backdrop_on(terrain, radius, height):
-    ball = make_sphere(radius, SIDE)
-    eye = np.array([0.0, 0.0, ball.radius + height])
-    return Backdrop.for_eye(replace(terrain, heights=ball), eye, SKY, [0.4, 0.3, 0.2])
-
-
-@pytest.mark.parametrize("height", [1e-3, 1.0, 1e9])
-def test_the_backdrop_is_finite_and_dark_far_away(tiles, height):
-    backdrop = backdrop_on(tiles, 8.0, height)
-    colours = backdrop.colours_along(np.random.default_rng(1).normal(size=(200, 3)))
-    assert np.isfinite(colours).all() and colours.min() >= 0 and colours.max() <= 1
-    assert (backdrop.colours_along(np.array([[0.0, 0.0, 1.0]])).max() < 1e-3) == (height > 100)
 
 
 def test_a_sphere_has_one_material_no_objects_and_no_rectangles(tiles):

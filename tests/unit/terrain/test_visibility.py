@@ -44,15 +44,6 @@ def test_what_the_camera_sees_is_there(request, surface, pitch, height):
     )
 
 
-def test_too_many_gaussians_go_farthest_first(terrain):
-    cells = visibility.visible_cells(terrain, walking(terrain))
-    few = visibility.drop_far_cells(terrain, cells, 20_000)
-    assert 0 < len(few) < len(cells)
-    gone = ~np.isin(cells.i * 1000 + cells.j, few.i * 1000 + few.j)
-    assert few.nearest.max() <= cells.nearest[gone].min()
-    assert (np.diff(np.abs(few.i) + np.abs(few.j)) <= 0).all(), "and the order stays"
-
-
 def test_levels_come_nearer_until_a_picture_fits_its_budget(terrain):
     camera = walking(terrain)
     cells = visibility.visible_cells(terrain, camera)

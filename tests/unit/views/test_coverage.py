@@ -11,7 +11,7 @@ from fixtures import ground as patch
 
 from dav_gswt.field import write_field
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.scene_frame import Extent, write_scene_frame
+from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.photos.view_split import ViewSplit
@@ -77,15 +77,6 @@ def test_importance_has_any_scale_and_none_at_all_is_an_equal_one_and_what_shows
     for bad in (-1.0, np.nan):
         with pytest.raises(ValueError, match="importance"):
             gain(cells, [], one, np.full(coverage.CELLS**2, bad))
-
-
-def test_where_far_more_ground_is_fitted_than_the_exemplar_all_of_it_counts():
-    whole = replace(patch.FRAME, extent=Extent(-3.2, 0.0, 6.4, 3.2))
-    grid = ground.fit_ground(whole, np.zeros((0, 3)), 0.1, max_cells=10**6, block=32, margin=ground.WHOLE)
-    cells = coverage.GroundCells(patch.field(replace(grid, seen=np.ones(grid.shape, bool))), grid)
-    west, south, east, north = grid.judged
-    assert east - west > 2 * (north - south) and cells.shape[1] == coverage.CELLS > 2 * cells.shape[0]
-    assert (cells.middle[:, 0].min(), cells.middle[:, 0].max()) == pytest.approx((west, east), abs=0.4)
 
 
 def test_the_error_of_a_cell_is_that_of_the_pixels_that_count_and_show_it_or_the_worst_where_none_does(cells):

@@ -7,7 +7,7 @@ import pytest
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.poses import Pose, select_farthest_poses
 from dav_gswt.views import policies, scores, selection
-from dav_gswt.views.policies import NEEDS_FIELD, POLICIES, SelectionInput, candidate_values, resolve_policy
+from dav_gswt.views.policies import NEEDS_FIELD, POLICIES, SelectionInput, resolve_policy
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty import Scales
 
@@ -125,18 +125,3 @@ def test_scores_are_read_as_written_to_the_bit_and_what_is_no_table_of_scores_is
     for name, reason in (reasons | {"word": "could not convert"}).items():
         with pytest.raises(InputError, match=reason):
             scores.read_scores(tmp_path / f"{name}.csv")
-
-
-def test_candidates_are_coloured_by_uncertainty_where_a_prior_was_sampled_else_by_coverage():
-    coverage, w2, lpips = np.linspace(0.0, 1.0, 6), np.linspace(1, 2, 6), np.linspace(5, 3, 6)
-    for terms, word, wanted in (
-        ({"coverage": coverage}, "coverage", coverage),
-        ({"w2_sq": w2, "lpips": lpips}, "W2 + 0.1 LPIPS", w2 + 0.1 * lpips),
-    ):
-        label, values = candidate_values(scored(*range(6), **terms), 0.1)
-        assert word in label
-        np.testing.assert_allclose(values, wanted / 2)  # over its scale
-    assert "LPIPS" not in candidate_values(scored(*range(6), w2_sq=w2), 0.1)[0]
-    agreed = scored(*range(6), coverage=coverage, w2_sq=np.zeros(6))
-    agreed.scales.by_term["w2_sq"] = 0.0
-    assert "coverage" in candidate_values(agreed, 0.0)[0]

@@ -117,11 +117,6 @@ def test_lam_weighs_lpips_over_its_scale_against_w2_or_the_gradient_over_theirs(
     assert "the scores lack LPIPS" in caplog.text
 
 
-def test_a_scale_that_is_no_number_is_refused():
-    with pytest.raises(ValueError, match="scale of lpips"):
-        un.Scales({"w2_sq": 1.0, "lpips": math.nan})
-
-
 def test_normalised_goes_from_0_at_the_low_quantile_to_1_at_the_high_one():
     quantiles = un.Quantiles(2.0, 4.0)
     np.testing.assert_array_equal(un.normalise(np.array([-9.0, 2, 3, 4, 1e30]), quantiles), [0, 0, 0.5, 1, 1])

@@ -10,10 +10,9 @@ __version__ = "0.1.0"
 
 def __getattr__(name: str) -> Any:
     """Load a function of `dav_gswt.api` when it is first used: loading takes time, and jobs use none."""
-    if name.startswith("_") or name == "api":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from dav_gswt import api
+    if not name.startswith("_") and name != "api":
+        from dav_gswt import api
 
-    if name not in api.__all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(api, name)
+        if name in api.__all__:
+            return getattr(api, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

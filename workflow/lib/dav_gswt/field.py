@@ -1,7 +1,7 @@
 """`GaussianField`, the arrays of a 3D Gaussian splat, and the standard 3DGS PLY that stores them."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TypeVar
@@ -283,24 +283,14 @@ def _gather(rows: Array, names: dict[str, list[str]], path: Path) -> dict[str, F
         key: np.empty((len(rows), len(listed)), np.float64 if key == "means" and double else np.float32)
         for key, listed in names.items()
     }
-    for part, block in _read_blocks(rows, path):
+    step = max(1, BLOCK // max(1, rows.dtype.itemsize))
+    for part in (slice(start, start + step) for start in range(0, len(rows), step)):
+        block = rows[part]
         for key, listed in names.items():
             for j, name in enumerate(listed):
                 with np.errstate(over="ignore"):
                     out[key][part, j] = block[name]
     return out
-
-
-def _read_blocks(rows: Array, path: Path) -> Iterator[tuple[slice, Array]]:
-    """A table in blocks. Those of a mapped file are read instead, so that its pages do not pile up in memory."""
-    step = max(1, BLOCK // max(1, rows.dtype.itemsize))
-    for start in range(0, len(rows), step):
-        part = slice(start, min(start + step, len(rows)))
-        if isinstance(rows, np.memmap):
-            place = rows.offset + start * rows.dtype.itemsize
-            yield part, np.fromfile(path, rows.dtype, part.stop - start, offset=place)
-        else:
-            yield part, rows[part]
 
 
 def _read_tables(path: Path) -> PlyData:

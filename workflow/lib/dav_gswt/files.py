@@ -115,13 +115,7 @@ def write_table(path: Path | str, rows: Iterable[dict]) -> None:
         if rows:
             writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
             writer.writeheader()
-            writer.writerows({name: _format_cell(value) for name, value in row.items()} for row in rows)
-
-
-def _format_cell(value: object) -> str:
-    if value is None:
-        return ""
-    return f"{value:.5g}" if isinstance(value, float) else str(value)
+            writer.writerows({k: f"{v:.5g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
 
 
 def read_json(path: Path | str):
@@ -168,9 +162,7 @@ def parse_record(values, kind: type[Record]) -> Record:
         raise ValueError(": ".join(filter(None, (where, first["msg"])))) from None
 
 
-@cache
-def _adapter(kind: type) -> TypeAdapter:
-    return TypeAdapter(kind)
+_adapter = cache(TypeAdapter)
 
 
 def require_file_name(name) -> str:

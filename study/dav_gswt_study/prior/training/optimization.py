@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from dav_gswt.files import atomic_file
 from dav_gswt.logs import progress
-from dav_gswt.prior import dropout, weights
+from dav_gswt.prior import sampler, weights
 from dav_gswt.prior.networks import LATENT, TIMES, Network, make_schedule
 from dav_gswt.prior.terrain import average_opacity, pack_photo, pack_render, pack_truth
 from dav_gswt_study import csv_tables
@@ -95,7 +95,7 @@ def train_autoencoder(
         true = pictures[rows].float() / 255
         posterior = _find_posterior(network, true)
         latent = posterior.mean + posterior.std * torch.randn(posterior.mean.shape, generator=rng)
-        decoded = (network.autoencoder.decode(latent) + 1) / 2
+        decoded = (network.autoencoder.decoder(latent) + 1) / 2
         return (decoded - true).abs().mean() + KL_WEIGHT * posterior.kl().mean()
 
     _start_with_small_variances(network)
@@ -109,12 +109,12 @@ def train_autoencoder(
 
 def _find_posterior(network: Network, planes: Float[Tensor, "n 5 s s"]) -> DiagonalGaussianDistribution:
     """The encoder's normal distribution of unscaled latents of pictures."""
-    return DiagonalGaussianDistribution(network.autoencoder.encode(2 * planes - 1))
+    return DiagonalGaussianDistribution(network.autoencoder.encoder(2 * planes - 1))
 
 
 def train_denoiser(network: Network, examples: EncodedExamples, plan: TrainingPlan, checkpoint: Path) -> list[float]:
     """Train the denoiser to predict the velocity of noisy latents; returns the loss of every step."""
-    schedule, layers = make_schedule(), dropout.replace_dropout(network.denoiser)
+    schedule, layers = make_schedule(), sampler.replace_dropout(network.denoiser)
     trained = nn.ModuleDict({"denoiser": network.denoiser, "condition_encoder": network.condition_encoder})
 
     def loss(step: int, rng: torch.Generator) -> Tensor:
@@ -126,7 +126,7 @@ def train_denoiser(network: Network, examples: EncodedExamples, plan: TrainingPl
         tokens = network.condition_encoder(examples.photo[rows], examples.relative[rows])
         inputs = examples.render[rows] * known, opacity, tokens
         p_drop = MOST_DROPOUT * max(0.0, 1.5 * float(torch.rand((), generator=rng)) - 0.5)
-        with dropout.hold_masks(layers, plan.batch, p_drop, plan.seed * 1_000_003 + step):
+        with sampler.hold_masks(layers, plan.batch, p_drop, plan.seed * 1_000_003 + step):
             noisy, velocity = schedule.add_noise(truth, noise, time), schedule.get_velocity(truth, noise, time)
             return (network.predict_velocity(noisy, time, *inputs) - velocity).square().mean()
 

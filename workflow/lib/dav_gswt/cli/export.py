@@ -2,9 +2,10 @@
 
 import argparse
 import logging
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, get_args
+
+import yaml
 
 from dav_gswt.bundle.manifest import NAME as MANIFEST
 from dav_gswt.config.exports import Export, Format
@@ -26,7 +27,7 @@ def add_command(commands) -> None:
         if name == "formats":
             about = f"any of {', '.join(get_args(Format))} and {GROUND}; {about}"
         how = LISTS.get(name, {}) | {"help": about}
-        parser.add_argument(f"--{name}", type=_parse_value, **how)
+        parser.add_argument(f"--{name}", type=yaml.safe_load, **how)
     parser.add_argument("--threads", type=int, default=2)
     parser.set_defaults(run=run_export)
 
@@ -100,11 +101,3 @@ def check_target(folder: Path, mark: str) -> None:
         raise InputError(f"-o {folder.parent}: a file is in the way; name a folder")
     if folder.is_symlink() or (folder.exists() and not (folder / mark).is_file()):
         raise InputError(f"{folder} is in the way, and is no export (it has no {mark}): name another folder with -o")
-
-
-def _parse_value(text: str) -> Any:
-    """A number or text, as the config has it."""
-    for kind in (int, float):
-        with suppress(ValueError):
-            return kind(text)
-    return text

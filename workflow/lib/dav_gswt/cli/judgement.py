@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dav_gswt.files import read_json
+from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 
 # PSNR of photos that were set aside, after their exposure is fitted, from which a word holds
 SHARPNESS = ((30.0, "shows them sharply"), (25.0, "shows them well, a little softer"), (20.0, "is soft beside them"))
@@ -18,7 +19,7 @@ def judge_terrain(frame: Path, materials: Path | None, metrics: Path | None) -> 
 
     Raises: InputError: a file is not readable.
     """
-    ground = read_json(frame)
+    ground = read_scene_frame(frame)
     found = read_json(materials) if materials else None
     sentences = [describe_ground(found), describe_photos(ground), describe_sharpness(metrics)]
     return [*filter(None, sentences), *list_reasons(ground, found)]
@@ -37,13 +38,13 @@ def describe_ground(found: Mapping[str, Any] | None) -> str:
     return f"{text}." + (f" {left_out:.0%} of it is shown nowhere (dark in materials.png)." if left_out >= 0.01 else "")
 
 
-def describe_photos(ground: Mapping[str, Any]) -> str:
+def describe_photos(ground: SceneFrame) -> str:
     """How many photos found their place, and the names of those that did not."""
-    left_out = [photo["name"] for photo in ground.get("left_out", [])]
-    if ground["kind"] != "photos" or not left_out:
+    left_out = [photo.name for photo in ground.left_out]
+    if ground.kind != "photos" or not left_out:
         return ""
     more = f" and {len(left_out) - 3} more" if len(left_out) > 3 else ""
-    return f"{ground['registered']} of {ground['images']} photos are used; not {', '.join(left_out[:3])}{more}."
+    return f"{ground.registered} of {ground.images} photos are used; not {', '.join(left_out[:3])}{more}."
 
 
 def describe_sharpness(metrics: Path | None) -> str:
@@ -58,11 +59,9 @@ def describe_sharpness(metrics: Path | None) -> str:
     return f"Beside {len(values.get('test_views', []))} photos that it never saw, it {word} ({psnr:.1f} dB)."
 
 
-def list_reasons(ground: Mapping[str, Any], found: Mapping[str, Any] | None) -> list[str]:
+def list_reasons(ground: SceneFrame, found: Mapping[str, Any] | None) -> list[str]:
     """What is doubtful, the worst first, and what would help."""
-    signs = (ground.get("verdict") or {}).get("signs", [])
-    reasons = [sign["reason"] for grade in ("refused", "doubtful") for sign in signs if sign["grade"] == grade]
-    for material in found["materials"] if found else []:
-        if material["verdict"]["grade"] != "good":
-            reasons.append(material["verdict"]["reason"])
+    reasons = [sign.reason for sign in ground.verdict.objections] if ground.verdict else []
+    verdicts = [material["verdict"] for material in found["materials"]] if found else []
+    reasons += [verdict["reason"] for verdict in verdicts if verdict["grade"] != "good"]
     return [f"{reason[:1].upper()}{reason[1:]}." for reason in reasons[:MOST_REASONS]]

@@ -180,23 +180,18 @@ def write_scene(path: Path, settings: Mapping[str, Any], head: str) -> None:
 
 def load_scene(out: Path) -> dict[str, Any]:
     """The config of a terrain's folder, with all defaults. Raises: InputError."""
-    files = [REPOSITORY / run.CONFIG, *list_overlays(quietly=True), out / SCENE_FILE]
+    files = [REPOSITORY / run.CONFIG, *run.select_overlays(REPOSITORY), out / SCENE_FILE]
     return check_config(add_scene_files(read_config(files), REPOSITORY / run.SCENES))
 
 
 def run_scene(out: Path, settings: dict[str, Any], cores: int) -> int:
     """Run the workflow in the folder, and put its results where they are found. Returns the exit status."""
-    overlays = [*list_overlays(quietly=False), (out / SCENE_FILE).resolve()]
+    overlays = [*run.select_overlays(REPOSITORY), (out / SCENE_FILE).resolve()]
     status, done = run.run_workflow(settings["scene"], cores, overlays, REPOSITORY, out.resolve())
     if status == 0:
         print(f"\n{done}.")
         report_made(collect_results(out, settings))
     return status
-
-
-def list_overlays(quietly: bool) -> list[Path]:
-    """The config files to read before scene.yaml."""
-    return [REPOSITORY / path for path in run.select_overlays(quietly)]
 
 
 def collect_results(out: Path, settings: dict[str, Any]) -> Made:

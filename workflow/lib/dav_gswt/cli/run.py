@@ -46,8 +46,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    overlays = select_overlays(quietly=options.view) + options.configfile
-    given = load_config(overlays, {"scene": options.scene} if options.scene else {})
+    overlays = select_overlays() + options.configfile
+    changes = {"scene": options.scene} if options.scene else {}
+    given = check_config(add_scene_files(read_config([CONFIG, *overlays], changes), SCENES))
     if not options.view:
         return run(given, options.cores, overlays)
     if not (pages := list_pages(given)):
@@ -57,19 +58,9 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def load_config(overlays: list[Path], changes: dict | None = None) -> dict:
-    """The config of this folder with all defaults, as the workflow reads it."""
-    return check_config(add_scene_files(read_config([CONFIG, *overlays], changes), SCENES))
-
-
-def select_overlays(quietly: bool) -> list[Path]:
-    """The config files to read before the user's: a smaller size where PyTorch renders. Printed unless `quietly`."""
-    if backends.select_backend() != "torch":
-        return []
-    if not quietly:
-        why = backends.explain_unavailable("cpu") or f"{backends.VARIABLE} asks for it"
-        print(f"PyTorch renders, many times slower, so at a smaller size ({SMALLER}): {why}", flush=True)
-    return [SMALLER]
+def select_overlays(root: Path = Path()) -> list[Path]:
+    """The config files of a workflow to read before the user's: a smaller size where PyTorch renders."""
+    return [root / SMALLER] if backends.select_backend() == "torch" else []
 
 
 def run(given: dict, cores: int, overlays: list[Path]) -> int:
@@ -96,6 +87,9 @@ def run_workflow(
             "program into a folder without them"
         )
     os.environ.update(replace_missing_user(folder))
+    if backends.select_backend() == "torch":
+        why = backends.explain_unavailable("cpu") or f"{backends.VARIABLE} asks for it"
+        print(f"PyTorch renders, many times slower, so at a smaller size ({SMALLER}): {why}", flush=True)
     snakemake = [sys.executable, "-m", "snakemake", "--config", f"scene={scene}"]
     if root != Path():
         profile = root / "workflow/profiles/default"  # Snakemake finds it in a clone, beside the Snakefile
@@ -261,21 +255,14 @@ def list_pages(given: dict) -> list[Path]:
     return sorted((path.parent for path in found), key=lambda path: path.stat().st_mtime, reverse=True)
 
 
-def link_latest(scene: str, folder: Path) -> Path:
-    """Let results/latest/SCENE lead to the folder of a round."""
-    link = Path(RESULTS, "latest", scene)
-    link.parent.mkdir(parents=True, exist_ok=True)
-    with suppress(FileNotFoundError):
-        link.unlink()
-    link.symlink_to(os.path.relpath(folder, link.parent), target_is_directory=True)
-    return link
-
-
 def report_result(given: dict, done: str, overlays: list[Path]) -> None:
-    """Print what was made, where it is, and what to type next."""
+    """Print what was made, where it is, and what to type next; results/latest/SCENE leads there."""
     page = list_pages(given)[0]
-    latest = link_latest(given["scene"], page.parents[3])
-    terrain, bundle, tiles = (latest / path.relative_to(page.parents[3]) for path in list(page.parents)[:3])
+    latest, folder = Path(RESULTS, "latest", given["scene"]), page.parents[3]  # the folder of a round
+    latest.parent.mkdir(parents=True, exist_ok=True)
+    latest.unlink(missing_ok=True)
+    latest.symlink_to(os.path.relpath(folder, latest.parent), target_is_directory=True)
+    terrain, bundle, tiles = (latest / path.relative_to(folder) for path in list(page.parents)[:3])
     page = terrain / page.name
     usual = given["scene"] == read_config([CONFIG])["scene"] and not set(overlays) - {SMALLER}
     size = sum(path.stat().st_size for path in page.rglob("*") if path.is_file())

@@ -36,13 +36,10 @@ Auto = Literal["auto"]
 LARGEST_SIDE = 16_384  # pixels of a photo
 
 
-def _replace_native(size: int | str) -> int:
-    return LARGEST_SIDE if isinstance(size, str) else size
-
-
 # the longer side of photos, which are never enlarged; `native`: as they are
 PhotoSize = Annotated[
-    Annotated[int, Field(ge=32, le=LARGEST_SIDE)] | Literal["native"], AfterValidator(_replace_native)
+    Annotated[int, Field(ge=32, le=LARGEST_SIDE)] | Literal["native"],
+    AfterValidator(lambda size: LARGEST_SIDE if size == "native" else size),
 ]
 
 

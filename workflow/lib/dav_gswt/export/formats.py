@@ -7,6 +7,7 @@ functions import what they need when they are called.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 
@@ -69,8 +70,6 @@ def export_glb(job: Any, path: str) -> None:
 @exporter("sog", axes="y-down", bytes=68)
 def export_sog(job: Any, path: str) -> None:
     """SOG in one file, made from a PLY."""
-    from pathlib import Path
-
     from dav_gswt.export.splat_files import write_sog
 
     write_sog(job.spool, Path(f"{path}.sog"))
@@ -79,8 +78,6 @@ def export_sog(job: Any, path: str) -> None:
 @exporter("3dtiles", axes="z-up", bytes=2 * 19, all_levels=True)
 def export_3dtiles(job: Any, path: str) -> int:
     """3D Tiles of all levels, compressed."""
-    from pathlib import Path
-
     from dav_gswt.export.tiles_3d import write_tileset
 
     return write_tileset(job, Path(f"{path}_3dtiles"))

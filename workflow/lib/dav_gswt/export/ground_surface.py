@@ -133,8 +133,9 @@ def collect_surface(terrain: EndlessTerrain, tiles: TileSurfaces, area: Area) ->
     n, pitch = tiles.steps, terrain.side / tiles.steps
     total = np.zeros((area.rows * n + 1, area.columns * n + 1), np.float32)
     shared = np.zeros(total.shape, np.float32)
-    cells = zip(*(v.tolist() for v in list_cells(terrain, area)), strict=True)
-    for i, j, tile, materials in cells:
+    cells = list_cells(terrain, area)
+    columns = (v.tolist() for v in (cells.i, cells.j, cells.tile, cells.materials))
+    for i, j, tile, materials in zip(*columns, strict=True):
         part = np.s_[
             (j - area.south) * n : (j - area.south + 1) * n + 1, (i - area.west) * n : (i - area.west + 1) * n + 1
         ]
@@ -171,8 +172,8 @@ def collect_hulls(terrain: EndlessTerrain, area: Area, origin: Float[Array, "3"]
     """
     if terrain.scatter is None:
         return
-    i, j, _, _ = list_cells(terrain, area)
-    found = terrain.scatter.instances_in(i, j)
+    cells = list_cells(terrain, area)
+    found = terrain.scatter.instances_in(cells.i, cells.j)
     feet = place_feet(terrain, found)
     shapes = [find_outermost(levels[0]) for levels in terrain.objects]
     thick = [np.linalg.matrix_rank(each - each.mean(0), FLAT * np.ptp(each)) == 3 for each in shapes]

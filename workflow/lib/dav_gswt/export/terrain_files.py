@@ -23,7 +23,7 @@ from dav_gswt.files import atomic_folder, write_json
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.logs import progress
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.finite import Area, count_cells, list_blocks, place_block
+from dav_gswt.terrain.finite import Area, count_cells, list_blocks, list_cells, place_block
 from dav_gswt.threads import map_ahead
 
 NAME = "terrain"
@@ -46,7 +46,8 @@ def find_origin(terrain: EndlessTerrain, area: Area) -> Float[Array, "3"]:
 def check_size(terrain: EndlessTerrain, area: Area, level: int, formats: Mapping[str, Format]) -> None:
     """Raises: InputError: a format's files would have more Gaussians than they may have."""
     wanted = {name: 0 if each.all_levels else level for name, each in formats.items()}
-    counts = {each: int(count_cells(terrain, area, each).sum()) for each in set(wanted.values())}
+    cells = list_cells(terrain, area)
+    counts = {each: int(count_cells(terrain, cells, each).sum()) for each in set(wanted.values())}
     for name, each in formats.items():
         count, most = counts[wanted[name]], MAX_BYTES // each.bytes
         bound = min(most, each.gaussians or most)

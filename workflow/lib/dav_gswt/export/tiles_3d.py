@@ -65,7 +65,7 @@ class _TreeWriter:
         """The root of the tree. Its error exceeds that of the coarsest level: without it there is nothing at all."""
         top = len(self.errors) - 1
         blocks = progress(split_area(self.job.area, 2**top), "write tiles")
-        found = [tile for tile in (self._write_tile(block, top) for block in blocks) if tile is not None]
+        found = [self._write_tile(block, top) for block in blocks]
         box = unite_boxes([box for _, box in found])
         return {
             "boundingVolume": {"box": to_volume(box)},
@@ -74,24 +74,19 @@ class _TreeWriter:
             "children": [tile for tile, _ in found],
         }
 
-    def _write_tile(self, area: Area, level: int) -> tuple[dict[str, Any], Box] | None:
-        """The tile of an area and the finer ones below it, and their box; None: there is no Gaussian."""
-        finer = [self._write_tile(part, level - 1) for part in split_area(area, 2 ** (level - 1))] if level else []
-        below = [tile for tile in finer if tile is not None]
-        boxes, content = [box for _, box in below], {}
+    def _write_tile(self, area: Area, level: int) -> tuple[dict[str, Any], Box]:
+        """The tile of an area and the finer ones below it, and their box."""
+        below = [self._write_tile(part, level - 1) for part in split_area(area, 2 ** (level - 1))] if level else []
+        uri = f"{level}/{area.west}_{area.south}.glb"
         with self.job.place(area, level) as placed:
-            if len(placed):
-                self.count += len(placed)
-                boxes.append(placed.find_box())
-                uri = f"{level}/{area.west}_{area.south}.glb"
-                extras = {"unit": self.job.facts["unit"], "level": level}
-                write_splats(placed, self.folder / uri, extras, compressed=True)
-                content = {"content": {"uri": uri, "boundingVolume": {"box": to_volume(boxes[-1])}}}
-        if not boxes:
-            return None
-        box = unite_boxes(boxes)
+            self.count += len(placed)
+            own = placed.find_box()
+            extras = {"unit": self.job.facts["unit"], "level": level}
+            write_splats(placed, self.folder / uri, extras, compressed=True)
+        box = unite_boxes([*(box for _, box in below), own])
         tile: dict[str, Any] = {"boundingVolume": {"box": to_volume(box)}, "geometricError": self.errors[level]}
-        return tile | content | ({"children": [child for child, _ in below]} if below else {}), box
+        tile["content"] = {"uri": uri, "boundingVolume": {"box": to_volume(own)}}
+        return tile | ({"children": [child for child, _ in below]} if below else {}), box
 
 
 def measure_errors(terrain: EndlessTerrain) -> list[float]:

@@ -67,7 +67,9 @@ def read_heif_exif(path: Path) -> bytes:
         return image.info.get("exif", b"").removeprefix(b"Exif\0\0")
 
 
+@contextmanager
 def _open_raw(path: Path):
+    """An open raw photo. Raises: InputError: as `_open_heif`."""
     try:
         import rawpy  # pyright: ignore[reportMissingImports]  an extra
     except ImportError as error:
@@ -76,8 +78,9 @@ def _open_raw(path: Path):
             "install -e '.[raw]'), or convert them to JPEG"
         ) from error
     try:
-        return rawpy.imread(str(path))
-    except (rawpy.LibRawError, *UNREADABLE) as error:
+        with rawpy.imread(str(path)) as raw:
+            yield raw
+    except Exception as error:  # LibRaw's errors have no common class but this
         raise _refuse(path, error) from error
 
 
@@ -90,10 +93,7 @@ def _read_raw_size(path: Path) -> tuple[int, int]:
 def _read_raw(path: Path) -> Float32[Array, "h w c"]:
     """Developed alike, so that photos of a set agree: the camera's white balance, no brightening by the picture."""
     with _open_raw(path) as raw:
-        try:
-            pixels = raw.postprocess(use_camera_wb=True, no_auto_bright=True, output_bps=16, gamma=SRGB)
-        except Exception as error:  # LibRaw's errors have no common class but this
-            raise _refuse(path, error) from error
+        pixels = raw.postprocess(use_camera_wb=True, no_auto_bright=True, output_bps=16, gamma=SRGB)
     return pixels.astype(np.float32) / 65535
 
 

@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import UNREADABLE, atomic_file
-from dav_gswt.images.camera_formats import DECODERS, Decoder
+from dav_gswt.images.camera_formats import DECODERS
 from dav_gswt.images.file_kinds import detect_kind
 
 AT_ONCE = 2_000_000  # values that are averaged at a time
@@ -41,7 +41,7 @@ def read_size(path: Path | str) -> tuple[int, int]:
 
 def read_stored_size(path: Path | str) -> tuple[int, int, int]:
     """Width and height as stored, and EXIF's orientation, from the header alone; HEIC and raw count as upright."""
-    if decoder := _find_decoder(path):
+    if decoder := DECODERS.get(detect_kind(Path(path))):  # OpenImageIO does not read it
         return *_check_size(path, *decoder.read_size(Path(path))), 1
     file, spec = _open_image(path)
     file.close()
@@ -84,7 +84,7 @@ def read_photo_and_alpha(path: Path | str) -> tuple[Float32[Array, "h w 3"], Flo
 
 def _read_colours(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w"] | None]:
     """Colours, and alpha where the file has one. Photos may have 50 million pixels: what can be done in place is."""
-    if decoder := _find_decoder(path):
+    if decoder := DECODERS.get(detect_kind(Path(path))):  # OpenImageIO does not read it
         _check_size(path, *decoder.read_size(Path(path)))
         pixels = decoder.read_pixels(Path(path))
         return np.ascontiguousarray(pixels[..., :3]), pixels[..., 3].copy() if pixels.shape[2] == 4 else None
@@ -287,11 +287,6 @@ def _open_image(path: Path | str):
         raise InputError(f"{path}: holds no flat picture; remove or replace it")
     _check_size(path, spec.width, spec.height)
     return file, spec
-
-
-def _find_decoder(path: Path | str) -> Decoder | None:
-    """What reads the photo, where OpenImageIO does not."""
-    return DECODERS.get(detect_kind(Path(path)))
 
 
 def _check_size(path: Path | str, width: int, height: int) -> tuple[int, int]:

@@ -34,12 +34,14 @@ def add_command(commands) -> None:
 
 
 def run_inspect(options: argparse.Namespace) -> None:
-    """Show or save. Raises: InputError: there is no display, or see `read_scene`."""
+    """Show or save. Raises: InputError: the extra is not installed, there is no display, or see `read_scene`."""
     if options.save is not None and options.save.suffix not in FORMATS:
         raise InputError(f"--save {options.save}: pictures end in .png and pages in .html")
     if not (min(options.size) >= 16 and max(options.size) <= MAX_PIXELS and options.most > 0):
         raise InputError(f"--size goes from 16 to {MAX_PIXELS} pixels a side, and --most from 1")
-    require_extra()
+    if missing := [name for name in REQUIRED if importlib.util.find_spec(name) is None]:
+        how = '.venv/bin/pip install --no-build-isolation -e ".[inspect]"'
+        raise InputError(f"inspect: {', '.join(missing)} is not installed: {how}")
     display = sys.platform in ("darwin", "win32") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if options.save is None and not display:
         raise InputError("there is no display for a window here: add --save FILE.png or --save FILE.html")
@@ -52,10 +54,3 @@ def run_inspect(options: argparse.Namespace) -> None:
     plot.show(scene, (options.size[0], options.size[1]), options.save)
     if options.save is not None:
         print(options.save)
-
-
-def require_extra() -> None:
-    """Raises: InputError: the extra is not installed."""
-    if missing := [name for name in REQUIRED if importlib.util.find_spec(name) is None]:
-        how = '.venv/bin/pip install --no-build-isolation -e ".[inspect]"'
-        raise InputError(f"inspect: {', '.join(missing)} is not installed: {how}")

@@ -205,9 +205,6 @@ def read_tile_set(path: Path, *, most: int, colour: str | None = None, level: in
     """A set of tiles, with --colour patch in the colours of the patches that they are cut from."""
     seams = path.parents[1] / "seams.json" if path.name == "labels.npz" else path
     cut = tiles.read_tiles(seams.parent / "tiles", seams)
-    shape, wide = cut.labels.shape, cut.labels.shape[1] * cut.spacing
-    if shape[1] != shape[2] or cut.labels.max(initial=0) >= len(LABELS) or not abs(wide - cut.side) < 1e-6 * wide:
-        raise ValueError("labels.npz is not a map of each tile")
     by = choose("colour", colour, (*COLOURS, "patch"), path)
     scene = _show_tiles(seams, cut.fields, cut.side, by, level, most, cut if by == "patch" else None)
     scene.names = dict(zip(LABELS, PATCH_COLOURS, strict=True)) if by == "patch" else {}

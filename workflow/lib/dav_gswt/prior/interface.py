@@ -7,9 +7,11 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
+from dav_gswt.field import Rows
+
 
 @dataclass(frozen=True)
-class Condition:
+class Condition(Rows):
     """What is known of b views, of s x s pixels each; colours sRGB in [0, 1].
 
     colour, alpha: the field rendered at the pose, colour over black. inverse_depth: flying height over depth, 0 where
@@ -23,12 +25,6 @@ class Condition:
     inverse_depth: Float32[Array, "b s s"]
     photo: Float32[Array, "b s s 3"]
     relative: Float32[Array, "b 4"]
-
-    def __len__(self) -> int:
-        return len(self.relative)
-
-    def __getitem__(self, rows) -> "Condition":
-        return Condition(*(getattr(self, f.name)[rows] for f in fields(self)))
 
     def check(self) -> None:
         """Raises: ValueError: a value is not finite; the message names the array and the first such view."""

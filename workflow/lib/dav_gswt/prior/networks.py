@@ -49,12 +49,12 @@ class Network(nn.Module):
 
     def encode(self, planes: Float[Tensor, "n 5 s s"]) -> Float[Tensor, "n 8 h w"]:
         """Latents of pictures: the mode of the posterior, scaled."""
-        means, _ = self.autoencoder.encode(2 * planes - 1).chunk(2, 1)
+        means, _ = self.autoencoder.encoder(2 * planes - 1).chunk(2, 1)
         return means * self.scale
 
     def decode(self, latents: Float[Tensor, "n 8 h w"]) -> Float[Tensor, "n 5 s s"]:
         """Pictures of latents, in [0, 1]."""
-        return ((self.autoencoder.decode(latents / self.scale) + 1) / 2).clamp(0, 1)
+        return ((self.autoencoder.decoder(latents / self.scale) + 1) / 2).clamp(0, 1)
 
     def predict_velocity(
         self,
@@ -71,7 +71,8 @@ class Network(nn.Module):
 class Autoencoder(nn.Module):
     """A variational autoencoder that changes resolution once: cells of 4 x 4 pixels are folded into channels.
 
-    It has no normalisation, which would lose absolute colours.
+    encoder: means and log-variances of latents, of pictures in [-1, 1]; decoder: pictures, about in [-1, 1]. There is
+    no normalisation, which would lose absolute colours.
     """
 
     def __init__(self):
@@ -89,14 +90,6 @@ class Autoencoder(nn.Module):
             nn.Conv2d(HIDDEN, folded, 3, padding=1),
             nn.PixelShuffle(CELL),
         )
-
-    def encode(self, pictures: Float[Tensor, "n 5 s s"]) -> Float[Tensor, "n 16 h w"]:
-        """Means and log-variances of latents, of pictures in [-1, 1]."""
-        return self.encoder(pictures)
-
-    def decode(self, latents: Float[Tensor, "n 8 h w"]) -> Float[Tensor, "n 5 s s"]:
-        """Pictures, about in [-1, 1]."""
-        return self.decoder(latents)
 
 
 class Residual(nn.Module):

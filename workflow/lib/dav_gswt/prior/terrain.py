@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float32
 from numpy import ndarray as Array
 from torch import Tensor
 
-from dav_gswt.prior import dropout, sampler, weights
+from dav_gswt.prior import sampler, weights
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import CELL, LATENT, SIZE, Network, make_schedule
 from dav_gswt.prior.sampler import Sampling
@@ -26,7 +26,7 @@ class TerrainPrior:
         # a fifth faster on CPUs, equal but for rounding
         network.denoiser.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]: torch lacks it
         self.network = network.eval().requires_grad_(False)
-        self.layers, self.schedule = dropout.replace_dropout(network.denoiser), make_schedule()
+        self.layers, self.schedule = sampler.replace_dropout(network.denoiser), make_schedule()
 
     @classmethod
     def open(cls, path: Path | str) -> "TerrainPrior":

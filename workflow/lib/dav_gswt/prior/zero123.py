@@ -34,10 +34,9 @@ from torch.nn import functional
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
-from dav_gswt.prior import dropout, sampler, weights
-from dav_gswt.prior.dropout import HeldDropout
+from dav_gswt.prior import sampler, weights
 from dav_gswt.prior.interface import Condition
-from dav_gswt.prior.sampler import Sampling
+from dav_gswt.prior.sampler import HeldDropout, Sampling
 
 Network = Any  # of diffusers or transformers, whose annotations are wrong: a config is no dict, an output no tuple
 
@@ -194,7 +193,7 @@ def load_networks(folder: Path | str) -> Zero123Networks:
         network.eval().requires_grad_(False)
     embeddings = clip.vision_model.embeddings  # its one buffer is not among the weights
     embeddings.position_ids = torch.arange(embeddings.position_ids.shape[-1])[None]
-    return Zero123Networks(unet, vae, clip, projection, DDIMScheduler(**SCHEDULE), dropout.replace_dropout(unet))
+    return Zero123Networks(unet, vae, clip, projection, DDIMScheduler(**SCHEDULE), sampler.replace_dropout(unet))
 
 
 def _find_projection(folder: Path) -> str:

@@ -6,6 +6,7 @@ environment variables DAV_GSWT_ISA and DAV_GSWT_THREADS set the instruction set 
 
 import os
 import weakref
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float32
@@ -46,16 +47,9 @@ class Rasterizer(interface.Rasterizer):
     threads, instruction_set: see `default_threads`, `default_instruction_set`.
     """
 
-    def __init__(
-        self,
-        near: float = 0.01,
-        dilation: float = 0.3,
-        antialiased: bool = False,
-        threads: int | None = None,
-        instruction_set: str | None = None,
-    ):
-        super().__init__(near, dilation, antialiased, threads)
-        self.threads = threads or default_threads()
+    def __init__(self, instruction_set: str | None = None, **options: Any):
+        super().__init__(**options)
+        self.threads = self.threads or default_threads()
         self._core = _core.Context(instruction_set or default_instruction_set())
         self._memory = _MemoryPool()
 

@@ -11,7 +11,6 @@ Each call of the interface copies arrays to the GPU and back, and `adam` runs on
 GPU (`reconstruction.fitting.device_descent`): it calls `draw`, `differentiate` and `contribute`.
 """
 
-import warnings
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -48,15 +47,8 @@ class GsplatForward:
 class Rasterizer(interface.Rasterizer):
     """See `interface.Rasterizer`. device: where gsplat runs. threads: not used."""
 
-    def __init__(
-        self,
-        near: float = 0.01,
-        dilation: float = 0.3,
-        antialiased: bool = False,
-        threads: int | None = None,
-        device: str = "cuda",
-    ):
-        super().__init__(near, dilation, antialiased, threads)
+    def __init__(self, device: str = "cuda", **options: Any):
+        super().__init__(**options)
         self.device = torch.device(device)
 
     def draw(self, given: dict[str, Tensor], camera: Camera) -> GsplatForward:
@@ -103,7 +95,9 @@ class Rasterizer(interface.Rasterizer):
 
     def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Any]:
         given = {name: upload(array, self.device) for name, array in vars(gaussians).items()}
-        if not all(bool(tensor.isfinite().all()) for tensor in given.values()) or _has_zero(given["quats"]):
+        if not all(bool(tensor.isfinite().all()) for tensor in given.values()) or (
+            len(gaussians.means) and bool((given["quats"].abs().amax(1) < interface.TINY).any())
+        ):
             gaussians.check_values()
         last = self.draw(given, camera)
         picture = last.picture.detach()[0]
@@ -161,19 +155,13 @@ def find_visible(last: GsplatForward) -> Bool[Tensor, "n"]:
 
 def upload(array: Array, device: torch.device) -> Tensor:
     """An array on the device."""
-    with warnings.catch_warnings():  # of arrays that cannot be written to: nobody does
-        warnings.simplefilter("ignore")
-        return torch.as_tensor(array).to(device)
+    return torch.tensor(array).to(device)
 
 
 def download(tensor: Tensor) -> Array:
     """A tensor as an array, through memory that the device writes to by itself."""
     on_host = torch.empty(tensor.shape, dtype=tensor.dtype, pin_memory=tensor.is_cuda)
     return on_host.copy_(tensor.detach()).numpy()
-
-
-def _has_zero(quats: Float32[Tensor, "n 4"]) -> bool:
-    return len(quats) > 0 and bool((quats.abs().amax(1) < interface.TINY).any())
 
 
 def list_pairs(

@@ -1,7 +1,7 @@
 """The oracle: the same pictures in plain PyTorch, every Gaussian against every pixel. For small scenes, in float64.
 
-It shares no code with the core and none of its shortcuts; gradients come from autograd. `project` brings Gaussians onto
-the screen and `weights` blends them there; both have the type and the device of the tensors they are given.
+`project` brings Gaussians onto the screen and `weights` blends them there; both have the type and the device of the
+tensors they are given. It shares no code with the core and none of its shortcuts; gradients come from autograd.
 """
 
 from dataclasses import dataclass
@@ -33,26 +33,6 @@ class Splats:
     def shapes(self) -> Float[Tensor, "m 6"]:
         """What `weights` needs of them: centre, the three entries of the root, opacity."""
         return torch.cat([self.centres, self.roots.flatten(1)[:, [0, 1, 3]], self.opacity[:, None]], 1)
-
-
-def forward(
-    means: Float[Tensor, "n 3"],
-    log_scales: Float[Tensor, "n 3"],
-    quats: Float[Tensor, "n 4"],
-    opacity_logits: Float[Tensor, "n"],
-    colours: Float[Tensor, "n c"] | Float[Tensor, "n k 3"],
-    camera: Camera,
-    near: float = 0.01,
-    dilation: float = 0.3,
-    antialiased: bool = False,
-) -> tuple[Tensor, ...]:
-    """Colour, alpha and depth, differentiable; see `interface.Rasterizer`."""
-    splats = project(means, log_scales, quats, opacity_logits, colours, camera, near, dilation, antialiased)
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    weight = weights(splats.shapes, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1)).to(means))
-    size = camera.height, camera.width
-    colour = (weight @ splats.colours).reshape(*size, -1)
-    return colour, weight.sum(1).reshape(size), (weight @ splats.depth).reshape(size)
 
 
 def project(

@@ -15,7 +15,7 @@ from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import Sphere, displace_field
 from dav_gswt.terrain.placement import collect_tiles
 from dav_gswt.terrain.scatter import Instances
-from dav_gswt.terrain.visibility import GridCells, choose_tiles, count_gaussians
+from dav_gswt.terrain.visibility import GridCells, choose_tiles, count_levels
 
 BLOCK = 65_536  # Gaussians that are placed at once, about
 SLICE = 4096  # cells that are counted at once
@@ -31,15 +31,15 @@ class Area:
     rows: int
 
 
-def list_cells(terrain: EndlessTerrain, area: Area) -> tuple[Ints, Ints, Ints, Ints]:
-    """Column, row, tile number and materials (bit m for material m) of an area's cells, row by row from the south.
+def list_cells(terrain: EndlessTerrain, area: Area) -> GridCells:
+    """The cells of an area, row by row from the south. Of one level alone, their distances from an eye do not matter.
 
     Raises: InputError: the terrain is a sphere.
     """
     require_plane(terrain)
     columns, rows = area.west + np.arange(area.columns), area.south + np.arange(area.rows)
     i, j = (v.ravel() for v in np.meshgrid(columns, rows))
-    return i, j, *choose_tiles(terrain, i, j)
+    return GridCells(i, j, *choose_tiles(terrain, i, j), np.zeros(len(i), bool), np.zeros(len(i)), np.zeros(len(i)))
 
 
 def require_plane(terrain: EndlessTerrain) -> None:
@@ -48,34 +48,19 @@ def require_plane(terrain: EndlessTerrain) -> None:
         raise InputError("heights: a rectangle of cells is cut from a plane: choose another surface than `sphere`")
 
 
-def keep_level(terrain: EndlessTerrain, level: int) -> EndlessTerrain:
-    """The terrain that shows one level at any distance."""
-    count = len(terrain.switches)
-    return replace(terrain, switches=[-np.inf] * level + [np.inf] * (count - level), bands=[0.0] * count)
-
-
-def list_grid(terrain: EndlessTerrain, area: Area) -> GridCells:
-    """The cells of an area, row by row. Of one level alone, their distances from an eye do not matter."""
-    i, j, tile, materials = list_cells(terrain, area)
-    return GridCells(i, j, tile, materials, np.zeros(len(i), bool), np.zeros(len(i)), np.zeros(len(i)))
-
-
-def count_cells(terrain: EndlessTerrain, area: Area, level: int) -> Ints:
-    """Most Gaussians of each cell of an area at a level, objects included. Where materials meet there are fewer.
+def count_cells(terrain: EndlessTerrain, cells: GridCells, level: int) -> Ints:
+    """Most Gaussians of each cell at a level, objects included. Where materials meet there are fewer.
 
     SLICE cells are counted at a time: so memory does not grow with what is known of each of them.
     """
-    kept, cells = keep_level(terrain, level), list_grid(terrain, area)
     slices = [cells[first : first + SLICE] for first in range(0, len(cells), SLICE)]
-    return np.concatenate([np.zeros(0, np.int64), *(count_gaussians(kept, some) for some in slices)])
+    return np.concatenate([count_levels(terrain, some)[level] for some in slices])
 
 
 def list_blocks(terrain: EndlessTerrain, area: Area, level: int) -> list[GridCells]:
     """The cells of an area in blocks of about BLOCK Gaussians of a level, row by row."""
-    cells = list_grid(terrain, area)
-    if not len(cells):
-        return []
-    block = np.cumsum(count_cells(terrain, area, level)) // BLOCK
+    cells = list_cells(terrain, area)
+    block = np.cumsum(count_cells(terrain, cells, level)) // BLOCK
     return [cells[rows] for rows in np.split(np.arange(len(cells)), np.flatnonzero(np.diff(block)) + 1)]
 
 

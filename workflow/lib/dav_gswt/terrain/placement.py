@@ -139,7 +139,8 @@ def place_objects(terrain: EndlessTerrain, found: Instances, cell: tuple[int, in
     to = feet + [cell[0] * side, cell[1] * side, 0.0] - eye
     to[:, 2] += height
     distance = np.linalg.norm(to, axis=1)
-    active = active_objects(terrain, found, distance)
+    reach = np.array(terrain.extents)[found.number] * found.size * (1 + terrain.heights.bounds[2])
+    active = active_range(terrain, distance - reach, distance + reach)
     angle = np.radians(found.turn)
     cos, sin = np.cos(angle), np.sin(angle)
     back = np.stack([cos * to[:, 0] + sin * to[:, 1], cos * to[:, 1] - sin * to[:, 0], to[:, 2]], 1)
@@ -155,11 +156,3 @@ def place_objects(terrain: EndlessTerrain, found: Instances, cell: tuple[int, in
     field, level = concatenate_parts(parts)
     row = np.repeat(sequence, [len(levels) for _, levels in parts])
     return turn_and_scale(field, turn_rows(angle)[row], found.size[row], feet[row]), level
-
-
-def active_objects(terrain: EndlessTerrain, found: Instances, distance: Floats) -> Bool[Array, "levels n"]:
-    """Which levels have a weight somewhere on objects whose feet are at distances from the eye."""
-    extent = np.array(terrain.extents)[found.number] * found.size
-    _, _, steepest = terrain.heights.bounds
-    reach = extent * (1 + steepest)
-    return active_range(terrain, distance - reach, distance + reach)

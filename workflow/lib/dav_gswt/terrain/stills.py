@@ -106,9 +106,7 @@ def render_view(
     eye, here, surface = camera.centre, replace(camera, translation=np.zeros(3)), terrain.heights
     sphere = surface if isinstance(surface, Sphere) else None
     cells = visible_on_sphere(terrain, sphere, camera) if sphere else visibility.visible_cells(terrain, camera)
-    if visibility.count_gaussians(terrain, cells).sum() > MAX_GAUSSIANS:  # coarser levels first, then fewer cells
-        terrain = visibility.coarsen_to_budget(terrain, camera, MAX_GAUSSIANS, cells)
-        cells = visibility.drop_far_cells(terrain, cells, MAX_GAUSSIANS)
+    terrain = visibility.coarsen_to_budget(terrain, camera, MAX_GAUSSIANS, cells)
     things = group_by_cell(terrain, cells, eye)
     backdrop = Backdrop.for_eye(terrain, eye, sky, ground_colour)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
 from dav_gswt.field import Rows
@@ -44,11 +44,10 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     at = (int(np.floor(eye[0] / side)), int(np.floor(eye[1] / side)))
     steps = np.arange(-terrain.reach, terrain.reach + 1, dtype=np.int64)
     i, j = (v.ravel() for v in np.meshgrid(at[0] + steps, at[1] + steps))
-    nearest, farthest = measure_distances(terrain, i, j, eye)
-    middle, half = _bound_cells(terrain, i, j, eye)
+    middle, half, nearest, farthest = bound_cells(terrain, i, j, eye)
     planes = frustum_planes(camera, terrain.near)
-    half += np.array([terrain.overhang, terrain.overhang, 0])
-    most = middle @ planes[:, :3].T + half @ np.abs(planes[:, :3]).T + planes[:, 3]
+    wide = half + [terrain.overhang, terrain.overhang, 0]
+    most = middle @ planes[:, :3].T + wide @ np.abs(planes[:, :3]).T + planes[:, 3]
     seen = (nearest < terrain.reach * side) & (most >= 0).all(1)
     sequence = draw_order.sort_cells(i, j, at)
     sequence = sequence[seen[sequence]]
@@ -58,15 +57,8 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     return GridCells(i, j, tile, materials, close, nearest[sequence], farthest[sequence])
 
 
-def measure_distances(terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector) -> tuple[Floats, Floats]:
-    """Bounds of the distances from an eye to the centres of cells' Gaussians."""
-    middle, half = _bound_cells(terrain, i, j, eye)
-    nearest = np.linalg.norm(np.maximum(np.abs(middle) - half, 0), axis=1)
-    return nearest, np.linalg.norm(np.abs(middle) + half, axis=1)
-
-
-def _bound_cells(terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector) -> tuple[Points, Points]:
-    """Boxes of the centres of cells' Gaussians: their middles from an eye, and their half extents."""
+def bound_cells(terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector) -> tuple[Points, Points, Floats, Floats]:
+    """Boxes of the centres of cells' Gaussians: middles from an eye, half extents, least and greatest distances."""
     side, surface = terrain.side, terrain.heights
     x, y = (i + 0.5) * side, (j + 0.5) * side
     middle, _ = surface.at(x, y)
@@ -74,8 +66,10 @@ def _bound_cells(terrain: EndlessTerrain, i: Ints, j: Ints, eye: Vector) -> tupl
     most = steepest * (0.5 * side + terrain.overhang) * 2**0.5
     low = np.maximum(middle - most, lowest) + terrain.z[0]
     high = np.minimum(middle + most, highest) + terrain.z[1]
-    half = np.full(len(x), 0.5 * side)
-    return np.stack([x, y, 0.5 * (low + high)], 1) - eye, np.stack([half, half, 0.5 * (high - low)], 1)
+    middle = np.stack([x, y, 0.5 * (low + high)], 1) - eye
+    half = np.stack([np.full(len(x), 0.5 * side), np.full(len(x), 0.5 * side), 0.5 * (high - low)], 1)
+    nearest = np.linalg.norm(np.maximum(np.abs(middle) - half, 0), axis=1)
+    return middle, half, nearest, np.linalg.norm(np.abs(middle) + half, axis=1)
 
 
 def choose_tiles(terrain: EndlessTerrain, i: Ints, j: Ints) -> tuple[Ints, Ints]:
@@ -116,6 +110,11 @@ def active_range(terrain: EndlessTerrain, nearest: Floats, farthest: Floats) -> 
 
 def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Ints:
     """Number of Gaussians in each cell, and of the objects whose feet lie in it, over its active levels."""
+    return (count_levels(terrain, cells) * active_levels(terrain, cells)).sum(0)
+
+
+def count_levels(terrain: EndlessTerrain, cells: GridCells) -> Int[Array, "levels n"]:
+    """Number of Gaussians in each cell, and of the objects whose feet lie in it, at each level."""
     levels, each = range(len(terrain.switches)), terrain.tiles_each
     kinds = 1 if terrain.classes is None else terrain.classes.materials
     sizes = np.array([[len(terrain.tiles[level, t]) for t in range(kinds * each)] for level in levels], np.int64)
@@ -128,14 +127,7 @@ def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Ints:
         owner = np.array([index[cell] for cell in zip(found.i.tolist(), found.j.tolist(), strict=True)], int)
         sizes = np.array([[len(fields[level]) for fields in terrain.objects] for level in levels])
         counts += np.array([np.bincount(owner, size[found.number], len(cells)) for size in sizes]).astype(np.int64)
-    return (counts * active_levels(terrain, cells)).sum(0)
-
-
-def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int) -> GridCells:
-    """The nearest cells whose Gaussians stay within a budget."""
-    nearest_first = np.argsort(cells.nearest, kind="stable")
-    count = np.cumsum(count_gaussians(terrain, cells)[nearest_first])
-    return cells[np.sort(nearest_first[count <= budget])]
+    return counts
 
 
 def coarsen_to_budget(

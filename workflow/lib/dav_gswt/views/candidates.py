@@ -41,12 +41,14 @@ def list_remaining(
         listed = list_poses(scene, frame, synthetic.lens(scene["size"]))
     else:
         known = read_colmap_model(model_folder)
-        at = dict(zip(known.names, known.cameras, strict=True))
         if scene["agent"] == "replay":
-            listed = [(pose_of_camera(name, at[name], frame), at[name]) for name in split.pool]
+            shown = [(name, known.camera(name)) for name in split.pool]
+            listed = [(pose_of_camera(name, camera, frame), camera) for name, camera in shown]
         else:
             listed = list_poses(scene, frame, find_main_camera(known.cameras))
-    used = {name for folder in captures for name in _used_names(folder)}
+    # a photo taken in place of another is used too
+    taken = [photo for folder in captures for photo in read_capture_record(folder)]
+    used = {name for photo in taken for name in (photo.pose.name, photo.name)}
     return [(pose, camera) for pose, camera in listed if pose.name not in used]
 
 
@@ -109,11 +111,5 @@ def _with_lens(camera: Camera, lens: Camera) -> Camera:
 def read_captured_cameras(model_folder: Path | str, split: ViewSplit, captures: list) -> list[Camera]:
     """Read the cameras of all photos so far."""
     known = read_colmap_model(model_folder)
-    at = dict(zip(known.names, known.cameras, strict=True))
-    start = [at[name] for name in split.start]
+    start = [known.camera(name) for name in split.start]
     return start + [photo.camera for folder in captures for photo in read_capture_record(folder)]
-
-
-def _used_names(folder: Path | str) -> list[str]:
-    """Names of requested poses and of captured photos: a photo taken in place of another is used too."""
-    return [name for photo in read_capture_record(folder) for name in (photo.pose.name, photo.name)]
