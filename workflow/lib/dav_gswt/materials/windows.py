@@ -102,7 +102,7 @@ def _to_square(plan: GroundPlan, box: _Box) -> Square:
 
 def _measure_quality(plan: GroundPlan, views: Sequence[TrainingView]) -> tuple[Float[Array, "n"], Float[Array, "m m"]]:
     """Widths of pixels at knots of the exemplar where photos look; and how well each cell is seen, about 1 at best."""
-    place = plan.maps.exemplar
+    place, m = plan.maps.exemplar, plan.maps.cells
     step = m / KNOTS
     at = np.minimum(((np.arange(KNOTS) + 0.5) * step).astype(int), m - 1)
     x, y = np.meshgrid(place.west + (at + 0.5) * place.spacing, place.south + (at + 0.5) * place.spacing)

@@ -23,13 +23,15 @@ from dav_gswt.reconstruction.coarse import BLOCK, Reconstruction, finish_field
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import FitPlan, FitReport, FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions
-from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.reconstruction.ground import Ground, smooth
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 from dav_gswt.reconstruction.plane_sweep import sweep_heights
 
 _log = logging.getLogger(__name__)
 
 MARGIN = 2.0  # cells of the draft, fitted around a window: its discs reach so far into the window
+DRAFT_RELIEF = 3.0  # cells of the draft: its finer relief is noise of its small photos, and heights start without it
+SMOOTHING = 1.0  # cells: blur of the gradients of heights, as cells are nearly as narrow as pixels
 FINEST = 2.5  # pixels of a photo across a cell at most: finer photos are shrunk, as no cell could show their detail
 LEAST_PIXELS = 400  # of a photo over a window, to count as one that shows it
 
@@ -113,7 +115,8 @@ def make_grid(ground: Ground, window: FitWindow, spacing: float) -> Ground:
     shape = below + cells + above, left + cells + right
     corner = west - left * spacing, south - below * spacing
     grid = Ground(*corner, spacing, below, left, cells, np.zeros(shape), np.zeros(shape, bool))
-    return replace(grid, heights=ground.height_at(grid.centres).reshape(shape))
+    rough = replace(ground, heights=smooth(ground.heights, DRAFT_RELIEF))
+    return replace(grid, heights=rough.height_at(grid.centres).reshape(shape))
 
 
 def _fit_window(
@@ -144,7 +147,7 @@ def _fit_window(
     width = measure_pixel_widths(grid.centres[:: max(1, grid.heights.size // 100)], views)[0]
     _log.info(said, name, *grid.shape, grid.spacing, draft.frame.unit, grid.spacing / np.nanmedian(width), len(seen))
     held = observation.make_constraints(grid, relief, occluders, draft.frame)
-    constraints = GroundConstraints(grid, held.ceiling.heights, frozen=len(around))
+    constraints = GroundConstraints(grid, held.ceiling.heights, SMOOTHING, len(around))
     steps = max(1, round(plan.steps * len(seen) / max(1, len(views))))
     plan = FitPlan(steps, settings.max_gaussians + len(around), settings.sh_degree)
     fit = trainer.fit_field(start, seen, plan, constraints, rng, FitOptions(name))
