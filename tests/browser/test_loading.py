@@ -89,7 +89,7 @@ def assert_said(seen, address, message):
 
 
 PHOTOS = [{"round": int(k > 2), "at": [k - 2.0, 1.0, 3.0], "look": [0.5, -0.5], "picture": k} for k in range(5)]
-ROUNDS = [{"photos": 3, "psnr": 27.1, "preset": "draft"}, {"photos": 2, "psnr": None}]
+ROUNDS = [{"photos": 3, "psnr": 27.1}, {"photos": 2, "psnr": None}]
 VALUE = dict(unit="metre", half=2.0, photos=PHOTOS, rounds=ROUNDS, thumb=120, columns=8, pictures=5)
 
 
@@ -107,7 +107,6 @@ VALUE = dict(unit="metre", half=2.0, photos=PHOTOS, rounds=ROUNDS, thumb=120, co
         ({"photos": [PHOTOS[0] | {"picture": 5}]}, False),
         ({"rounds": [{"photos": -1, "psnr": 1}]}, False),
         ({"rounds": [{"photos": 1, "psnr": "1"}]}, False),
-        ({"rounds": [{"photos": 1, "psnr": 1, "preset": 3}]}, False),
     ],
 )
 def test_a_story_is_read_or_refused(call, change, sound):

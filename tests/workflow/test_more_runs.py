@@ -11,6 +11,7 @@ from fixtures.runs import TINY, USUAL
 from dav_gswt.field import read_field
 from dav_gswt.files import digest_files, read_json
 from dav_gswt.photos.colmap_model import read_colmap_model
+from dav_gswt.reconstruction import ground
 from dav_gswt.views import pose_maps, scores
 
 pytestmark = pytest.mark.slow
@@ -113,7 +114,10 @@ def test_a_run_leaves_for_other_programs(tiny, snakemake, tmp_path):
 
 
 def test_another_preset_fits_the_photos_that_the_first_one_chose(tiny, snakemake, tmp_path):
-    """The rounds of the tiny run stay: one fit to their photos, of another size, and what follows from it."""
+    """The rounds of the tiny run stay: one fit to their photos, of another size, and what follows from it.
+
+    Of windows, since materials are told apart: tiles are cut from them, and tests are measured in them, too.
+    """
     folder, config = shutil.copytree(tiny.folder, tmp_path / "chosen"), tmp_path / "finer.yaml"
     preset = {
         "fit_size": 96,
@@ -123,14 +127,14 @@ def test_another_preset_fits_the_photos_that_the_first_one_chose(tiny, snakemake
         "steps_per_photo": 10,
         "level_steps": 10,
     }
-    entries = {"presets": {"finer": preset | {"choose_with": "draft"}}, "scenes": {"desert": {"preset": "finer"}}}
+    entries = {"presets": {"finer": preset | {"choose_with": "draft"}}, "scenes": {"desert": {"preset": "finer", "materials": "auto"}}}
     config.write_text(yaml.safe_dump(entries))
     own = tiny.round.relative_to(tiny.folder)
     made = Path(str(own).replace("/draft/", "/finer/"))
     page = made / tiny.terrain.relative_to(tiny.round) / "page"
-    targets = [made / "metrics.json", made / "scores.csv", page]
+    targets = [made / "metrics.json", page]
     done = snakemake(folder, "--cores", "2", *targets, configs=(*CONFIGS, config))
-    assert "rule fit_chosen_photos" in done.stdout and "rule fit_coarse" not in done.stdout
+    assert "rule fit_windows" in done.stdout and "rule fit_coarse" not in done.stdout
     asked, chosen = (read_json(folder / path / "poses.json") for path in (own, made))
     assert chosen == asked | {"chosen_with": "draft"}
     taken = [digest_files(*sorted((folder / path / "capture").glob("[!.]*"))) for path in (own, made)]
@@ -138,7 +142,10 @@ def test_another_preset_fits_the_photos_that_the_first_one_chose(tiny, snakemake
     found = read_json(folder / made / "metrics.json")
     assert found["photos"] == 7 and 20 < found["psnr"] < 60
     rounds = read_json(folder / page / "story.json")["rounds"]
-    assert [one.get("preset") for one in rounds] == ["draft", None] and rounds[1]["psnr"] == round(found["psnr"], 2)
+    assert [one["psnr"] for one in rounds] == [None, round(found["windows"]["psnr"], 2)]
+    assert read_json(folder / made / "windows/windows.json")["tiled"][0]
+    width = read_json(folder / made / "materials/materials.json")["tile_side"]
+    assert width * ground.read_ground(folder / made / "windows/window0.exr").spacing > 0
 
 
 def test_torch_fits_the_coarse_field_as_well_as_the_core(snakemake, tiny, tmp_path):

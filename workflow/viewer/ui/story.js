@@ -13,8 +13,8 @@ const MOST = 10_000; // photos
  * at: place seen from the middle of the ground; look: direction on the ground; picture: number in the sheet.
  * @typedef {{ round: number, at: number[], look: number[], picture?: number }} StoryPhoto
  *
- * preset: whose fit was tested, where it is not the terrain's own.
- * @typedef {{ photos: number, psnr: number | null, preset?: string }} StoryRound
+ * psnr: of the terrain's own fit; null where no photo tested it, or another preset's fit was tested.
+ * @typedef {{ photos: number, psnr: number | null }} StoryRound
  *
  * half: half the side of the ground that tiles are cut from; thumb: pixels along a side of a photo in the sheet.
  * @typedef {{ unit: string, half: number, photos: StoryPhoto[], rounds: StoryRound[],
@@ -74,11 +74,11 @@ function listRounds({ rounds }) {
   const table = document.createElement("table");
   table.createTHead().innerHTML = "<tr><th></th><th>photos</th><th>PSNR</th></tr>";
   const rows = table.createTBody();
-  for (const [k, { photos, psnr, preset }] of rounds.entries()) {
+  for (const [k, { photos, psnr }] of rounds.entries()) {
     const row = rows.insertRow();
     row.insertCell().append(swatch(ROUNDS[k % ROUNDS.length]), k ? ` round ${k}` : " start");
     row.insertCell().append(k ? `+ ${photos}` : String(photos));
-    row.insertCell().append(psnr === null ? "none" : `${psnr.toFixed(1)} dB${preset ? ` (${preset})` : ""}`);
+    row.insertCell().append(psnr === null ? "" : `${psnr.toFixed(1)} dB`);
   }
   return table;
 }
@@ -110,8 +110,7 @@ export function readStory(value) {
     && Array.isArray(photos) && photos.length <= MOST && Array.isArray(rounds) && rounds.length <= MOST
     && photos.every((one) => isNatural(one?.round) && finite(one.at) && one.at.length === 3 && finite(one.look)
       && one.look.length === 2 && (one.picture === undefined || (isNatural(one.picture) && one.picture < pictures)))
-    && rounds.every((one) => isNatural(one?.photos) && (one.psnr === null || Number.isFinite(one.psnr))
-      && (one.preset === undefined || (typeof one.preset === "string" && one.preset.length <= 40)));
+    && rounds.every((one) => isNatural(one?.photos) && (one.psnr === null || Number.isFinite(one.psnr)));
   if (!sound) throw new PageError(`${STORY} is not as the workflow writes it. Make the page again.`);
   return { unit, half, photos, rounds, thumb, columns, pictures };
 }

@@ -82,11 +82,11 @@ class _Filling:
         self.shown = np.zeros(source.shape)  # how often each cell has been copied
         last = len(source) - patch
         self.starts = np.unique(np.append(np.arange(0, last + 1, max(1, patch // 2)), last))
+        self.counts = box_sums(source, patch, patch)[np.ix_(self.starts, self.starts)]  # known cells from each start
 
     def next_corner(self) -> tuple[int, int] | None:
         """Where the next patch goes: of the places on a grid that are not full, the one with most known cells."""
-        counts = box_sums(self.known, self.patch, self.patch)[np.ix_(self.starts, self.starts)]
-        counts = np.where(counts == self.patch**2, -1, counts)
+        counts = np.where(self.counts == self.patch**2, -1, self.counts)
         row, column = np.unravel_index(int(counts.argmax()), counts.shape)
         return None if counts.max() < 0 else (int(self.starts[row]), int(self.starts[column]))
 
@@ -103,6 +103,11 @@ class _Filling:
         self.columns[window] = np.where(new, there[1], here[1])
         self.shown[y : y + p, x : x + p] += new
         self.known[window] = True
+        near = [np.flatnonzero(np.abs(self.starts - at) < p) for at in (row, column)]
+        for i in near[0]:
+            for j in near[1]:
+                r, c = self.starts[i], self.starts[j]
+                self.counts[i, j] = self.known[r : r + p, c : c + p].sum()
 
     def _choose_place(self, known: Bool[Array, "p p"], here: tuple[Array, Array]) -> tuple[int, int]:
         drawn = self.rng.integers(len(self.places), size=min(CANDIDATES, len(self.places)))
@@ -114,7 +119,8 @@ class _Filling:
         wanted = self.features[here[0][y, x], here[1][y, x]]
         found = self.features[drawn[:, :1] + y, drawn[:, 1:] + x]
         cost = divide_by_median(((found - wanted) ** 2).sum(-1).mean(-1)) if len(y) else np.zeros(len(drawn))
-        often = box_sums(self.shown, self.patch, self.patch)[drawn[:, 0], drawn[:, 1]] / self.patch**2
+        inside = np.arange(self.patch)
+        often = self.shown[drawn[:, :1, None] + inside[:, None], drawn[:, 1:, None] + inside].mean((1, 2))
         best = drawn[int(np.argmin(cost + REPEAT_COST * often))]
         return int(best[0]), int(best[1])
 

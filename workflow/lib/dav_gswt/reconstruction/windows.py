@@ -154,13 +154,14 @@ def _fit_window(
     field, grid = finish_field(fit.field, grid, seen)
     first = grid.heights.size + discs.count_underlay(grid)
     own = np.r_[0:first, first + len(around) : len(field)]
-    return Reconstruction(field[own], grid, FitReport(fit.report.steps, len(own)))
+    field = field[own]
+    return Reconstruction(field, grid, FitReport(fit.report.steps, len(field)))
 
 
 def _match_harmonics(field: GaussianField, like: GaussianField) -> GaussianField:
     """The field with as many coefficients of colour as another has."""
-    sh = np.zeros((len(field), *like.sh.shape[1:]), np.float32)
-    kept = min(sh.shape[1], field.sh.shape[1])
+    wanted = like.sh.shape[1]
+    sh, kept = np.zeros((len(field), wanted, 3), np.float32), min(wanted, field.sh.shape[1])
     sh[:, :kept] = field.sh[:, :kept]
     return replace(field, sh=sh)
 

@@ -54,8 +54,11 @@ def tell_story(given: Mapping[str, Any]) -> Story | None:
         photos[k]["picture"] = number
     presets = [decode_path(Path(path)).get("preset") for path in given["metrics"]]
     rounds = [
-        {"photos": sum(photo.round == t for photo in taken), "psnr": _psnr(path, frame.kind)}
-        | ({"preset": preset} if preset != presets[-1] else {})
+        {
+            "photos": sum(photo.round == t for photo in taken),
+            # fits of another preset cannot be compared: they were measured on smaller photos and other ground
+            "psnr": _psnr(path, frame.kind) if preset == presets[-1] else None,
+        }
         for t, (path, preset) in enumerate(zip(given["metrics"], presets, strict=True))
     ]
     half = frame.exemplar.side / 2
@@ -87,6 +90,8 @@ def draw_sheet(smalls: Sequence[Float32[Array, "_ _ 3"]]) -> Float32[Array, "hei
 
 
 def _psnr(path: Path | str, kind: str) -> float | None:
-    """PSNR of the test photos in metrics.json, of real ones after their exposure is fitted; None: none was spared."""
-    value = read_json(path).get("psnr_colour_corrected" if kind == "photos" else "psnr")
+    """PSNR of the test photos in metrics.json, in the windows if there are any, of real photos after their exposure is
+    fitted; None: none was spared."""
+    values = read_json(path)
+    value = values.get("windows", values).get("psnr_colour_corrected" if kind == "photos" else "psnr")
     return round(value, 2) if isinstance(value, int | float) and np.isfinite(value) else None

@@ -83,7 +83,7 @@ class DeviceDescent(Descent):
         gradient = gain * gradient
         gradients = self.raster.differentiate(last, gradient, -BACKDROP * (gradient * behind).sum(2))
         hold_ground(gradients, task.constraints, smooth)
-        self._move_parameters(run, task, gradients, cuda.find_visible(last))
+        self._step_adam_on_device(run, task, gradients, cuda.find_visible(last))
         view.release()
 
     def perturb(self, run: TrainingState, task: TrainingTask) -> None:
@@ -94,7 +94,7 @@ class DeviceDescent(Descent):
         densification.perturb(loose, 0, perturbation(run, task), run.rng)
         self.values["means"][rows] = cuda.upload(loose["means"], self.device)
 
-    def _move_parameters(
+    def _step_adam_on_device(
         self, run: TrainingState, task: TrainingTask, gradients: dict[str, Tensor], rows: Bool[Tensor, "n"]
     ) -> None:
         """As `Descent._step_adam`."""
