@@ -28,7 +28,7 @@ with logging_to(snakemake.log[0]):
     fitted = fit_windows(draft, photos, focus.windows, focus.spacing, settings, rng)
     joined, parts = join_windows(draft, fitted), [(each.field, each.grid) for each in fitted]
     maps = windows.map_windows(maps, parts)
-    windows.write_windows(parts, focus.windows, maps, snakemake.output.windows)
+    windows.write_windows(parts, focus, maps, snakemake.output.windows)
     write_field(joined, snakemake.output.field)
     copy_file(paths.draft_ground, snakemake.output.ground)
     reports = [vars(each.report) for each in fitted]

@@ -127,7 +127,10 @@ def test_another_preset_fits_the_photos_that_the_first_one_chose(tiny, snakemake
         "steps_per_photo": 10,
         "level_steps": 10,
     }
-    entries = {"presets": {"finer": preset | {"choose_with": "draft"}}, "scenes": {"desert": {"preset": "finer", "materials": "auto"}}}
+    entries = {
+        "presets": {"finer": preset | {"choose_with": "draft"}},
+        "scenes": {"desert": {"preset": "finer", "materials": "auto"}},
+    }
     config.write_text(yaml.safe_dump(entries))
     own = tiny.round.relative_to(tiny.folder)
     made = Path(str(own).replace("/draft/", "/finer/"))

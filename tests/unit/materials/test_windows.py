@@ -83,7 +83,8 @@ def test_a_material_and_objects_are_cut_from_fitted_windows(plan, tmp_path):
         np.testing.assert_array_equal(ours.field.means, theirs.field.means)
     assert found.tile_side == pytest.approx(usual.tile_side)
     assert all(each.grid.cells == made.CELLS for each in found.materials)
-    windows.write_windows(whole.windows, [windows.FitWindow(Square(0.0, 0.0, SIDE), True)], plan.maps, tmp_path / "w")
+    focus = windows.Focus([windows.FitWindow(Square(0.0, 0.0, SIDE), True)], made.SPACING, 0.07)
+    windows.write_windows(whole.windows, focus, plan.maps, tmp_path / "w")
     read = windows.read_windows(tmp_path / "w")
     assert read.tiled == [True] and read.maps.exemplar == plan.maps.exemplar
     np.testing.assert_allclose(read.maps.colour, plan.maps.colour, atol=1e-6)

@@ -36,17 +36,21 @@ SHRUNK = 0.97  # factor of the windows' sides, until they fit into the Gaussians
 
 @dataclass(frozen=True)
 class Focus:
-    """The windows, and the width of their cells in world units."""
+    """The windows, and the widths of their cells and of a photo's pixel there, in world units."""
 
     windows: list[FitWindow]
     spacing: float
+    pixel: float
 
 
 @dataclass(frozen=True)
 class WindowsRecord:
-    """windows.json. tiled: of each window, whether tiles are cut from it."""
+    """windows.json. tiled: of each window, whether tiles are cut from it. cell, pixel: widths of a cell, and of a
+    photo's pixel where photos show most detail, in world units."""
 
     tiled: list[bool]
+    cell: float
+    pixel: float
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,8 @@ def choose_windows(plan: GroundPlan, views: Sequence[TrainingView], settings: Fi
         if spacing <= fine or grown <= 1:
             break
         grown = max(1.0, SHRUNK * grown)
-    return Focus([FitWindow(_to_square(plan, box), k < tiled) for k, box in enumerate(windows)], spacing)
+    squares = [FitWindow(_to_square(plan, box), k < tiled) for k, box in enumerate(windows)]
+    return Focus(squares, spacing, fine / settings.spacing)
 
 
 def _to_square(plan: GroundPlan, box: _Box) -> Square:
@@ -197,9 +202,7 @@ def map_windows(maps: GroundMaps, fitted: Sequence[FittedWindow]) -> GroundMaps:
     return GroundMaps(**layers, exemplar=place)
 
 
-def write_windows(
-    fitted: Sequence[FittedWindow], windows: Sequence[FitWindow], maps: GroundMaps, folder: Path | str
-) -> None:
+def write_windows(fitted: Sequence[FittedWindow], focus: Focus, maps: GroundMaps, folder: Path | str) -> None:
     """Write window{k}.ply, its grid window{k}.exr, maps.exr and windows.json; the folder appears whole or not."""
     place = maps.exemplar
     layers = dict(zip("RGB", np.moveaxis(maps.colour, -1, 0), strict=True))
@@ -211,7 +214,8 @@ def write_windows(
         header = {name: repr(getattr(place, name)) for name in ("west", "south", "spacing")}
         stored = {name: layer[::-1].astype(np.float32) for name, layer in layers.items()}
         image_files.write_exr(part / "maps.exr", stored, header)
-        write_json(part / NAME, asdict(WindowsRecord([window.tiled for window in windows])))
+        tiled = [window.tiled for window in focus.windows]
+        write_json(part / NAME, asdict(WindowsRecord(tiled, focus.spacing, focus.pixel)))
 
 
 def read_windows(folder: Path | str) -> FocusedFields:
