@@ -12,7 +12,7 @@ from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground, observation
 from dav_gswt.reconstruction.fitting.plan import FitSettings
-from dav_gswt.reconstruction.windows import Draft, fit_windows, join_windows
+from dav_gswt.reconstruction.windows import Draft, fit_windows, join_windows, widen_exemplar
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
@@ -22,7 +22,8 @@ with logging_to(snakemake.log[0]):
     masks = {name.removeprefix("mask_"): path for name, path in paths.items() if name.startswith("mask_")}
     settings = FitSettings.from_preset(params.preset).from_scratch(len(names), len(photos))
     photos, _ = observation.observe(draft.frame, draft.grid, photos)
-    maps = sharpen_maps(measure_ground(draft.field, draft.grid), photos)
+    whole = widen_exemplar(draft.grid, draft.frame.exemplar)
+    maps = sharpen_maps(measure_ground(draft.field, whole), photos)
     plan = build.plan_ground(maps, bool(draft.field.ground.any()), masks)
     focus, rng = windows.choose_windows(plan, photos, settings), np.random.default_rng([params.seed, params.t])
     fitted = fit_windows(draft, photos, focus.windows, focus.spacing, settings, rng)

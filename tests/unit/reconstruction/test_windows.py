@@ -42,6 +42,14 @@ def test_a_window_lies_in_its_square_in_whole_blocks_with_a_margin_and_the_heigh
     assert corner.first_row == corner.first_column == 0 and corner.west == pytest.approx(0)
 
 
+def test_the_whole_square_is_looked_at_where_the_drafts_blocks_leave_a_part_of_it():
+    grid = made.grid(0.07)  # 45 cells, of which 32 are the draft's exemplar, in the middle of the square
+    wide = replace(grid, heights=np.zeros((45, 45)), seen=np.ones((45, 45), bool), west=0.02, south=0.02)
+    wide = windows.widen_exemplar(replace(wide, first_row=6, first_column=6), Square(0.0, 0.0, 3.2))
+    assert (wide.first_row, wide.first_column, wide.cells) == (0, 0, 45)
+    assert windows.widen_exemplar(grid, Square(1.0, 1.0, 0.5)) == grid
+
+
 def test_a_window_shows_the_photos_and_its_field_has_none_of_what_surrounds_it(fitted):
     draft, own = fitted
     grid, field = own.grid, own.field

@@ -6,6 +6,7 @@ draft's Gaussians outside it held fixed behind and before it.
 """
 
 import logging
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -51,6 +52,20 @@ class FitWindow:
 
     square: Square
     tiled: bool
+
+
+def widen_exemplar(grid: Ground, square: Square) -> Ground:
+    """The grid with the largest exemplar of whole cells in a square: a draft's is a multiple of BLOCK cells."""
+    low = [
+        max(0, math.ceil((at - start) / grid.spacing - 1e-6))
+        for at, start in ((square.south, grid.south), (square.west, grid.west))
+    ]
+    high = [
+        math.floor((at + square.side - start) / grid.spacing + 1e-6)
+        for at, start in ((square.south, grid.south), (square.west, grid.west))
+    ]
+    cells = min(min(end, count) - start for start, end, count in zip(low, high, grid.shape, strict=True))
+    return replace(grid, first_row=low[0], first_column=low[1], cells=cells) if cells > grid.cells else grid
 
 
 def measure_pixel_widths(
