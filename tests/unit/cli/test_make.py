@@ -113,7 +113,7 @@ def test_the_judgement_says_what_was_found_how_good_it_is_and_what_would_help(tm
     weak = {"grade": "marginal", "reason": "material0 has little: photograph 2.0 times as much of it"}
     materials = {"excluded": 0.07, "objects": [{}], "materials": [{"share": 0.4, "verdict": weak}]}
     materials["materials"].append({"share": 0.6, "verdict": {"grade": "good", "reason": ""}})
-    metrics = {"psnr": 20.0, "psnr_colour_corrected": 26.0, "test_views": [{}, {}]}
+    metrics = {"psnr_colour_corrected": 20.0, "windows": {"psnr_colour_corrected": 26.0, "test_views": [{}, {}]}}
     paths = [tmp_path / name for name in ("ground.json", "materials.json", "metrics.json")]
     write_scene_frame(paths[0], scene_frame(kind="photos", **about))
     for path, value in zip(paths[1:], (materials, metrics), strict=True):

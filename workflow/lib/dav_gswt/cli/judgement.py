@@ -56,6 +56,7 @@ def describe_quality(ground: SceneFrame, metrics: Path | None) -> list[str]:
     """How test photos look beside the field; for a poor score the likely cause and what to do."""
     doubts = ground.verdict.describe() if ground.verdict and ground.verdict.objections else ""
     values = read_json(metrics) if metrics else {}
+    values |= values.get("windows", {})  # what tiles are cut from
     psnr = values.get("psnr_colour_corrected", values.get("psnr"))
     said = ["No photo was set aside, so the quality was not measured (--test 2 sets two aside)."] if metrics else []
     if isinstance(psnr, int | float) and math.isfinite(psnr):
