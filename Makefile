@@ -1,6 +1,7 @@
 # Each target sets the environment up if it is missing. `make help` lists them.
 SCENE ?=
 PHOTOS ?=
+PRESET ?=
 CORES ?= 2
 PORT ?= 8000
 WORKERS ?= 2
@@ -21,11 +22,15 @@ ifneq ($(filter run view,$(MAKECMDGOALS)),)
   ifneq ($(WORDS),)
     $(error For photos of your own type: make run PHOTOS=$(firstword $(WORDS)))
   endif
+  ifneq ($(if $(PHOTOS),,$(PRESET)),)
+    $(error PRESET needs PHOTOS=...; a scene's preset is the key `preset` of the scene)
+  endif
 endif
 
 help:
 	@echo "make run                  a terrain of a small synthetic desert; SCENE=name for another scene of config/scenes"
-	@echo "make run PHOTOS=folder    a terrain of your photos, a video or a splat, in folder-terrain"
+	@echo "make run PHOTOS=folder    a terrain of your photos, a video or a splat, in ./folder-terrain;"
+	@echo "                          PRESET=draft (fast), standard (default) or reference (sharp)"
 	@echo "make view                 walk over it in a browser; SCENE and PHOTOS as above, PORT=8000"
 	@echo "make setup                the environment alone (.venv); CORES=2 limits the processors of a run"
 	@echo "make test, test-all       what people use; also slow tests"
@@ -35,7 +40,7 @@ help:
 setup: .venv/installed
 
 run: .venv/installed
-	@$(if $(PHOTOS),$(BIN)/dav-gswt make --cores $(CORES) "$(PHOTOS)",\
+	@$(if $(PHOTOS),$(BIN)/dav-gswt make --cores $(CORES) $(if $(PRESET),--preset $(PRESET)) "$(PHOTOS)",\
 	  $(BIN)/python -m dav_gswt.cli.run --cores $(CORES) $(if $(SCENE),--scene $(SCENE)))
 
 view: .venv/installed

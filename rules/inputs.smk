@@ -177,7 +177,8 @@ def source_files(scene):
     except (InputError, OSError) as error:
         raise WorkflowError(f"config: {where}.folder: {error}") from None
     videos = [] if listing.photos else listing.files.get("video", [])[:1]
-    found = {"photos": [dated(path, f"{where}.folder") for path in listing.photos.values()]}
+    once, _ = drop_twins(listing.photos)  # a copy that is added changes no input
+    found = {"photos": [dated(path, f"{where}.folder") for path in once.values()]}
     found["video"] = [dated(path, f"{where}.folder") for path in videos]
     found["masks"] = [dated(path, f"{where}.masks") for path in listing.masks.values()]
     found["model"] = files_of_model(given["model"], f"{where}.model") if "model" in given else []

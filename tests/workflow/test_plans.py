@@ -76,6 +76,16 @@ def test_a_folder_alone_is_a_scene_whose_photos_are_all_fitted_at_once(planned, 
     assert plan["register_photos"] == plan["split_views"] == 1 and plan["fit_coarse"] == 2
 
 
+def test_a_copy_of_a_photo_is_no_input(snakemake, tmp_path):
+    (tmp_path / "photos").mkdir()
+    for name, content in {"a": b"a", "a (1)": b"a", "b": b"b"}.items():
+        (tmp_path / f"photos/{name}.jpg").write_bytes(b"\xff\xd8\xff" + content)
+    (tmp_path / "mine.yaml").write_text("scenes: {mine: {kind: photos, folder: photos}}\n")
+    configs = (USUAL, tmp_path / "mine.yaml")
+    said = snakemake(tmp_path, "results/mine/photos/ground.json", "--dry-run", configs=configs).stdout
+    assert "photos/a.jpg" in said and "photos/b.jpg" in said and "a (1)" not in said
+
+
 @pytest.mark.parametrize("start", ["", "start: 2, "])
 def test_the_last_fit_of_a_preset_that_chooses_with_another_is_of_windows_unless_the_whole_is_wanted(
     planned, tmp_path, start

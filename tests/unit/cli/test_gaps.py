@@ -52,7 +52,7 @@ def test_a_hole_gives_a_map_outlines_and_a_mission_that_goes_when_it_is_filled(r
     assert image_files.read_size(tmp_path / "out/gaps.png")[0] == 960
     assert (tmp_path / "out/mission.plan").is_file()
     assert run(placed(False)) == 0
-    assert "Nothing is missing" in capsys.readouterr().out
+    assert "No gaps: three photos or more" in capsys.readouterr().out
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["gaps.geojson", "gaps.png"]
 
 

@@ -110,25 +110,41 @@ def test_view_finds_a_terrain_by_its_input_and_the_newest_one(folder):
 def test_the_judgement_says_what_was_found_how_good_it_is_and_what_would_help(tmp_path):
     verdict = SfmVerdict("doubtful", (SfmSign("tilt", "doubtful", "photos look aside"),))
     about = {"images": 5, "registered": 4, "left_out": (LeftOutPhoto("a.jpg", "blurred"),), "verdict": verdict}
-    weak = {"grade": "marginal", "reason": "too little of it was photographed"}
+    weak = {"grade": "marginal", "reason": "material0 has little: photograph 2.0 times as much of it"}
     materials = {"excluded": 0.07, "objects": [{}], "materials": [{"share": 0.4, "verdict": weak}]}
     materials["materials"].append({"share": 0.6, "verdict": {"grade": "good", "reason": ""}})
-    metrics = {"psnr": 20.0, "psnr_colour_corrected": 26.0, "test_views": [{}, {}]}
+    metrics = {"psnr_colour_corrected": 20.0, "windows": {"psnr_colour_corrected": 26.0, "test_views": [{}, {}]}}
     paths = [tmp_path / name for name in ("ground.json", "materials.json", "metrics.json")]
     write_scene_frame(paths[0], scene_frame(kind="photos", **about))
     for path, value in zip(paths[1:], (materials, metrics), strict=True):
         path.write_text(json.dumps(value))
     said = judgement.judge_terrain(*paths)
     assert said == [
-        "Found 2 kinds of ground (60%, 40%) and 1 thing standing on it. "
-        "7% of it is shown nowhere (dark in materials.png).",
+        "Found 2 kinds of ground (60%, 40%). 7% of it is shown nowhere (dark in materials.png).",
+        "1 thing on it is scattered over the terrain (to leave it out: `materials: {exclude: MASK.png}` in scene.yaml, "
+        "see docs/photos.md).",
         "4 of 5 photos are used; not a.jpg.",
-        "Beside 2 photos that it never saw, it shows them well, a little softer (26.0 dB).",
-        "Photos look aside.",
-        "Too little of it was photographed.",
+        "Beside test photos (2), the terrain is good (26.0 dB PSNR; good from 25, very good from 30).",
+        "The camera poses are doubtful, since photos look aside.",
+        "The kind that covers 40% was photographed on a small area: photograph 2.0 times as much of it.",
     ]
     paths[2].write_text('{"psnr": null, "test_views": []}')
     assert "was not measured (--test 2" in judgement.judge_terrain(paths[0], None, paths[2])[1]
+
+
+@pytest.mark.parametrize(
+    "scores, photos, doubts, cause, advice",
+    [
+        ([17, 16], 24, "camera poses are doubtful, since x", "camera poses are doubtful, since x.", "sharply"),
+        ([17, 17, 9], 24, "", "other things or light in 2.", "things moved"),
+        ([17, 17, 15], 8, "", "only 8 photos.", "Take 20"),
+        ([17, 17, 15], 24, "", "unknown, often blur or things that moved.", "sharply"),
+    ],
+)
+def test_a_poor_score_has_its_likely_cause_and_what_to_do(scores, photos, doubts, cause, advice):
+    views = [{"view": f"{number}.png", "psnr_colour_corrected": score} for number, score in enumerate(scores)]
+    said = " ".join(judgement.explain_poor_quality({"test_views": views, "photos": photos}, doubts))
+    assert cause in said and advice in said
 
 
 def test_python_makes_a_terrain_as_the_command_does(folder, monkeypatch):

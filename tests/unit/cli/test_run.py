@@ -51,6 +51,16 @@ def start(handler: str, after: str = "") -> subprocess.Popen:
     return job
 
 
+def test_sigterm_ends_a_command_without_a_stack_trace(monkeypatch):
+    """`python -c` stands for the command line, which loads COLMAP with its own handler of signals."""
+    command = (
+        "from dav_gswt import cli; import pycolmap, signal, types; exit(cli.run_safely(types.SimpleNamespace(run={})))"
+    )
+    asked = command.format("lambda _: signal.raise_signal(signal.SIGTERM)")
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (130, b"")
+
+
 @pytest.mark.parametrize("handler", ["signal.default_int_handler", "signal.SIG_IGN"])
 def test_snakemake_tidies_up_after_jobs_that_end_and_after_those_that_are_killed(monkeypatch, handler):
     monkeypatch.setattr(run, "GRACE", 600.0 if "default" in handler else 1.0)

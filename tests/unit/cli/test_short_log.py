@@ -38,6 +38,14 @@ def test_the_plan_and_the_begin_and_the_end_of_each_job_are_a_line(handler):
     assert handler.describe(failed) == "fit_coarse is not finished; its log: results/logs/a.log"
 
 
+def test_jobs_are_numbered_in_the_order_in_which_they_end(handler):
+    handler.describe(record(LogEvent.RUN_INFO, stats={"total": 3}))
+    for number in (1, 2):
+        handler.describe(record(LogEvent.JOB_INFO, rule_name=f"job{number}", jobid=number, log=["a.log"]))
+    ends = [handler.describe(record(LogEvent.JOB_FINISHED, job_id=number)) for number in (2, 1)]
+    assert ends == ["[1 of 2] job2: 0 s", "[2 of 2] job1: 0 s"]
+
+
 NO_SPACE = "[Errno 28] No space left on device"
 SPACE = "  No space left on device; free some space, then run the same again"
 FAULT = "Traceback (most recent call last):\n\nKeyError: 'a'"

@@ -59,15 +59,22 @@ def test_the_page_needs_nothing_but_itself_and_escapes_names(made, root, tmp_pat
     assert len(links) == 13 and all(link.startswith("data:image/") for link in links)
     assert "default-src 'none'" in text and not re.search(r"url\(|@import|<script|https?:", text)
     assert not {"<b>", "<i>"} & set(re.findall(r"<[^>]*>", text))
-    for said in ("matches &lt;i&gt;no&lt;/i&gt;", "&lt;img src=", "&lt;b&gt;bold", "12 of 14 photos", "it is odd"):
+    for said in (
+        "matches &lt;i&gt;no&lt;/i&gt;",
+        "&lt;img src=",
+        "&lt;b&gt;bold",
+        "12 of 14 photos",
+        "it is odd",
+        "0.40 px on average (good: up to 0.9)",
+    ):
         assert said in text
 
 
 def test_advice_names_what_is_weak():
     said = " ".join(list_advice(FRAME))
-    assert "doubtful: it is odd" in said and "1 of 14 photos were left out" in said
+    assert "camera poses are doubtful, since it is odd" in said and "1 of 14 photos were left out" in said
     small = replace(FRAME, exemplar=Square(0.0, 0.0, 0.4))
-    assert "only 0.40 flying heights wide" in list_advice(small)[-1]
+    assert "0.40 camera heights wide" in list_advice(small)[-1]
 
 
 def test_the_page_says_which_ground_the_photos_miss(flown, root, tmp_path):
@@ -78,5 +85,5 @@ def test_the_page_says_which_ground_the_photos_miss(flown, root, tmp_path):
         write_photo_folder(tmp_path / "photos", flown, pictures, FRAME)
         write_report(tmp_path / "photos", root / "workflow/report/photos.html", "dunes", tmp_path / "a.html")
         text = (tmp_path / "a.html").read_text()
-        assert ("Nothing is missing" in text, "Blurred: 001.png, 002.png" in text) == (not blurred, bool(blurred))
-        assert ("seen by too few photos, at" in text.replace("square flying heights ", "")) == bool(blurred)
+        assert ("No gaps" in text, "Blurred: 001, 002" in text) == (not blurred, bool(blurred))
+        assert ("seen by too few photos, at" in text.replace("square camera heights ", "")) == bool(blurred)

@@ -65,9 +65,9 @@ class LogHandler(LogHandlerBase):
     """Prints a line for the plan, each job's begin and end, each failed job and each error."""
 
     def __post_init__(self) -> None:
-        self.running: dict[int, tuple[str, float]] = {}  # lines of jobs and when they began, by Snakemake's number
+        self.running: dict[int, tuple[str, float]] = {}  # stages of jobs and when they began, by Snakemake's number
         self.jobs = 0  # to do, without the rule that only names the targets
-        self.begun = 0
+        self.ended = 0  # jobs end in another order than they begin in, so lines are numbered at the end
         self.signals: deque[str] = deque()  # of killed jobs whose name and log are still to come
         logging.raiseExceptions = False  # Snakemake's own log file on a full disk is not worth a traceback a line
 
@@ -100,14 +100,14 @@ class LogHandler(LogHandlerBase):
     def _describe_job(self, job: dict) -> str | None:
         if not job["log"]:  # a rule that only names targets
             return None
-        self.begun += 1
-        line = f"[{self.begun} of {self.jobs}] {STAGES.get(job['rule_name'], job['rule_name'])}"
-        self.running[job["jobid"]] = line, time.monotonic()
-        return line + RUNNING
+        stage = STAGES.get(job["rule_name"], job["rule_name"])
+        self.running[job["jobid"]] = stage, time.monotonic()
+        return f"[{self.ended + 1} of {self.jobs}] {stage}{RUNNING}"
 
     def _describe_end(self, job: dict) -> str | None:
-        line, begun = self.running.pop(job["job_id"], (None, 0.0))
-        return line and f"{line}: {time.monotonic() - begun:.0f} s"
+        stage, begun = self.running.pop(job["job_id"], (None, 0.0))
+        self.ended += stage is not None
+        return stage and f"[{self.ended} of {self.jobs}] {stage}: {time.monotonic() - begun:.0f} s"
 
     def _describe_failed_job(self, job: dict) -> str:
         logs = [Path(path) for path in job.get("log") or []]

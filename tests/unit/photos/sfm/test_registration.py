@@ -114,7 +114,7 @@ def test_copies_count_once_and_damaged_photos_are_left_out_by_name(photos, tmp_p
     with pytest.raises(ZeroDivisionError):
         register_photos(tmp_path, replace(OPTIONS, features=64))
     assert tuple(sorted(photo.key for photo in given)) == NAMES
-    assert "8 of 18 photos are copies (000 (1).jpg of 000.jpg): each counts once" in caplog.text
+    assert "copies among the 18 photos: 8 (000 (1).jpg of 000.jpg)" in caplog.text
     assert "left out: " in caplog.text and "text.jpg: not readable" in caplog.text and "cut.jpg: damaged" in caplog.text
 
 

@@ -1,6 +1,7 @@
 """The command line: `dav-gswt`, and what `make run` and `make view` call."""
 
 import argparse
+import signal
 import sys
 
 from dav_gswt.errors import InputError
@@ -9,6 +10,7 @@ from dav_gswt.logs import describe_os_error
 
 def run_safely(options: argparse.Namespace) -> int:
     """Call `options.run`. Returns its exit status, or that of an error, whose message is printed."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # COLMAP's own handler prints a stack trace
     try:
         return options.run(options) or 0
     except (InputError, OSError) as error:

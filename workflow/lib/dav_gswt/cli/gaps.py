@@ -20,7 +20,7 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import figures
 from dav_gswt.logs import PROGRESS
 from dav_gswt.photos.colmap_model import ColmapModel
-from dav_gswt.photos.gaps import Gaps, describe_gaps, describe_ground, draw_gaps, find_gaps, plan_photos
+from dav_gswt.photos.gaps import CAMERA_HEIGHT, Gaps, describe_gaps, describe_ground, draw_gaps, find_gaps, plan_photos
 from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model
 from dav_gswt.photos.photo_listing import locate_source
@@ -135,5 +135,5 @@ def describe_photos(placed: PlacedPhotos, found: Gaps) -> str:
     lines += [f"  {name} is blurred and does not count" for name in placed.blurred]
     lines += [f"  {name} shows the horizon more than the ground and does not count" for name in found.horizon]
     if frame.georeference is None:
-        lines.append("  Without GPS positions that agree with the photos, the unit of length is their flying height.")
+        lines.append(f"  {CAMERA_HEIGHT}")
     return "\n".join(lines)

@@ -3,15 +3,18 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 
-# PSNR of photos that were set aside, after their exposure is fitted, from which a word holds
-SHARPNESS = ((30.0, "shows them sharply"), (25.0, "shows them well, a little softer"), (20.0, "is soft beside them"))
-WORST = "differs from them: things moved, the light changed, or photos found a wrong place"
-MOST_REASONS = 3
+# PSNR of test photos, after their exposure is fitted, from which a grade holds
+GRADES = ((30.0, "very good"), (25.0, "good"), (20.0, "fair: softer than they are"))
+POOR = "poor: its details differ from theirs"
+APART = 3.0  # dB below the median: something is wrong with this test photo
+ENOUGH_PHOTOS = 20
+AGAIN = "Photograph the ground again, sharply, with one camera and zoom, while nothing moves"
 
 
 def judge_terrain(frame: Path, materials: Path | None, metrics: Path | None) -> list[str]:
@@ -21,47 +24,71 @@ def judge_terrain(frame: Path, materials: Path | None, metrics: Path | None) -> 
     """
     ground = read_scene_frame(frame)
     found = read_json(materials) if materials else None
-    sentences = [describe_ground(found), describe_photos(ground), describe_sharpness(metrics)]
-    return [*filter(None, sentences), *list_reasons(ground, found)]
+    return [*describe_ground(found), *describe_photos(ground), *describe_quality(ground, metrics), *list_scarce(found)]
 
 
-def describe_ground(found: Mapping[str, Any] | None) -> str:
-    """How many materials and things were found, and what share of the ground is left out."""
+def describe_ground(found: Mapping[str, Any] | None) -> list[str]:
+    """How many materials and objects were found, what share of the ground is left out, and how to leave more out."""
     if found is None:
-        return ""
+        return []
     shares = sorted((material["share"] for material in found["materials"]), reverse=True)
     kinds = f"{len(shares)} kinds of ground ({', '.join(f'{share:.0%}' for share in shares)})"
-    things = len(found["objects"])
-    text = "Found one kind of ground" if len(shares) == 1 else f"Found {kinds}"
-    text += f" and {things} {'thing' if things == 1 else 'things'} standing on it" if things else ""
-    left_out = found["excluded"]
-    return f"{text}." + (f" {left_out:.0%} of it is shown nowhere (dark in materials.png)." if left_out >= 0.01 else "")
+    said, left_out = ["Found one kind of ground." if len(shares) == 1 else f"Found {kinds}."], found["excluded"]
+    if left_out >= 0.01:
+        said[0] += f" {left_out:.0%} of it is shown nowhere (dark in materials.png)."
+    if things := len(found["objects"]):
+        count, which = ("1 thing on it is", "it") if things == 1 else (f"{things} things on it are", "some")
+        mask = f"to leave {which} out: `materials: {{exclude: MASK.png}}` in scene.yaml, see docs/photos.md"
+        said.append(f"{count} scattered over the terrain ({mask}).")
+    return said
 
 
-def describe_photos(ground: SceneFrame) -> str:
+def describe_photos(ground: SceneFrame) -> list[str]:
     """How many photos found their place, and the names of those that did not."""
     left_out = [photo.name for photo in ground.left_out]
     if ground.kind != "photos" or not left_out:
-        return ""
+        return []
     more = f" and {len(left_out) - 3} more" if len(left_out) > 3 else ""
-    return f"{ground.registered} of {ground.images} photos are used; not {', '.join(left_out[:3])}{more}."
+    return [f"{ground.registered} of {ground.images} photos are used; not {', '.join(left_out[:3])}{more}."]
 
 
-def describe_sharpness(metrics: Path | None) -> str:
-    """How photos that were set aside look beside the field; that it is unknown where none was."""
-    if metrics is None:
-        return ""
-    values = read_json(metrics)
+def describe_quality(ground: SceneFrame, metrics: Path | None) -> list[str]:
+    """How test photos look beside the field; for a poor score the likely cause and what to do."""
+    doubts = ground.verdict.describe() if ground.verdict and ground.verdict.objections else ""
+    values = read_json(metrics) if metrics else {}
+    values |= values.get("windows", {})  # what tiles are cut from
     psnr = values.get("psnr_colour_corrected", values.get("psnr"))
-    if not isinstance(psnr, int | float) or not math.isfinite(psnr):
-        return "No photo was set aside, so how true it is was not measured (--test 2 sets two aside)."
-    word = next((word for least, word in SHARPNESS if psnr >= least), WORST)
-    return f"Beside {len(values.get('test_views', []))} photos that it never saw, it {word} ({psnr:.1f} dB)."
+    said = ["No photo was set aside, so the quality was not measured (--test 2 sets two aside)."] if metrics else []
+    if isinstance(psnr, int | float) and math.isfinite(psnr):
+        grade = next((grade for least, grade in GRADES if psnr >= least), POOR)
+        tests = f"test photos ({len(values['test_views'])})"
+        said = [f"Beside {tests}, the terrain is {grade} ({psnr:.1f} dB PSNR; good from 25, very good from 30)."]
+        if grade == POOR:
+            return said + explain_poor_quality(values, doubts)
+    return said + ([f"The {doubts}."] if doubts else [])
 
 
-def list_reasons(ground: SceneFrame, found: Mapping[str, Any] | None) -> list[str]:
-    """What is doubtful, the worst first, and what would help."""
-    reasons = [sign.reason for sign in ground.verdict.objections] if ground.verdict else []
-    verdicts = [material["verdict"] for material in found["materials"]] if found else []
-    reasons += [verdict["reason"] for verdict in verdicts if verdict["grade"] != "good"]
-    return [f"{reason[:1].upper()}{reason[1:]}." for reason in reasons[:MOST_REASONS]]
+def explain_poor_quality(values: Mapping[str, Any], doubts: str) -> list[str]:
+    """The likely cause, where the data tell one, and what to do."""
+    scores = {Path(view["view"]).stem: view["psnr_colour_corrected"] for view in values["test_views"]}
+    apart = [name for name, score in scores.items() if score < median(scores.values()) - APART]
+    if doubts:
+        cause, advice = doubts, AGAIN
+    elif apart:
+        cause, advice = f"other things or light in {', '.join(apart)}", "Leave out photos in which things moved"
+    elif values["photos"] < ENOUGH_PHOTOS:
+        cause, advice = f"only {values['photos']} photos", f"Take {ENOUGH_PHOTOS} or more that overlap by two thirds"
+    else:
+        cause, advice = "unknown, often blur or things that moved", f"Leave such photos out. {AGAIN} if that is no help"
+    return [f"The likely cause: {cause}.", f"{advice}."]
+
+
+def list_scarce(found: Mapping[str, Any] | None) -> list[str]:
+    """The kinds of ground of which too little was photographed for tiles that do not repeat."""
+    kinds, said = found["materials"] if found else [], []
+    for kind in kinds:
+        which = f"The kind that covers {kind['share']:.0%}" if len(kinds) > 1 else "The ground"
+        if kind["verdict"]["grade"] != "good":
+            what_to_do = kind["verdict"]["reason"].rpartition(": ")[2]
+            said.append(f"{which} was photographed on a small area: {what_to_do}.")
+    return said

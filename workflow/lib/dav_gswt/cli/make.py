@@ -208,7 +208,7 @@ def collect_results(out: Path, settings: dict[str, Any]) -> Made:
     materials = out / stage_folder("materials", branch) / "materials.json"
     if materials.is_file():
         link_file(materials.with_name("materials.png"), out / "materials.png")
-    metrics = (round_folder if branch["t"] else out / stage_folder("coarse", branch)) / "metrics.json"
+    metrics = round_folder / "metrics.json"
     said = judge_terrain(photos / "ground.json", *(each if each.is_file() else None for each in (materials, metrics)))
     return Made(out / "page", out / "terrain.png", out / "field.ply", report, out / SCENE_FILE, tuple(said))
 

@@ -77,6 +77,10 @@ class SfmVerdict:
         """The signs that are not good, the worst first."""
         return tuple(sign for grade in ("refused", "doubtful") for sign in self.signs if sign.grade == grade)
 
+    def describe(self) -> str:
+        """The grade and what speaks against the model, for a sentence."""
+        return f"camera poses are {self.grade}, since {'; '.join(sign.reason for sign in self.objections)}"
+
 
 @dataclass(frozen=True)
 class FocalLength:

@@ -40,6 +40,7 @@ COLOURS = ("#882255", "#d55e00", "#e69f00", "#56b4e9")
 WELL, BEYOND = -1, -2  # in place of a reason: seen well, not asked for
 GOOD, BACK = "#b8d8b8", "#ffffff"
 DOWN = 5.0  # degrees off straight down, within which a camera has no arrow
+CAMERA_HEIGHT = "No GPS fits the photos: lengths are in camera heights, the cameras' usual height over the ground."
 LABELLED, LISTED = 20, 10  # gaps that have their number on the map, that are told of one by one
 
 
@@ -313,7 +314,7 @@ def describe_ground(found: Gaps, frame: SceneFrame) -> list[str]:
     """What ground is missing, in words: a line in all, and one for each of the largest gaps."""
     whole = f"{format_area(found.area, frame)} of ground"
     if not found.gaps:
-        return [f"Nothing is missing: {whole} is seen by three photos or more, from several sides and closely enough."]
+        return [f"No gaps: three photos or more see all {whole}, from several sides and closely enough."]
     missing = sum(gap.area for gap in found.gaps)
     lines = [f"{format_area(missing, frame)} of {whole} is missing ({100 * missing / found.area:.1f} %):"]
     for number, gap in enumerate(found.gaps[:LISTED], 1):
@@ -328,7 +329,7 @@ def describe_ground(found: Gaps, frame: SceneFrame) -> list[str]:
 def format_area(area: float, frame: SceneFrame) -> str:
     """An area of square world units in words: hectares from one on."""
     if frame.unit != "metre":
-        return f"{area:.2f} square flying heights"
+        return f"{area:.2f} square camera heights"
     return f"{area / 1e4:.2f} ha" if area >= 1e4 else f"{area:.0f} m²" if area >= 10 else f"{area:.1f} m²"
 
 
@@ -349,7 +350,7 @@ def draw_gaps(
     from matplotlib.colors import BoundaryNorm, ListedColormap  # not above: it loads for a second
     from matplotlib.patches import Rectangle
 
-    surface, unit = gaps.surface, "m" if frame.unit == "metre" else "flying heights"
+    surface, unit = gaps.surface, "m" if frame.unit == "metre" else "camera heights"
     rows, columns = surface.heights.shape
     here, x, y = gaps.fault != BEYOND, surface.centres[:columns, 0], surface.centres[::columns, 1]
     places = np.array([camera.centre[:2] for camera in model.cameras])

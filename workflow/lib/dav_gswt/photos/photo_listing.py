@@ -18,6 +18,7 @@ from dav_gswt.images.file_kinds import HEIF_SUFFIXES, RAW_SUFFIXES, SUFFIXES, Ki
 PICTURES: tuple[Kind, ...] = ("photo", "heif", "raw")
 MASK_FOLDERS = {"masks", "mask"}
 MASK_ENDING = "_mask"
+START = 4096  # bytes of a file that are compared before all of it
 RESULT_MARK = "scene.yaml"  # a folder with it is a terrain that was made, not a folder of photos
 
 Source = Path | str | Sequence[Path | str]  # a folder, a file, or several of them
@@ -102,10 +103,11 @@ def drop_twins(photos: Mapping[str, Path]) -> tuple[dict[str, Path], dict[str, s
 
     The shortest file name stays: IMG_1.jpg, not the copy IMG_1 (1).jpg.
     """
-    sizes = Counter(path.stat().st_size for path in photos.values())
+    starts = {name: _digest(path, START) for name, path in photos.items()}
+    alike = Counter(starts.values())
     first, twins = {}, {}
     for name in sorted(photos, key=lambda name: (len(PurePosixPath(name).name), name)):
-        content = _digest(photos[name]) if sizes[photos[name].stat().st_size] > 1 else None
+        content = _digest(photos[name]) if alike[starts[name]] > 1 else None
         if content in first:
             twins[name] = first[content]
         elif content:
@@ -193,8 +195,10 @@ def _drop_other_copies(pictures: list[_File]) -> list[_File]:
     return [file for file in pictures if file.kind == "photo" or file.name.with_suffix("") not in plain]
 
 
-def _digest(path: Path) -> str | None:
+def _digest(path: Path, size: int = -1) -> str | None:
+    """A digest of the first `size` bytes, or of all of them; None if the file cannot be read."""
     try:
-        return digest_files(path)
+        with path.open("rb") as file:
+            return digest_files(path) if size < 0 else f"{path.stat().st_size} {file.read(size)!r}"
     except OSError:
-        return None  # reported when it is read
+        return None

@@ -17,6 +17,7 @@ from dav_gswt.images import figures, image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos import gaps
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model, reprojection_errors
+from dav_gswt.photos.sfm.verdict import describe_error
 from dav_gswt.photos.sharpness import find_blurred
 from dav_gswt.templates import render_template
 
@@ -62,21 +63,21 @@ def find_missed_ground(frame: SceneFrame, model: ColmapModel, images: Path) -> t
 
 
 def _summarize(frame: SceneFrame, model: ColmapModel) -> str:
-    side = f"{frame.exemplar.side:.2f} {frame.unit}s"
+    side = f"{frame.exemplar.side:.2f} {'metres' if frame.unit == 'metre' else 'camera heights'}"
     if frame.kind == "synthetic":
         tests, photos = len(frame.test or ()), len(model.names)
         first = f"{photos - tests} photos were rendered, and {tests} for testing; their cameras are exact."
     else:
         first = f"{frame.registered} of {frame.images} photos were placed."
-    return f"{first} Tiles are cut from a square of ground that is {side} wide, the exemplar (dashed on the map)."
+    said = f"{first} Tiles are cut from a square of ground that is {side} wide (dashed on the map)."
+    return said if frame.unit == "metre" else f"{said} {gaps.CAMERA_HEIGHT}"
 
 
 def list_advice(frame: SceneFrame) -> list[str]:
     """What is weak about the set, and what to do about it."""
     said = []
     if frame.verdict and frame.verdict.grade != "good":
-        reasons = "; ".join(sign.reason for sign in frame.verdict.objections)
-        said.append(f"The cameras are {frame.verdict.grade}: {reasons}.")
+        said.append(f"The {frame.verdict.describe()}.")
     if frame.left_out:
         said.append(
             f"{len(frame.left_out)} of {frame.images} photos were left out for the reasons below. Photos taken between "
@@ -84,9 +85,7 @@ def list_advice(frame: SceneFrame) -> list[str]:
         )
     side = frame.exemplar.side / frame.flying_height
     if side < LEAST_SIDE:
-        said.append(
-            f"The exemplar is only {side:.2f} flying heights wide, so tiles repeat soon. Photograph more ground."
-        )
+        said.append(f"Tiles repeat soon: their square is {side:.2f} camera heights wide. Photograph more ground.")
     return said
 
 
@@ -96,7 +95,7 @@ def _list_facts(frame: SceneFrame, model: ColmapModel) -> list[tuple[str, str]]:
     if error is None and len(model.pixels):
         error = float(reprojection_errors(model).mean())
     if error is not None:
-        facts.append(("Reprojection error", f"{error:.2f} px (good: below 1)"))
+        facts.append(("Reprojection error", describe_error(error)))
     if frame.focal:
         ratio = f"{frame.focal_ratio:.3f} times EXIF's; " if frame.focal_ratio else ""
         facts.append(("Focal length", ratio + frame.focal.decision))

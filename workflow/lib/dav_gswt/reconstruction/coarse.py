@@ -24,7 +24,6 @@ _log = logging.getLogger(__name__)
 
 BAND = 0.1  # flying heights within which points belong to a ground with objects on it
 BLOCK = 32  # the exemplar's side is a multiple of it, in cells: six levels halve it five times
-MUCH_WIDER = 2.0  # discs than the preset asks for, from which on the log says so
 MIN_WEIGHT = 0.05  # pixels of blend weight from which a photo counts as seeing a Gaussian
 OPAQUE = 0.5  # alpha above which a cell takes its height from a finished field
 
@@ -73,9 +72,7 @@ def fit_coarse_field(
     frame, views, points = given.frame, given.views, given.points
     spacing = settings.spacing * observation.pixel_size(frame, views)
     grid = ground.fit_ground(frame, points, spacing, limit_discs(settings.max_gaussians), BLOCK, given.margin)
-    if (wider := grid.spacing / spacing) > MUCH_WIDER:
-        said = "discs of this large ground are %.1f times as wide as the preset asks for: raise its max_gaussians"
-        _log.warning(said, wider)
+    _log.info("discs are %.1f times as wide as `spacing` asks for", grid.spacing / spacing)
     views, relief = observation.observe(frame, grid, views)
     shell = objects.make_shell(relief, views)
     isolated = objects.make_isolated_points(grid, relief, points, given.colours, BAND * frame.flying_height)

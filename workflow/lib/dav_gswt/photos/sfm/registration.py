@@ -108,8 +108,8 @@ def register_photos(source: Source, options: SfmOptions) -> Registration:
     verdict = solution.verdict
     for text in verdict.tried:
         _log.info("structure from motion: %s", text)
-    for sign in verdict.objections:
-        _log.warning("structure from motion is %s: %s", sign.grade, sign.reason)
+    if verdict.grade == "doubtful":
+        _log.warning("%s", verdict.describe())
     require_trust(verdict)
     if positions and not align_to_gps(solution.best, gps, options.seed):
         positions = None
@@ -154,7 +154,7 @@ def select_photos(listing: PhotoListing) -> dict[str, Path]:
     if twins:
         copy, kept = next(iter(twins.items()))
         _log.warning(
-            "%d of %d photos are copies (%s of %s): each counts once", len(twins), len(listing.photos), copy, kept
+            "copies among the %d photos: %d (%s of %s); each counts once", len(listing.photos), len(twins), copy, kept
         )
     return photos
 

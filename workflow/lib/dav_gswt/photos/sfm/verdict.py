@@ -57,7 +57,7 @@ def judge_model(
     none.
     """
     normal, offset, spread = fit_plane(model.points, rng)
-    signs: list[SfmSign | None] = [_grade("reprojection error", error, f"points lie {error:.2f} px off on average")]
+    signs: list[SfmSign | None] = [_grade("reprojection error", error, f"points are off by {describe_error(error)}")]
     if len(model.names) >= FEW and len(model.points):
         length = len(model.pixels) / len(model.points)
         signs.append(_grade("track length", 1 / length, f"a point is seen by {length:.1f} photos on average"))
@@ -65,7 +65,7 @@ def judge_model(
     signs.append(gps)
     heights = np.array([camera.centre @ normal for camera in model.cameras]) - offset
     relief = spread / max(abs(float(np.median(heights))), 1e-12)
-    uneven = _grade("relief", relief, f"points lie {relief:.2f} flying heights off their plane")
+    uneven = _grade("relief", relief, f"points lie {relief:.2f} camera heights off their plane")
     tilt = float(np.median([_measure_angle(camera.forward, normal) for camera in model.cameras]))
     limits = SIDEWAYS if uneven.grade != "good" else THRESHOLDS["tilt"]
     signs.append(_grade("tilt", tilt, f"photos look {tilt:.0f} degrees off the ground's vertical (median)", limits))
@@ -82,6 +82,11 @@ def judge_model(
     signs.append(_grade("placed", 1 - placed / images, f"{placed} of {images} photos found a place"))
     known = tuple(sign for sign in signs if sign)
     return SfmVerdict(combine_grades(known), known)
+
+
+def describe_error(error: float) -> str:
+    """A mean reprojection error in pixels, beside the largest good one."""
+    return f"{error:.2f} px on average (good: up to {THRESHOLDS['reprojection error'][0]})"
 
 
 def combine_grades(signs: Iterable[SfmSign]) -> Grade:
@@ -168,7 +173,7 @@ def _judge_ties(model: ColmapModel) -> SfmSign:
     if not most:
         return _grade("hangs together", 1 / WELL_TIED, f"{WELL_TIED} points or more tie each photo to the others")
     worst = min(most, key=lambda g: (most[g], g))
-    names = [name for name, g in zip(model.names, group, strict=True) if g == worst]
+    names = [name.removesuffix(".png") for name, g in zip(model.names, group, strict=True) if g == worst]
     some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
     reason = f"only {most[worst]} points tie {some} to the other photos"
     return _grade("hangs together", 1 / max(most[worst], 1e-12), reason)
