@@ -42,7 +42,7 @@ PRESET = FitSettings(fit_size=384, spacing=1.25, max_gaussians=140000, steps=360
 PHOTOS = {"photo_count": 12, "layout": "cap", "min_elevation": 50, "size": 384, "seed": 0, "test": 0}
 FRAME = scene.Scene("oasis", 0).frame
 HEAPS = ((-1.3, 0.7, 1.5, 0.9), (1.3, -0.9, 1.2, 0.75))  # x, y, radius and height in metres: sand at rest
-LOAM = np.array([0.36, 0.25, 0.19])  # over sand: other ground, not its shade
+LOAM = np.array([0.24, 0.15, 0.10])  # over sand: other ground, not its shade
 
 
 def lower_sun(light: Light, elevation: float) -> Light:
