@@ -74,7 +74,7 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
     cells are objects or excluded ground.
     masks: drawn by people. Materials that they name are taken as they are, and the rest is excluded.
     """
-    sun = shading.fit_sun(maps)
+    sun = None if masks and masks.materials else shading.fit_sun(maps)  # shade that is named is kept
     maps = maps if sun is None else shading.even_light(maps, sun)
     features = segmentation.describe_cells(maps.colour)
     if masks and masks.materials:

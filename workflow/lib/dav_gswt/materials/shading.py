@@ -29,7 +29,6 @@ LEAST_EXPLAINED = 0.25  # of the variance of brightness: where materials explain
 SHADE = 0.5  # of the light of level ground: less is shade that no tile can show, where it is wide
 WIDE = 1 / 30  # of the side: narrower shade is texture, as that of ripples
 LUMINANCE = (0.2126, 0.7152, 0.0722)
-LEVEL = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
