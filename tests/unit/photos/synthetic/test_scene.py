@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.geometry.cameras import pinhole
+from dav_gswt.images.srgb import encode_srgb
 from dav_gswt.photos.synthetic import mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.synthetic.land import Land, Light
@@ -131,4 +132,4 @@ def test_walkers_are_a_group_of_their_own_around_the_exemplar():
     "light, code", [(0.0, 0.0), (1.0, 1.0), (7.0, 1.0), (-1.0, 0.0), (0.5, 0.7353570), (0.002, 0.02584)]
 )
 def test_light_is_encoded_as_srgb(light, code):
-    assert synthetic.encode_srgb(np.array([light]))[0] == pytest.approx(code, abs=1e-6)
+    assert encode_srgb(np.array([light]))[0] == pytest.approx(code, abs=1e-6)

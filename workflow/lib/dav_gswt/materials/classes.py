@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
-from dav_gswt.materials import objects, segmentation, standing
+from dav_gswt.materials import objects, segmentation, shading, standing
 from dav_gswt.materials.maps import NO_CLASS, GroundMaps, GroundMasks, Surroundings, unite
 from dav_gswt.materials.objects import Footprint, is_shade, linear_light
 
@@ -74,6 +74,8 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
     cells are objects or excluded ground.
     masks: drawn by people. Materials that they name are taken as they are, and the rest is excluded.
     """
+    sun = None if masks and masks.materials else shading.fit_sun(maps)  # shade that is named is kept
+    maps = maps if sun is None else shading.even_light(maps, sun)
     features = segmentation.describe_cells(maps.colour)
     if masks and masks.materials:
         classes, names = masks.label()

@@ -11,12 +11,13 @@ from functools import lru_cache
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
+from dav_gswt.images.srgb import encode_srgb
 from dav_gswt.photos.synthetic import desert, flowers, grass, meadow, oasis, planet
 
 # each has a function `make_land`
@@ -130,10 +131,3 @@ def render(scene: Scene, camera: Camera, samples: int = SAMPLES) -> Float32[Arra
     place = np.round(np.concatenate([camera.centre, camera.forward]), 6) + 0.0  # + 0.0: no negative zeros
     seed = zlib.crc32(place.astype("<f8").tobytes(), scene.seed & 0xFFFFFFFF)
     return encode_srgb(mitsuba_scene.render_light(load_scene(scene), camera, samples, seed))
-
-
-def encode_srgb(light: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
-    """Linear light to sRGB's curve (IEC 61966-2-1), clipped to [0, 1]."""
-    light = np.clip(light, 0.0, 1.0)
-    curve = 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055
-    return np.where(light <= 0.0031308, 12.92 * light, curve).astype(light.dtype)
