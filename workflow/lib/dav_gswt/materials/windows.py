@@ -1,7 +1,7 @@
 """Which squares of the ground are fitted at the photos' resolution: those that tiles and objects are cut from."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -199,14 +199,14 @@ def map_windows(maps: GroundMaps, fitted: Sequence[FittedWindow]) -> GroundMaps:
         own = resample_maps(measure_ground(field, grid), Exemplar(*corner, place.spacing, cells))
         for name, layer in layers.items():
             layer[rows, columns] = getattr(own, name)[: rows.stop - rows.start, : columns.stop - columns.start]
-    return GroundMaps(**layers, exemplar=place)
+    return replace(maps, **layers)
 
 
 def write_windows(fitted: Sequence[FittedWindow], focus: Focus, maps: GroundMaps, folder: Path | str) -> None:
     """Write window{k}.ply, its grid window{k}.exr, maps.exr and windows.json; the folder appears whole or not."""
     place = maps.exemplar
     layers = dict(zip("RGB", np.moveaxis(maps.colour, -1, 0), strict=True))
-    layers |= {name: getattr(maps, name) for name in LAYERS}
+    layers |= {name: getattr(maps, name) for name in LAYERS} | ({} if maps.tilt is None else {"tilt": maps.tilt})
     with atomic_folder(folder) as part:
         for number, (field, grid) in enumerate(fitted):
             write_field(field, part / f"window{number}.ply")
@@ -229,4 +229,5 @@ def read_windows(folder: Path | str) -> FocusedFields:
     height, surface, cover, known = (layers[name] for name in LAYERS)
     place = Exemplar(west, south, spacing, len(known))
     colour = np.dstack([layers[name] for name in "RGB"])
-    return FocusedFields(fields, tiled, GroundMaps(colour, height, surface, cover, known > 0, place))
+    maps = GroundMaps(colour, height, surface, cover, known > 0, place, layers.get("tilt"))
+    return FocusedFields(fields, tiled, maps)
