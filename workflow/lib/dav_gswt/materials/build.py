@@ -86,6 +86,7 @@ class FoundMaterials:
     materials: list[Material]
     objects: list[ExtractedObject]
     verdict: MaterialVerdict
+    left_out: tuple[LeftOut, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -223,7 +224,7 @@ def find_materials(
     materials = [replace(each, info=replace(each.info, share=each.info.share / total)) for each in kept.values()]
     objects = _extract_objects(plan, field, grid, {k: place for place, k in enumerate(kept)}, focused)
     side = plan.tile_side * plan.maps.exemplar.spacing / materials[0].grid.spacing
-    return _report(plan.maps, plan.classes, side, materials, objects)
+    return replace(_report(plan.maps, plan.classes, side, materials, objects), left_out=plan.left_out)
 
 
 @dataclass(frozen=True)

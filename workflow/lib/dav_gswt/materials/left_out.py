@@ -1,9 +1,7 @@
 """What is no ground and no object: what stands or is sunk, and things that are cut off or were seen from above only.
 
-What stands is told by the heights alone. Under a wide thing with steep sides, as a roof, the ground is taken to rise
-from its surroundings by no more than a slope (lower envelope of slope-limited functions; filters of this kind tell
-buildings from terrain in laser scans: Vosselman 2000, Zhang et al. 2003). A heap that lies at its angle of repose has
-no steep sides, and is ground.
+What stands is told by the heights alone, as buildings are in laser scans: it is what openings of rising widths cut off
+(Zhang et al. 2003), if it is taller than a share of its width. A heap of loose ground has no steep sides, and is ground.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,17 +11,25 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
-from scipy.ndimage import binary_dilation, binary_erosion, distance_transform_edt, label, median_filter, uniform_filter
+from scipy.ndimage import (
+    binary_dilation,
+    binary_erosion,
+    distance_transform_edt,
+    grey_opening,
+    label,
+    median_filter,
+    uniform_filter,
+)
 
 from dav_gswt.materials.classes import find_wide_parts
-from dav_gswt.materials.maps import GroundMaps
+from dav_gswt.materials.maps import GroundMaps, unite
 from dav_gswt.materials.objects import BORDER, LARGEST, RING, SMALLEST_STANDING, Footprint
 
 TALL = 0.2  # height over width, from which something stands or is sunk; of what is wider than LARGEST: over that
-STEEP, WALL = 1.0, 0.3  # a slope that loose ground does not keep; share of a thing whose height is half above such a one
+STEEP, WALL = 1.0, 0.5  # a slope that loose ground does not keep, and share of a thing's rim that rises by more
 SPECK = 1 / 44  # of the side: width of the median of the heights, which a draft has with specks
 HIDDEN = 0.1  # of the ground around a cell, from which something stands there, not only in a noisy height
-LEVELS = 1.5  # ratio of the heights at which parts of what stands are looked at, so that no low bridge joins them
+WIDEST, WIDER = 0.7, 1.5  # of the side: width of the widest thing; ratio of the widths that are tried
 TOUCHED = 0.2  # of what is around a thing, that may be ground which is no material or was never seen
 LONG, STRAIGHT = 0.5, 0.04  # of a thing's size: length of a straight cut; and of that: its deviation from a line
 UNSEEN = 45.0  # degrees from the vertical that photos are taken to have looked from, where that is not known
@@ -61,28 +67,29 @@ def find_relief(maps: GroundMaps) -> list[tuple[str, Bool[Array, "m m"]]]:
     surface, height = (median_filter(each, size) / maps.exemplar.spacing for each in (maps.surface, maps.height))
     hidden = uniform_filter(maps.cover, size) > HIDDEN
     up = find_steep_things(surface, np.where(hidden, np.minimum(surface, height), surface))
-    return [(STANDS, each) for each in up] + [(SUNK, each) for each in find_steep_things(-height, -height)]
+    standing = unite(up, height.shape)
+    open_ground = height[tuple(distance_transform_edt(standing, return_distances=False, return_indices=True))]
+    return [(STANDS, each) for each in up] + [(SUNK, each) for each in find_steep_things(-open_ground, -open_ground)]
 
 
 def find_steep_things(top: Float[Array, "m m"], low: Float[Array, "m m"]) -> list[Bool[Array, "m m"]]:
-    """Cells of each thing wider or longer than an object may be that rises steeply above what is around it.
+    """Cells of each thing longer than an object may be that rises from its surroundings with steep sides.
 
-    It is looked for at rising heights over the ground, the first what the least object that stands has.
+    Things of rising widths are cut off by an opening.
     top, low: heights of what is seen from above and of the ground below it, as far as that is known; in cells.
     """
     m, found = len(top), np.zeros(top.shape, bool)
-    lift, steep = (top - limit_slope(low, slope) for slope in (2 * TALL, STEEP))
-    least = SMALLEST_STANDING * m
-    level = first = TALL * least
-    while (above := lift > level).any():
-        pieces, number = label(find_wide_parts(above, least / 2))
+    width = SMALLEST_STANDING * m
+    wall, least = top - limit_slope(low, STEEP) > TALL * width, width / 2
+    while width < WIDEST * m:
+        hat = top - grey_opening(low, 2 * round(width / 2) + 1)
+        pieces, number = label(find_wide_parts(hat > TALL * min(width, LARGEST * m), least))
         for k in range(1, number + 1):
             own = pieces == k
-            width = min(2 * distance_transform_edt(np.pad(own, 1)).max(), LARGEST * m)
-            tall = np.quantile(lift[own], 0.75) > TALL * width
-            if tall and max(map(np.ptp, np.nonzero(own))) >= LARGEST * m and (steep[own] > max(first, level / 2)).mean() > WALL:
+            rim = own & binary_dilation(~own, iterations=RING)
+            if max(map(np.ptp, np.nonzero(own))) >= LARGEST * m and wall[rim].mean() > WALL:
                 found |= own
-        level *= LEVELS
+        width *= WIDER
     things, number = label(found)
     return [things == k for k in range(1, number + 1)]
 
