@@ -24,7 +24,12 @@ def built_up():
     """Sand with a roof, a hedge and a wood that the ground layer lies below, and a trench and a heap that it follows."""
     maps, rng = made.maps(mixed=False, shrubs=False), np.random.default_rng(0)
     colour = maps.colour.copy()
-    for cells, paint in ((ROOF, (0.5, 0.2, 0.15)), (HEDGE, made.GRASS), (CANOPY, made.SHRUB), (TRENCH, (0.4, 0.3, 0.2))):
+    for cells, paint in (
+        (ROOF, (0.5, 0.2, 0.15)),
+        (HEDGE, made.GRASS),
+        (CANOPY, made.SHRUB),
+        (TRENCH, (0.4, 0.3, 0.2)),
+    ):
         colour[cells] = paint + rng.normal(0, 0.03, (cells.sum(), 3))
     ground = HEAP - 6.0 * TRENCH + gaussian_filter(rng.normal(0, 1, (M, M)), 1)
     above = 10.0 * ROOF + 6.0 * HEDGE + 15.0 * CANOPY
@@ -81,6 +86,8 @@ NOTHING = np.zeros((M, M), bool)
 def test_things_that_are_cut_off_are_no_objects(own, unseen, excluded, flaw):
     maps = made.maps(mixed=False, shrubs=False)
     assert left_out.find_flaw(Footprint(own, 0), maps, unseen, excluded) == flaw
+    tall = replace(maps, surface=maps.surface + 8 * made.SPACING * own)  # what stands ends where it is high no more
+    assert left_out.find_flaw(Footprint(own, 0), tall, unseen, excluded) == (flaw if unseen.any() else "")
 
 
 @pytest.mark.parametrize(

@@ -110,9 +110,7 @@ class _LabelledGround:
     strips: list[Bool[Array, "m m"]]
 
 
-def _segment_ground(
-    maps: GroundMaps, contrast: Float[Array, "m m"], relief: Bool[Array, "m m"]
-) -> _LabelledGround:
+def _segment_ground(maps: GroundMaps, contrast: Float[Array, "m m"], relief: Bool[Array, "m m"]) -> _LabelledGround:
     """Ground by its looks: the segmentation with the most materials, since a start of k-means may hide one in another.
 
     contrast: of the grain around each cell. relief: see `classify_ground`.

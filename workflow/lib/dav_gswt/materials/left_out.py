@@ -1,7 +1,8 @@
 """What is no ground and no object: what stands or is sunk, and things that are cut off or were seen from above only.
 
 What stands is told by the heights alone, as buildings are in laser scans: it is what openings of rising widths cut off
-(Zhang et al. 2003), if it is taller than a share of its width. A heap of loose ground has no steep sides, and is ground.
+(Zhang et al. 2003), if it is taller than a share of its width. A heap of loose ground
+has no steep sides, and is ground.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,16 +23,17 @@ from scipy.ndimage import (
 )
 
 from dav_gswt.materials.classes import find_wide_parts
-from dav_gswt.materials.maps import GroundMaps, unite
+from dav_gswt.materials.maps import HALF, GroundMaps, unite
 from dav_gswt.materials.objects import BORDER, LARGEST, RING, SMALLEST_STANDING, Footprint
 
+ROUNDED = 0.35  # cells: such a deviation has every straight row of cells
 TALL = 0.2  # height over width, from which something stands or is sunk; of what is wider than LARGEST: over that
 STEEP, WALL = 1.0, 0.5  # a slope that loose ground does not keep, and share of a thing's rim that rises by more
 SPECK = 1 / 44  # of the side: width of the median of the heights, which a draft has with specks
 HIDDEN = 0.1  # of the ground around a cell, from which something stands there, not only in a noisy height
 WIDEST, WIDER = 0.7, 1.5  # of the side: width of the widest thing; ratio of the widths that are tried
-TOUCHED = 0.2  # of what is around a thing, that may be ground which is no material or was never seen
-LONG, STRAIGHT = 0.5, 0.04  # of a thing's size: length of a straight cut; and of that: its deviation from a line
+TOUCHED = 0.2  # of a thing, and of what is around it, that may be on other things that stand or was never seen
+LONG, STRAIGHT = 0.4, 0.05  # of a thing's size: length of a straight cut; and of that: its deviation from a line
 UNSEEN = 45.0  # degrees from the vertical that photos are taken to have looked from, where that is not known
 STANDS, SUNK, CUT, ABOVE = "stands", "sunk", "cut off", "from above"
 WORDS = {
@@ -115,28 +117,34 @@ def find_flaw(footprint: Footprint, maps: GroundMaps, unseen: Bool[Array, "m m"]
 
     A thing may be no taller than wide times the tangent of the angle from the vertical that photos saw it from: at
     45 degrees its side is as sharp as its top.
-    unseen: ground that no photo saw, and what stands; excluded: also other ground that is shown nowhere.
+    unseen: ground that no photo saw, and what stands; excluded: also other things and ground that is shown nowhere.
     """
     own = footprint.cells
     ring = binary_dilation(own, iterations=RING) & ~own
-    if unseen[ring | own].mean() > TOUCHED or _is_cut_straight(own, excluded):
+    width = 2 * np.sqrt(own.sum() / np.pi)
+    below = (np.quantile(maps.surface[own], 0.9) - maps.surface) / maps.exemplar.spacing
+    hidden = max(unseen[ring].mean(), unseen[own].mean())
+    if hidden > TOUCHED or _is_cut_straight(own, excluded, below > TALL * width):
         return CUT
     tilt = UNSEEN if maps.tilt is None else float(np.median(maps.tilt[own]))
-    height = np.quantile(maps.surface[own], 0.9) - np.median(maps.surface[ring])
-    width = 2 * np.sqrt(own.sum() / np.pi) * maps.exemplar.spacing
-    return ABOVE if height > max(TALL, np.tan(np.radians(tilt))) * width else ""
+    return ABOVE if np.median(below[ring]) > max(TALL, np.tan(np.radians(tilt))) * width else ""
 
 
-def _is_cut_straight(own: Bool[Array, "m m"], excluded: Bool[Array, "m m"]) -> bool:
-    """Whether an outline runs straight along the border of other ground for a good part of a thing's size."""
-    touching = own & ~binary_erosion(own) & binary_dilation(excluded, iterations=BORDER)
+def _is_cut_straight(own: Bool[Array, "m m"], excluded: Bool[Array, "m m"], low: Bool[Array, "m m"]) -> bool:
+    """Whether an outline runs straight along the border of other ground for a good part of a thing's size.
+
+    low: far below the thing: where that is beyond the border, as in its shade, the thing does end there.
+    """
+    touching = own & ~binary_erosion(own) & binary_dilation(excluded & ~own, iterations=BORDER)
     pieces, number = label(touching, np.ones((3, 3)))
     size = max(map(np.ptp, np.nonzero(own))) + 1
     for k in range(1, number + 1):
         cells = np.argwhere(pieces == k).astype(float)
         along, across = np.linalg.svd(cells - cells.mean(0), full_matrices=False)[1] if len(cells) > 1 else (0, 0)
         length = np.sqrt(12 / len(cells)) * along  # of a line of evenly spaced cells with this spread
-        if length >= LONG * size and across / np.sqrt(len(cells)) <= max(0.35, STRAIGHT * length):
+        beyond = excluded & ~own & binary_dilation(pieces == k, iterations=RING)
+        straight = length >= LONG * size and across / np.sqrt(len(cells)) <= max(ROUNDED, STRAIGHT * length)
+        if straight and low[beyond].mean() < HALF:
             return True
     return False
 
@@ -145,6 +153,6 @@ def drop_flawed(
     footprints: list[Footprint], maps: GroundMaps, unseen: Bool[Array, "m m"], excluded: Bool[Array, "m m"]
 ) -> tuple[list[Footprint], list[tuple[str, Bool[Array, "m m"]]]]:
     """The footprints that can be used, and the cells of the others with the reason."""
-    flaws = [find_flaw(each, maps, unseen, excluded) for each in footprints]
-    kept = [each for each, flaw in zip(footprints, flaws, strict=True) if not flaw]
-    return kept, [(flaw, each.cells) for each, flaw in zip(footprints, flaws, strict=True) if flaw]
+    taken = excluded | unite([each.cells for each in footprints], excluded.shape)
+    flaws = [(find_flaw(each, maps, unseen, taken), each) for each in footprints]
+    return [each for flaw, each in flaws if not flaw], [(flaw, each.cells) for flaw, each in flaws if flaw]
