@@ -1,6 +1,6 @@
-"""Is what stands or is sunk taken for ground? A rendered land with houses, a hedge, a wood, a trench, a heap and shrubs.
+"""Is what stands or is sunk taken for ground? A land with houses, a hedge, a wood, a trench, a heap and shrubs.
 
-Run as `python -m dav_gswt_study.materials.standing FOLDER`. The field is kept there, so that another run only plans again.
+Run as `python -m dav_gswt_study.materials.standing FOLDER`. Photos and field are kept there, for the next run.
 """
 
 import sys
@@ -104,7 +104,7 @@ def photograph(folder: Path) -> list[TrainingView]:
 
 
 def main(folder: Path) -> None:
-    """Say of each thing which share of its cells is in a material or in an object, with maps of a draft and of photos."""
+    """Say which share of each thing is in a material and in an object, by maps of a draft and of photos."""
     views = photograph(folder)
     if not (folder / "ground.exr").exists():
         start = coarse.read_start_views(FRAME, views, folder / "sparse", folder / "images", False)

@@ -21,7 +21,7 @@ HEAP = 12 * np.clip(1 - np.hypot(ROWS - 60, COLUMNS - 106) / 18, 0, 1)  # cells,
 
 
 def built_up():
-    """Sand with a roof, a hedge and a wood that the ground layer lies below, and a trench and a heap that it follows."""
+    """Sand with a roof, a hedge and a wood, which the ground layer lies below, and a trench and a heap."""
     maps, rng = made.maps(mixed=False, shrubs=False), np.random.default_rng(0)
     colour = maps.colour.copy()
     for cells, paint in (

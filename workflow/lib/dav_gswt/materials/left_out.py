@@ -29,11 +29,12 @@ from dav_gswt.materials.objects import BORDER, LARGEST, RING, SMALLEST_STANDING,
 ROUNDED = 0.35  # cells: such a deviation has every straight row of cells
 TALL = 0.2  # height over width, from which something stands or is sunk; of what is wider than LARGEST: over that
 STEEP, WALL = 1.0, 0.5  # a slope that loose ground does not keep, and share of a thing's rim that rises by more
+LEAST_RISE = 4.0  # cells: lower things are too near to the errors of a draft
 SPECK = 1 / 44  # of the side: width of the median of the heights, which a draft has with specks
 HIDDEN = 0.1  # of the ground around a cell, from which something stands there, not only in a noisy height
 WIDEST, WIDER = 0.7, 1.5  # of the side: width of the widest thing; ratio of the widths that are tried
 TOUCHED = 0.2  # of a thing, and of what is around it, that may be on other things that stand or was never seen
-LONG, STRAIGHT = 0.4, 0.05  # of a thing's size: length of a straight cut; and of that: its deviation from a line
+LONG, STRAIGHT = 0.5, 0.055  # of a thing's size: length of a straight cut; and of that: its deviation from a line
 UNSEEN = 45.0  # degrees from the vertical that photos are taken to have looked from, where that is not known
 STANDS, SUNK, CUT, ABOVE = "stands", "sunk", "cut off", "from above"
 WORDS = {
@@ -82,10 +83,11 @@ def find_steep_things(top: Float[Array, "m m"], low: Float[Array, "m m"]) -> lis
     """
     m, found = len(top), np.zeros(top.shape, bool)
     width = SMALLEST_STANDING * m
-    wall, least = top - limit_slope(low, STEEP) > TALL * width, width / 2
+    wall, least = top - limit_slope(low, STEEP) > max(LEAST_RISE, TALL * width), width / 2
     while width < WIDEST * m:
-        hat = top - grey_opening(low, 2 * round(width / 2) + 1)
-        pieces, number = label(find_wide_parts(hat > TALL * min(width, LARGEST * m), least))
+        side = 2 * round(width / 2) + 1
+        hat = top - grey_opening(low, (side, side))
+        pieces, number = label(find_wide_parts(hat > max(LEAST_RISE, TALL * min(width, LARGEST * m)), least))
         for k in range(1, number + 1):
             own = pieces == k
             rim = own & binary_dilation(~own, iterations=RING)
