@@ -83,7 +83,7 @@ def find_steep_things(top: Float[Array, "m m"], low: Float[Array, "m m"]) -> lis
     """
     m, found = len(top), np.zeros(top.shape, bool)
     width = SMALLEST_STANDING * m
-    wall, least = top - limit_slope(low, STEEP) > max(LEAST_RISE, TALL * width), width / 2
+    wall, least = top - limit_slope(low, STEEP) > TALL * width, width / 2
     while width < WIDEST * m:
         side = 2 * round(width / 2) + 1
         hat = top - grey_opening(low, (side, side))
