@@ -113,6 +113,7 @@ def test_the_judgement_says_what_was_found_how_good_it_is_and_what_would_help(tm
     weak = {"grade": "marginal", "reason": "material0 has little: photograph 2.0 times as much of it"}
     materials = {"excluded": 0.07, "objects": [{}], "materials": [{"share": 0.4, "verdict": weak}]}
     materials["materials"].append({"share": 0.6, "verdict": {"grade": "good", "reason": ""}})
+    materials["left_out"] = [{"reason": "cut off", "share": 0.02}]
     metrics = {"psnr_colour_corrected": 20.0, "windows": {"psnr_colour_corrected": 26.0, "test_views": [{}, {}]}}
     paths = [tmp_path / name for name in ("ground.json", "materials.json", "metrics.json")]
     write_scene_frame(paths[0], scene_frame(kind="photos", **about))
@@ -121,6 +122,7 @@ def test_the_judgement_says_what_was_found_how_good_it_is_and_what_would_help(tm
     said = judgement.judge_terrain(*paths)
     assert said == [
         "Found 2 kinds of ground (60%, 40%). 7% of it is shown nowhere (dark in materials.png).",
+        "Left out: 1 thing cut off at a border (2%).",
         "1 thing on it is scattered over the terrain (to leave it out: `materials: {exclude: MASK.png}` in scene.yaml, "
         "see docs/photos.md).",
         "4 of 5 photos are used; not a.jpg.",
@@ -128,6 +130,9 @@ def test_the_judgement_says_what_was_found_how_good_it_is_and_what_would_help(tm
         "The camera poses are doubtful, since photos look aside.",
         "The kind that covers 40% was photographed on a small area: photograph 2.0 times as much of it.",
     ]
+    (tmp_path / "report.html").write_text("<body><p>photos</p></body>\n")
+    make.add_to_report(tmp_path / "report.html", ["One & all."], tmp_path / "made.html")
+    assert "<li>One &amp; all.</li>\n</ul>\n</body>\n" in (tmp_path / "made.html").read_text()
     paths[2].write_text('{"psnr": null, "test_views": []}')
     assert "was not measured (--test 2" in judgement.judge_terrain(paths[0], None, paths[2])[1]
 

@@ -96,7 +96,7 @@ def test_a_field_without_a_ground_layer_or_of_which_nothing_is_left_is_tiled_as_
     field = made.field()
     field = replace(field, ground=field.ground & has_layer)
     nowhere = replace(found.classes, excluded=np.ones_like(found.classes.excluded))
-    monkeypatch.setattr(build, "classify_ground", lambda maps, masks: nowhere)
+    monkeypatch.setattr(build, "classify_ground", lambda *given: nowhere)
     whole = build.find_materials(field, made.grid(), 0)
     assert [each.field is field for each in whole.materials] == [True] and not whole.objects
     assert "all of the ground is tiled as one" in caplog.text
@@ -107,7 +107,7 @@ def test_a_material_of_which_next_to_nothing_is_left_is_left_out(found, monkeypa
     grass = classes.materials == 1
     few = grass & (np.cumsum(grass.ravel()).reshape(grass.shape) <= 0.02 * grass.size)
     monkeypatch.setattr(
-        build, "classify_ground", lambda maps, masks: replace(classes, excluded=classes.excluded | grass & ~few)
+        build, "classify_ground", lambda *given: replace(classes, excluded=classes.excluded | grass & ~few)
     )
     left, whole = build.find_materials(made.field(), made.grid(), 0), classes.source(0)
     assert [each.info.name for each in left.materials] == [classes.names[0]]

@@ -49,15 +49,6 @@ def test_what_is_no_object_is_excluded(cells, options):
     assert not footprints and excluded[things].mean() > 0.85 and not excluded[~things].any()
 
 
-@pytest.mark.parametrize(("rise", "found"), [(8.0, 1), (16.0, 0)])
-def test_things_that_are_taller_than_wide_are_no_objects(rise, found):
-    own = box(50, 60, 40, 50)
-    ground = around(own)
-    ground.rise[own] = rise
-    footprints, excluded = objects.find_footprints([own], own, ground)
-    assert len(footprints) == found and excluded[55, 45] == (not found)
-
-
 def test_specks_stay_texture_and_on_rough_ground_so_does_the_largest_of_many():
     footprints, excluded = find(box(50, 52, 50, 52))
     assert not footprints and not excluded.any()

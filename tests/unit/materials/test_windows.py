@@ -83,12 +83,14 @@ def test_a_material_and_objects_are_cut_from_fitted_windows(plan, tmp_path):
         np.testing.assert_array_equal(ours.field.means, theirs.field.means)
     assert found.tile_side == pytest.approx(usual.tile_side)
     assert all(each.grid.cells == made.CELLS for each in found.materials)
+    maps = replace(plan.maps, tilt=np.full((made.CELLS, made.CELLS), 30.0))
     focus = windows.Focus([windows.FitWindow(Square(0.0, 0.0, SIDE), True)], made.SPACING, 0.07)
-    windows.write_windows(whole.windows, focus, plan.maps, tmp_path / "w")
+    windows.write_windows(whole.windows, focus, maps, tmp_path / "w")
     read = windows.read_windows(tmp_path / "w")
     assert read.tiled == [True] and read.maps.exemplar == plan.maps.exemplar
     np.testing.assert_allclose(read.maps.colour, plan.maps.colour, atol=1e-6)
     np.testing.assert_array_equal(read.maps.known, plan.maps.known)
+    np.testing.assert_allclose(read.maps.tilt, 30.0)
     np.testing.assert_array_equal(read.windows[0][0].means, field.means)
 
 
@@ -106,6 +108,8 @@ def test_sharper_maps_have_the_colours_of_the_photos():
     blurred = replace(made.maps(shrubs=False), colour=np.full((made.CELLS, made.CELLS, 3), 0.5))
     maps = sharpen_maps(blurred, seen, 192)
     assert maps.cells == 192 and maps.exemplar.spacing * 192 == pytest.approx(SIDE)
+    corner = np.hypot(6.4, 6.4) - 0.05  # from below the photo to the middle of the last cell
+    assert maps.tilt is not None and maps.tilt.max() == pytest.approx(np.degrees(np.arctan2(corner, 12.0)), abs=1.0)
     middle = np.s_[60:130, 60:130]
     wanted = np.where(maps_of_truth(192)[middle][..., None], made.GRASS, made.SAND)
     assert np.abs(maps.colour[middle] - wanted).mean() < 0.06

@@ -8,6 +8,7 @@ from typing import Any
 
 from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
+from dav_gswt.materials.left_out import describe_left_out
 
 # PSNR of test photos, after their exposure is fitted, from which a grade holds
 GRADES = ((30.0, "very good"), (25.0, "good"), (20.0, "fair: softer than they are"))
@@ -36,6 +37,8 @@ def describe_ground(found: Mapping[str, Any] | None) -> list[str]:
     said, left_out = ["Found one kind of ground." if len(shares) == 1 else f"Found {kinds}."], found["excluded"]
     if left_out >= 0.01:
         said[0] += f" {left_out:.0%} of it is shown nowhere (dark in materials.png)."
+    if phrases := describe_left_out(found["left_out"]):
+        said.append(f"Left out: {', '.join(phrases)}.")
     if things := len(found["objects"]):
         count, which = ("1 thing on it is", "it") if things == 1 else (f"{things} things on it are", "some")
         mask = f"to leave {which} out: `materials: {{exclude: MASK.png}}` in scene.yaml, see docs/photos.md"

@@ -5,6 +5,7 @@ be edited and run again, and `results`, the files of all stages.
 """
 
 import argparse
+import html
 import os
 import shlex
 import shutil
@@ -203,14 +204,22 @@ def collect_results(out: Path, settings: dict[str, Any]) -> Made:
     link_file(terrain / STILL, out / "terrain.png")
     link_file(round_folder / "field.ply", out / "field.ply")
     report = out / "report.html" if (photos / "report.html").is_file() else None
-    if report:
-        link_file(photos / "report.html", report)
     materials = out / stage_folder("materials", branch) / "materials.json"
     if materials.is_file():
         link_file(materials.with_name("materials.png"), out / "materials.png")
     metrics = round_folder / "metrics.json"
     said = judge_terrain(photos / "ground.json", *(each if each.is_file() else None for each in (materials, metrics)))
+    if report:
+        add_to_report(photos / "report.html", said, report)
     return Made(out / "page", out / "terrain.png", out / "field.ply", report, out / SCENE_FILE, tuple(said))
+
+
+def add_to_report(page: Path, sentences: list[str], target: Path) -> None:
+    """The page on the photos with what was made of them at its end."""
+    said = "".join(f"<li>{html.escape(sentence)}</li>\n" for sentence in sentences)
+    body, end = page.read_text(encoding="utf-8").rsplit("</body>", 1)
+    with atomic_file(target) as part:
+        part.write_text(f"{body}<h2>What was made of them</h2>\n<ul>\n{said}</ul>\n</body>{end}", encoding="utf-8")
 
 
 def link_file(source: Path, target: Path) -> None:

@@ -13,11 +13,12 @@ from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
-from dav_gswt.materials import extraction, outlines, segmentation
+from dav_gswt.materials import extraction, left_out, outlines, segmentation
 from dav_gswt.materials.borders import measure_bend, measure_fray
 from dav_gswt.materials.classes import GroundClasses, classify_ground
 from dav_gswt.materials.filling import fill_cells
-from dav_gswt.materials.maps import HALF, GroundMaps, measure_ground, read_masks, resample
+from dav_gswt.materials.left_out import LeftOut
+from dav_gswt.materials.maps import HALF, GroundMaps, measure_ground, read_masks, resample, unite
 from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import compose, energy, layout, patches, texture
@@ -85,6 +86,7 @@ class FoundMaterials:
     materials: list[Material]
     objects: list[ExtractedObject]
     verdict: MaterialVerdict
+    left_out: tuple[LeftOut, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,7 @@ class GroundPlan:
         sources: the cells that each material is made of; none of a material that is left out.
         tile_side: in cells.
         whole: all of the ground is one material, and is tiled as it is.
+        left_out: things that stand or are sunk, are cut off, or were seen from above only.
     """
 
     maps: GroundMaps
@@ -103,6 +106,7 @@ class GroundPlan:
     sources: list[Bool[Array, "m m"]]
     tile_side: float
     whole: bool = False
+    left_out: tuple[LeftOut, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -162,18 +166,25 @@ def plan_ground(maps: GroundMaps, layered: bool, mask_files: Mapping[str, Path |
         _log.warning("materials: this field has no ground layer: all of the ground is tiled as one")
         return _plan_whole(maps)
     masks = read_masks(mask_files, maps.cells) if mask_files else None
-    classes = classify_ground(maps, masks)
+    relief = [] if masks and masks.materials else left_out.find_relief(maps)  # people may name what stands
+    standing = unite([cells for _, cells in relief], maps.known.shape)
+    classes = classify_ground(maps, masks, standing)
     free = replace(maps, known=maps.known & ~classes.excluded)
-    refined = replace(classes, footprints=outlines.refine_footprints(free, classes.footprints))
+    refined = outlines.refine_footprints(free, classes.footprints)
+    kept, flawed = left_out.drop_flawed(refined, maps, ~maps.known | standing, classes.excluded)
     # what stood out beside the closer outlines is shown nowhere
-    classes = replace(refined, excluded=classes.excluded | (classes.occupied & ~refined.occupied))
+    before, classes = classes, replace(classes, footprints=kept)
+    classes = replace(classes, excluded=before.excluded | (before.occupied & ~classes.occupied))
+    lost = tuple(LeftOut(reason, float(cells.mean())) for reason, cells in [*relief, *flawed])
+    for phrase in left_out.describe_left_out([vars(each) for each in lost]):
+        _log.info("left out: %s", phrase)
     sources = [_ignore_scarce(classes, k) for k in range(classes.number)]
     if all(source.all() for source in sources) and masks is None:
         return _plan_whole(maps)
     if not any(source.any() for source in sources):
         _warn_of_nothing()
         return _plan_whole(maps)
-    return GroundPlan(maps, classes, sources, choose_tile_side(maps, sources))
+    return GroundPlan(maps, classes, sources, choose_tile_side(maps, sources), left_out=lost)
 
 
 def _warn_of_nothing() -> None:
@@ -213,7 +224,7 @@ def find_materials(
     materials = [replace(each, info=replace(each.info, share=each.info.share / total)) for each in kept.values()]
     objects = _extract_objects(plan, field, grid, {k: place for place, k in enumerate(kept)}, focused)
     side = plan.tile_side * plan.maps.exemplar.spacing / materials[0].grid.spacing
-    return _report(plan.maps, plan.classes, side, materials, objects)
+    return replace(_report(plan.maps, plan.classes, side, materials, objects), left_out=plan.left_out)
 
 
 @dataclass(frozen=True)

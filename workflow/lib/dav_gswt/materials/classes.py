@@ -66,22 +66,26 @@ class GroundClasses:
         return count / max(count.sum(), 1)
 
 
-def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> GroundClasses:
+def classify_ground(
+    maps: GroundMaps, masks: GroundMasks | None = None, relief: Bool[Array, "m m"] | None = None
+) -> GroundClasses:
     """Find materials and objects.
 
     A class is a material if it is wide somewhere, common enough, and not the shade of another; at most
     MAX_MATERIALS are kept, the largest. If no class is one, all of the ground is one material. Other
     cells are objects or excluded ground.
     masks: drawn by people. Materials that they name are taken as they are, and the rest is excluded.
+    relief: what stands or is sunk: excluded, and it makes no class common or wide.
     """
     sun = None if masks and masks.materials else shading.fit_sun(maps)  # shade that is named is kept
     maps = maps if sun is None else shading.even_light(maps, sun)
+    relief = np.zeros_like(maps.known) if relief is None else relief
     features = segmentation.describe_cells(maps.colour)
     if masks and masks.materials:
         classes, names = masks.label()
         ground = _LabelledGround(classes, list(range(len(names))), names, np.zeros(classes.shape, bool), [])
     else:
-        ground = _segment_ground(maps, features[..., -1])
+        ground = _segment_ground(maps, features[..., -1], relief)
     known = maps.known & (ground.classes != NO_CLASS)
     maps = replace(maps, known=known & ~masks.excluded if masks else known)
     around = _describe_surroundings(maps, features[..., :3], ground)
@@ -92,8 +96,8 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
         kinds[strip] = len(ground.chosen) + place
     taken = unite([each.cells for each in footprints], known.shape) | excluded | around.strips
     if masks is None and around.rough == {0} and len(ground.chosen) == 1 and taken.mean() < LITTLE:
-        return GroundClasses(around.materials, kinds, [], ~maps.known, ground.names)
-    wide = _widen(excluded & maps.known | around.strips, footprints) | ~maps.known
+        return GroundClasses(around.materials, kinds, [], ~maps.known | relief, ground.names)
+    wide = _widen(excluded & maps.known | around.strips | relief, footprints) | ~maps.known
     return GroundClasses(around.materials, kinds, footprints, wide, ground.names)
 
 
@@ -108,14 +112,14 @@ class _LabelledGround:
     strips: list[Bool[Array, "m m"]]
 
 
-def _segment_ground(maps: GroundMaps, contrast: Float[Array, "m m"]) -> _LabelledGround:
+def _segment_ground(maps: GroundMaps, contrast: Float[Array, "m m"], relief: Bool[Array, "m m"]) -> _LabelledGround:
     """Ground by its looks: the segmentation with the most materials, since a start of k-means may hide one in another.
 
-    contrast: of the grain around each cell.
+    contrast: of the grain around each cell. relief: see `classify_ground`.
     """
     found = []
     for classes, strips in segmentation.list_segmentations(maps.colour):
-        apart = np.where(unite(strips, classes.shape), NO_CLASS, classes)
+        apart = np.where(unite([*strips, relief], classes.shape), NO_CLASS, classes)
         found.append((classes, strips, choose_materials(apart, maps.colour, contrast)))
     classes, strips, chosen = max(found, key=lambda each: len(each[-1]))  # of several the first: it explains most
     names = [f"material{k}" for k in range(len(chosen))]
@@ -193,13 +197,13 @@ def find_growth(classes: Int[Array, "m m"], chosen: list[int]) -> Bool[Array, "m
     widths = {number: _measure_width(classes == number) for number in range(int(classes.max()) + 1)}
     narrow = [number for number, width in widths.items() if width < LEAST_WIDTH * m and number not in chosen]
     growth = np.isin(classes, narrow)
-    wooded = _find_wide_parts(growth, WOOD * m).sum() > WOODED * growth.sum()
+    wooded = find_wide_parts(growth, WOOD * m).sum() > WOODED * growth.sum()
     if wooded and max(widths[number] for number in chosen) >= LEAST_WIDTH * m:
-        growth &= ~_find_wide_parts(growth, CROWNS * m)
+        growth &= ~find_wide_parts(growth, CROWNS * m)
     return growth if growth.mean() > objects.DENSE else np.zeros_like(growth)
 
 
-def _find_wide_parts(cells: Bool[Array, "m m"], width: float) -> Bool[Array, "m m"]:
+def find_wide_parts(cells: Bool[Array, "m m"], width: float) -> Bool[Array, "m m"]:
     """Cells of a region that lie in a disc of some diameter within it (its opening); it goes on beyond the border."""
     inner = distance_transform_edt(cells) >= width / 2
     return cells & (distance_transform_edt(~inner) < width / 2) if inner.any() else inner

@@ -39,6 +39,7 @@ class GroundMaps:
         cover: share of a cell that is hidden by what stands there.
         known: cells that a photo saw.
         exemplar: its place and the width of its cells.
+        tilt: the widest angle from the vertical, in degrees, that a photo saw a cell from; None: not known.
     """
 
     colour: Float[Array, "m m 3"]
@@ -47,6 +48,7 @@ class GroundMaps:
     cover: Float[Array, "m m"]
     known: Bool[Array, "m m"]
     exemplar: Exemplar
+    tilt: Float[Array, "m m"] | None = None
 
     @property
     def cells(self) -> int:
@@ -56,7 +58,7 @@ class GroundMaps:
         """The maps of a square within the exemplar."""
         own, box = self.exemplar, np.s_[row : row + cells, column : column + cells]
         corner = own.west + column * own.spacing, own.south + row * own.spacing
-        maps = {name: value[box] for name, value in vars(self).items() if name != "exemplar"}
+        maps = {name: value[box] for name, value in vars(self).items() if isinstance(value, Array)}
         return replace(self, **maps, exemplar=Exemplar(*corner, own.spacing, cells))
 
 
@@ -126,10 +128,25 @@ def sharpen_maps(maps: GroundMaps, views: list[TrainingView], cells: int = PLANN
     coarse = resample_maps(maps, fine)
     middles = (np.arange(cells) + 0.5) * fine.spacing
     x, y = np.meshgrid(place.west + middles, place.south + middles)
-    colour, seen = median_colours(np.stack([x.ravel(), y.ravel(), coarse.surface.ravel()], 1), views)
+    points = np.stack([x.ravel(), y.ravel(), coarse.surface.ravel()], 1)
+    colour, seen = median_colours(points, views)
     colour = np.where(seen[:, None], colour, coarse.colour.reshape(-1, 3)).reshape(cells, cells, 3).astype(float)
     known = coarse.known & seen.reshape(cells, cells)
-    return replace(coarse, colour=np.clip(colour, 0, 1), known=known if known.any() else np.ones_like(known))
+    known = known if known.any() else np.ones_like(known)
+    tilt = measure_tilt(points, views).reshape(cells, cells)
+    return replace(coarse, colour=np.clip(colour, 0, 1), known=known, tilt=tilt)
+
+
+def measure_tilt(points: Float[Array, "n 3"], views: Sequence[TrainingView]) -> Float[Array, "n"]:
+    """The widest angle from the vertical, in degrees, from which a photo looks at each point; 0 where none does."""
+    widest = np.zeros(len(points))
+    for camera in (view.camera for view in views):
+        pixel, depth = camera.project(points)
+        inside = (depth > 0) & (pixel >= 0).all(1) & (pixel < [camera.width, camera.height]).all(1)
+        way = camera.centre - points
+        angle = np.degrees(np.arctan2(np.hypot(way[:, 0], way[:, 1]), way[:, 2]))
+        widest = np.where(inside, np.maximum(widest, angle), widest)
+    return widest
 
 
 def resample(layer: Array, place: Exemplar, at: Exemplar) -> Float[Array, "n n"]:
@@ -148,7 +165,8 @@ def resample_maps(maps: GroundMaps, at: Exemplar) -> GroundMaps:
         resample(layer, maps.exemplar, at) for layer in (maps.height, maps.surface, maps.cover, maps.known)
     )
     colour = np.stack([resample(layer, maps.exemplar, at) for layer in np.moveaxis(maps.colour, -1, 0)], -1)
-    return GroundMaps(colour, height, surface, cover, known >= HALF, at)
+    tilt = None if maps.tilt is None else resample(maps.tilt, maps.exemplar, at)
+    return GroundMaps(colour, height, surface, cover, known >= HALF, at, tilt)
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,6 @@ MIN_FILL = 0.35  # of its bounding box that an object fills
 MAX_STRETCH = 3.5  # length over width
 MIN_SOLIDITY, SPLIT_SOLIDITY = 0.7, 0.8  # of its convex hull that an object fills; below the second it is split
 RING = 3  # cells around an object
-SLENDER = 1.0  # height over width: what is taller was hardly seen from the side and would be a haze there
 OPEN, WITHIN = 0.45, 0.7  # share of these that is plain ground, and share of that which is its material's
 MANY = 0.5  # area of smaller things of a thing's colour over its own, from which it is the largest of many
 COMMON, NEAR = 0.15, 0.6  # share of a material that looks like a thing, from which it is texture; and how near that is,
@@ -94,7 +93,7 @@ def find_footprints(
     """Objects, and the cells of everything else that is no texture.
 
     Things at the border of the exemplar are cut off, so they are no objects; nor are things that are
-    long, frayed, large or taller than wide, lie between two materials, are small pieces of another
+    long, frayed or large, lie between two materials, are small pieces of another
     material, shade, or markers. On rough ground the largest of many specks, and a thing of a colour
     that much of the ground has, is texture.
 
@@ -194,13 +193,11 @@ def split_things(cells: Bool[Array, "m m"]) -> list[Bool[Array, "m m"]]:
 
 
 def _is_single(own: Bool[Array, "m m"], material: int, around: Surroundings) -> bool:
-    """Whether a thing is an object: compact, no taller than wide, and within ground of one material."""
+    """Whether a thing is an object: compact, and within ground of one material."""
     ring = binary_dilation(own, iterations=RING) & ~own
     plain = around.ground[ring]
     within = plain.mean() >= OPEN and (around.materials[ring] == material)[plain].mean() >= WITHIN
-    width = 2 * np.sqrt(own.sum() / np.pi)
-    stout = np.quantile(around.rise[own], 0.9) <= SLENDER * width
-    return bool(within and stout and _is_compact(own) and around.known[own].all() and not around.strips[ring].any())
+    return bool(within and _is_compact(own) and around.known[own].all() and not around.strips[ring].any())
 
 
 def _is_one_of_many(

@@ -19,6 +19,7 @@ from dav_gswt.files import atomic_folder, read_record, write_json
 from dav_gswt.images import figures, image_files
 from dav_gswt.lod.merge import merge_by_voxel
 from dav_gswt.materials.build import FoundMaterials, MaterialVerdict
+from dav_gswt.materials.left_out import LeftOut
 from dav_gswt.materials.model import MaterialInfo, ObjectLevels
 from dav_gswt.reconstruction import ground
 
@@ -55,6 +56,7 @@ class MaterialsReport:
         excluded: share of the exemplar that is shown nowhere.
         tile_side: of tiles of these materials, in cells, where a tiling leaves it open; None: by the texture.
         materials, objects: by number.
+        left_out: what stands or is sunk, is cut off, or was seen from above only, and is shown nowhere.
         provenance: of the files that they were made from.
     """
 
@@ -63,6 +65,7 @@ class MaterialsReport:
     tile_side: float | None
     materials: list[MaterialRecord]
     objects: list[ObjectRecord]
+    left_out: list[LeftOut]
     provenance: dict[str, Any]
 
 
@@ -88,6 +91,7 @@ def write_materials(found: FoundMaterials, folder: Path | str, provenance: dict[
             found.tile_side,
             [MaterialRecord(**vars(each.info), filled=each.filled, verdict=each.verdict) for each in found.materials],
             [ObjectRecord(each.name, each.material, each.radius, each.height, each.density) for each in found.objects],
+            list(found.left_out),
             provenance,
         )
         write_json(part / NAME, asdict(report))

@@ -1,7 +1,7 @@
 """Which squares of the ground are fitted at the photos' resolution: those that tiles and objects are cut from."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +65,10 @@ class _Box:
     def corners(self) -> Array:
         return np.array([[self.row, self.column], [self.row + self.side, self.column + self.side]])
 
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        return slice(self.row, self.row + self.side), slice(self.column, self.column + self.side)
+
     def contains(self, other: "_Box") -> bool:
         return bool((self.corners[0] <= other.corners[0]).all() and (self.corners[1] >= other.corners[1]).all())
 
@@ -78,12 +82,11 @@ def choose_windows(plan: GroundPlan, views: Sequence[TrainingView], settings: Fi
     least windows, cells are wider.
     """
     place = plan.maps.exemplar
-    pixels, quality = _measure_quality(plan, views)
+    widths, quality = _measure_quality(plan, views)
     kept = [k for k, own in enumerate(plan.sources) if own.any()]
     least = {k: _find_least_side(plan.sources[k], plan.tile_side) for k in kept}
     things = [_surround(each.cells) for each in plan.classes.footprints]
     cells = limit_discs(settings.max_gaussians)
-    fine = settings.spacing * float(np.min(pixels))
     most = {k: _find_largest_side(plan.sources[k], side) for k, side in least.items()}
     grown = max(most[k] / least[k] for k in kept)
     while True:
@@ -91,12 +94,13 @@ def choose_windows(plan: GroundPlan, views: Sequence[TrainingView], settings: Fi
         boxes = {k: _place_window(plan.sources[k] * quality, sides[k]) for k in kept}
         windows, tiled = _join_boxes(list(boxes.values()), things)
         area = sum((each.side * place.spacing) ** 2 for each in windows)
-        spacing = max(fine, float(np.sqrt(area / cells)))
-        if spacing <= fine or grown <= 1:
+        pixel = min(float(np.median(widths[box.slices])) for box in windows[:tiled])
+        spacing = max(settings.spacing * pixel, float(np.sqrt(area / cells)))
+        if spacing <= settings.spacing * pixel or grown <= 1:
             break
         grown = max(1.0, SHRUNK * grown)
     squares = [FitWindow(_to_square(plan, box), k < tiled) for k, box in enumerate(windows)]
-    return Focus(squares, spacing, fine / settings.spacing)
+    return Focus(squares, spacing, pixel)
 
 
 def _to_square(plan: GroundPlan, box: _Box) -> Square:
@@ -105,20 +109,21 @@ def _to_square(plan: GroundPlan, box: _Box) -> Square:
     return Square(west, south, box.side * place.spacing)
 
 
-def _measure_quality(plan: GroundPlan, views: Sequence[TrainingView]) -> tuple[Float[Array, "n"], Float[Array, "m m"]]:
-    """Widths of pixels at knots of the exemplar where photos look; and how well each cell is seen, about 1 at best."""
+def _measure_quality(
+    plan: GroundPlan, views: Sequence[TrainingView]
+) -> tuple[Float[Array, "m m"], Float[Array, "m m"]]:
+    """Width of a photo's pixel on each cell, and how well the cell is seen, 1 at best; from knots of the exemplar."""
     place, m = plan.maps.exemplar, plan.maps.cells
     step = m / KNOTS
     at = np.minimum(((np.arange(KNOTS) + 0.5) * step).astype(int), m - 1)
     x, y = np.meshgrid(place.west + (at + 0.5) * place.spacing, place.south + (at + 0.5) * place.spacing)
     points = np.stack([x.ravel(), y.ravel(), plan.maps.height[np.ix_(at, at)].ravel()], 1)
     width, count = measure_pixel_widths(points, views)
-    known = count > 0
-    seen = np.where(known, np.minimum(count, ENOUGH_VIEWS) / ENOUGH_VIEWS, 0)
-    best = np.nanmin(width)
-    quality = (seen * (best / np.where(known, width, np.inf)) ** 2).reshape(KNOTS, KNOTS)
+    width = np.where(count > 0, width, np.nanmax(width))
+    seen = np.minimum(count, ENOUGH_VIEWS) / ENOUGH_VIEWS
     index = np.minimum((np.arange(m) / step).astype(int), KNOTS - 1)
-    return width[known], quality[np.ix_(index, index)]
+    layers = (layer.reshape(KNOTS, KNOTS)[np.ix_(index, index)] for layer in (width, seen * (width.min() / width) ** 2))
+    return next(layers), next(layers)
 
 
 def _find_least_side(own: Bool[Array, "m m"], tile_side: float) -> int:
@@ -199,14 +204,14 @@ def map_windows(maps: GroundMaps, fitted: Sequence[FittedWindow]) -> GroundMaps:
         own = resample_maps(measure_ground(field, grid), Exemplar(*corner, place.spacing, cells))
         for name, layer in layers.items():
             layer[rows, columns] = getattr(own, name)[: rows.stop - rows.start, : columns.stop - columns.start]
-    return GroundMaps(**layers, exemplar=place)
+    return replace(maps, **layers)
 
 
 def write_windows(fitted: Sequence[FittedWindow], focus: Focus, maps: GroundMaps, folder: Path | str) -> None:
     """Write window{k}.ply, its grid window{k}.exr, maps.exr and windows.json; the folder appears whole or not."""
     place = maps.exemplar
     layers = dict(zip("RGB", np.moveaxis(maps.colour, -1, 0), strict=True))
-    layers |= {name: getattr(maps, name) for name in LAYERS}
+    layers |= {name: getattr(maps, name) for name in LAYERS} | ({} if maps.tilt is None else {"tilt": maps.tilt})
     with atomic_folder(folder) as part:
         for number, (field, grid) in enumerate(fitted):
             write_field(field, part / f"window{number}.ply")
@@ -229,4 +234,5 @@ def read_windows(folder: Path | str) -> FocusedFields:
     height, surface, cover, known = (layers[name] for name in LAYERS)
     place = Exemplar(west, south, spacing, len(known))
     colour = np.dstack([layers[name] for name in "RGB"])
-    return FocusedFields(fields, tiled, GroundMaps(colour, height, surface, cover, known > 0, place))
+    maps = GroundMaps(colour, height, surface, cover, known > 0, place, layers.get("tilt"))
+    return FocusedFields(fields, tiled, maps)
