@@ -165,3 +165,14 @@ def test_python_makes_a_terrain_as_the_command_does(folder, monkeypatch):
     monkeypatch.setattr(make, "run_scene", lambda *_: 1)
     with pytest.raises(InputError, match="no terrain was made"):
         dav_gswt.make("pit")
+
+
+def test_the_judgement_says_from_how_high_the_ground_looks_sharp():
+    manifest, windows = {"eye_floor": 1.96}, {"cell": 0.021, "pixel": 0.014}
+    (said,) = judgement.describe_sharpness("metre", windows, manifest)
+    assert said == (
+        "The ground looks sharp from 2 m above it: its cells (2.1 cm) are 1.5 times as wide as pixels of the photos."
+    )
+    (said,) = judgement.describe_sharpness("flying height", None, manifest)
+    assert said == "The ground looks sharp from 2 camera heights above it."
+    assert not judgement.describe_sharpness("metre", windows, None)

@@ -18,14 +18,31 @@ ENOUGH_PHOTOS = 20
 AGAIN = "Photograph the ground again, sharply, with one camera and zoom, while nothing moves"
 
 
-def judge_terrain(frame: Path, materials: Path | None, metrics: Path | None) -> list[str]:
-    """Sentences on a finished terrain. frame: ground.json. materials: materials.json. metrics: of the last round.
+def judge_terrain(
+    frame: Path, materials: Path | None, metrics: Path | None, windows: Path | None = None, manifest: Path | None = None
+) -> list[str]:
+    """Sentences on a finished terrain.
 
-    Raises: InputError: a file is not readable.
+    frame: ground.json. materials: materials.json. metrics: of the last round. windows: windows.json. manifest:
+    davgswt.json. Raises: InputError: a file is not readable.
     """
     ground = read_scene_frame(frame)
-    found = read_json(materials) if materials else None
-    return [*describe_ground(found), *describe_photos(ground), *describe_quality(ground, metrics), *list_scarce(found)]
+    found, fitted, bundle = (read_json(path) if path else None for path in (materials, windows, manifest))
+    said = [*describe_ground(found), *describe_photos(ground), *describe_quality(ground, metrics)]
+    return said + describe_sharpness(ground.unit, fitted, bundle) + list_scarce(found)
+
+
+def describe_sharpness(unit: str, fitted: Mapping[str, Any] | None, bundle: Mapping[str, Any] | None) -> list[str]:
+    """From how high the ground looks sharp, and how its cells compare with the pixels of the photos."""
+    if bundle is None:
+        return []
+    metres = unit == "metre"
+    height = f"{bundle['eye_floor']:.2g} {'m' if metres else 'camera heights'}"
+    said = f"The ground looks sharp from {height} above it"
+    if fitted:
+        wide = f" ({100 * fitted['cell']:.2g} cm)" if metres else ""
+        said += f": its cells{wide} are {fitted['cell'] / fitted['pixel']:.1f} times as wide as pixels of the photos"
+    return [f"{said}."]
 
 
 def describe_ground(found: Mapping[str, Any] | None) -> list[str]:

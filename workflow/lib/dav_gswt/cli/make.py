@@ -207,8 +207,9 @@ def collect_results(out: Path, settings: dict[str, Any]) -> Made:
     materials = out / stage_folder("materials", branch) / "materials.json"
     if materials.is_file():
         link_file(materials.with_name("materials.png"), out / "materials.png")
-    metrics = round_folder / "metrics.json"
-    said = judge_terrain(photos / "ground.json", *(each if each.is_file() else None for each in (materials, metrics)))
+    read = (materials, round_folder / "metrics.json", round_folder / "windows/windows.json")
+    manifest = out / stage_folder("bundle", branch) / "davgswt.json"
+    said = judge_terrain(photos / "ground.json", *(each if each.is_file() else None for each in (*read, manifest)))
     if report:
         add_to_report(photos / "report.html", said, report)
     return Made(out / "page", out / "terrain.png", out / "field.ply", report, out / SCENE_FILE, tuple(said))
