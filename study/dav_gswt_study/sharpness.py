@@ -81,9 +81,8 @@ def compare_detail(field: GaussianField, views: list[TrainingView]) -> float:
     """Power above half the Nyquist frequency, field over photos: the median over squares that count whole."""
     shares = []
     for view in find_steepest(views):
-        boxes = list_boxes(view.weight, BLOCK)
-        seen = np.clip(render(field, view.camera).colour, 0, 1) if boxes else None
-        for box in boxes:
+        seen = np.clip(render(field, view.camera).colour, 0, 1)
+        for box in list_boxes(view.weight, BLOCK):
             photo, own = view.image[box], seen[box]
             own = metrics.correct_colours(own, photo, np.ones(photo.shape[:2], np.float32))
             shares.append(measure_fine_power(own) / max(measure_fine_power(photo), 1e-12))
