@@ -124,7 +124,7 @@ def is_windowed(values):
 
 
 def values_of_choice(values):
-    """The wildcards of the rounds that choose a field's photos and windows, which may be those of another preset."""
+    """The wildcards of the rounds that choose a field's photos and windows. Another preset may run these rounds."""
     return values | ({"preset": chooser_of(values["preset"])} if values["t"] or is_windowed(values) else {})
 
 
@@ -247,9 +247,7 @@ def windows_of_round(wildcards):
 
 
 def draft_of_windows(wildcards):
-    """The same of a rule that fits windows or measures them; nothing where there are none."""
-    if not is_windowed(wildcards):
-        return {}
+    """The draft field that windows are chosen by, and its ground."""
     folder = chosen_round(wildcards, int(wildcards.t))
     return {"draft": f"{folder}/field.ply", "draft_ground": f"{folder}/ground.exr"}
 

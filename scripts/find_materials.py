@@ -9,11 +9,12 @@ from dav_gswt.views import pose_maps
 
 with logging_to(snakemake.log[0]):
     paths, seed = snakemake.input, snakemake.params.seed
-    field = read_field(paths.field)
+    field, grid = read_field(paths.field), ground.read_ground(paths.ground)
+    focused = windows.read_windows(paths.windows) if paths.get("windows") else None
     if paths.get("maps"):  # scored by a prior: tiles use its uncertainty instead of the field's own
         field = pose_maps.apply_uncertainty(field, pose_maps.read_pose_maps(paths.maps)[1])
+        focused = windows.take_uncertainty(focused, field, grid) if focused else None
     masks = {name.removeprefix("mask_"): path for name, path in paths.items() if name.startswith("mask_")}
-    focused = windows.read_windows(paths.windows) if paths.get("windows") else None
-    found = build.find_materials(field, ground.read_ground(paths.ground), seed, masks, focused)
+    found = build.find_materials(field, grid, seed, masks, focused)
     provenance = record_provenance({"field": paths.field, "ground": paths.ground}, {"seed": seed})
     store.write_materials(found, snakemake.output.materials, provenance)

@@ -1,5 +1,7 @@
 """Rule fit_windows: the windows that tiles and objects are cut from, fitted to the photos that the rounds chose."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from dav_gswt.field import read_field, write_field
@@ -26,7 +28,8 @@ with logging_to(snakemake.log[0]):
     maps = sharpen_maps(measure_ground(draft.field, whole), photos)
     plan = build.plan_ground(maps, bool(draft.field.ground.any()), masks)
     focus, rng = windows.choose_windows(plan, photos, settings), np.random.default_rng([params.seed, params.t])
-    fitted = fit_windows(draft, photos, focus.windows, focus.spacing, settings, rng)
+    pairs = fit_windows(draft, photos, focus.windows, focus.spacing, settings, rng)
+    focus, fitted = replace(focus, windows=[window for window, _ in pairs]), [each for _, each in pairs]
     joined, parts = join_windows(draft, fitted), [(each.field, each.grid) for each in fitted]
     maps = windows.map_windows(maps, parts)
     windows.write_windows(parts, focus, maps, snakemake.output.windows)

@@ -159,7 +159,7 @@ def measure_crop_distances(
 def bootstrap_difference(
     before: Float[Array, "n"], after: Float[Array, "m"], rng: np.random.Generator
 ) -> tuple[float, float, float]:
-    """Mean of `after` less that of `before`, with the ends of its 95 % interval."""
+    """Difference of the means (`after` minus `before`), and the bounds of its 95 % bootstrap interval."""
     means = [rng.choice(part, (10_000, len(part))).mean(1) for part in (after, before)]
     low, high = np.quantile(means[0] - means[1], [0.025, 0.975])
     return float(after.mean() - before.mean()), float(low), float(high)

@@ -127,3 +127,15 @@ def test_windows_that_overlap_are_one_and_far_things_have_their_own():
     )
     assert tiled == 1 and [each.side for each in joined] == [44, 6, 6]
     assert [each.side for each in windows._merge_boxes([box(80, 80, 6), box(81, 82, 6)])] == [8]
+
+
+def test_windows_take_the_uncertainty_of_the_draft_that_a_prior_scored(plan):
+    """Half of the ground is uncertain by the prior; the windows' own is zero."""
+    field, grid = made.field(shrubs=False), made.grid()
+    east = field.means[:, 0] > SIDE / 2
+    scored = replace(field, uncertainty=np.where(east, 0.8, 0.1).astype(np.float32))
+    focused = build.FocusedFields([(field, grid)], [True], plan.maps)
+    (own, _), *_ = windows.take_uncertainty(focused, scored, grid).windows
+    inside = np.abs(field.means[:, 0] - SIDE / 2) > 3 * made.SPACING
+    inside &= grid.contains(field.means) & field.ground
+    np.testing.assert_allclose(own.uncertainty[inside], scored.uncertainty[inside], atol=0.05)

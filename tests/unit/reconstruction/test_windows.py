@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
+from dav_gswt.errors import InputError
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry.scene_frame import Square
 from dav_gswt.raster import make_rasterizer, render
@@ -27,7 +28,7 @@ def fitted():
     blurred = replace(made.field(COARSE), sh=0 * made.field(COARSE).sh)
     draft = Draft(blurred, COARSE, replace(made.FRAME, kind="synthetic"))
     found = windows.fit_windows(draft, made.photos(4, 96), [WINDOW], 0.05, SETTINGS, np.random.default_rng(0))
-    return draft, found[0]
+    return draft, found[0][1]
 
 
 def test_a_window_lies_in_its_square_in_whole_blocks_with_a_margin_and_the_heights_of_the_draft():
@@ -114,3 +115,22 @@ def test_masks_count_where_a_view_looks_at_a_square():
     masked = windows.mask_to_squares([view], [(0.0, 0.0, 3.2), (10.0, 10.0, 1.0)])[0]
     away = windows.mask_to_squares([view], [(10.0, 10.0, 1.0)])[0]
     assert 0.3 < masked.weight.mean() <= 1 and not away.weight.any()
+
+
+def test_an_objects_window_that_no_photo_shows_is_left_out_and_one_for_tiles_is_an_error():
+    draft = Draft(made.field(COARSE), COARSE, replace(made.FRAME, kind="synthetic"))
+    blind = [view.with_pixels(weight=0 * view.weight) for view in made.photos(2)]
+    thing = replace(WINDOW, tiled=False)
+    assert windows.fit_windows(draft, blind, [thing], 0.05, SETTINGS, np.random.default_rng(0)) == []
+    with pytest.raises(InputError, match="no photo shows the ground"):
+        windows.fit_windows(draft, blind, [WINDOW], 0.05, SETTINGS, np.random.default_rng(0))
+
+
+def test_photos_that_show_little_of_a_window_count_only_where_none_shows_more():
+    grid = windows.make_grid(COARSE, WINDOW, 0.05)
+    (whole,) = made.photos(1, 96)
+    part = np.zeros_like(whole.weight)
+    part[48:56, 48:56] = 1
+    little = whole.with_pixels(weight=part)
+    assert [view.image.shape[0] for view in windows.crop_views([little], grid)] == [8]
+    assert len(windows.crop_views([little, whole], grid)) == 1

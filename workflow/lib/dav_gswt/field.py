@@ -251,7 +251,7 @@ def _thicken(log_scales: Float[Array, "n m"]) -> Float[Array, "n 3"]:
 def _fuse_filter(columns: dict[str, Array]) -> None:
     """Fuse Mip-Splatting's 3D smoothing filter into deviations and opacities, in place: its `create_fused_ply`."""
     scales, size = _thicken(columns["log_scales"]).astype(float), columns.pop("filter_3D").astype(float)
-    with np.errstate(all="ignore"):  # what is not finite is refused with the rest
+    with np.errstate(all="ignore"):  # the checks below refuse values that are not finite
         wider = 0.5 * np.logaddexp(2 * scales, 2 * np.log(np.abs(size)))
         log_opacity = -np.logaddexp(0, -columns["opacity_logits"].astype(float)) + (scales - wider).sum(
             1, keepdims=True

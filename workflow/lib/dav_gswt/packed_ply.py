@@ -53,7 +53,7 @@ def _stretch(
 ) -> Float32[Array, "n 3"]:
     """Values from shares of what lies between the bounds of each group."""
     low, high = (np.stack([_require(bounds, f"{end}_{axis}", "f4") for axis in axes], 1) for end in ("min", "max"))
-    with np.errstate(all="ignore"):  # what is not finite is refused with the rest
+    with np.errstate(all="ignore"):  # the checks below refuse values that are not finite
         return low[group] * (1 - shares) + high[group] * shares
 
 

@@ -105,8 +105,8 @@ def write_gaps(out: Path, placed: PlacedPhotos, found: Gaps) -> list[str]:
 def plan_mission(path: Path, placed: PlacedPhotos, found: Gaps) -> str:
     """Write the mission that fills the gaps. Returns its path and length, or why there is none.
 
-    It starts below the photo that is nearest to the largest gap. Altitudes count from there, as those of the agent
-    `plan` do, so ground that slopes as a whole makes them wrong.
+    The drone takes off below the photo nearest to the largest gap. As in missions of the agent `plan`, altitudes are
+    relative to the takeoff point, so they are wrong where the ground slopes as a whole.
     """
     place, model, surface = placed.frame.georeference, placed.model, found.surface
     if place is None:

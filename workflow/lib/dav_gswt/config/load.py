@@ -46,8 +46,8 @@ def add_scene_files(config: dict, folder: Path, quietly: bool = False) -> dict:
 
     A file that is no scene is left out, with a warning unless `quietly`, if the config neither asks for its scene nor
     has keys of it.
-    Raises: InputError: the file that is asked for is no YAML, two have one name, or the config has a scene of that name
-    of another kind.
+    Raises: InputError: the requested file is not YAML, two files share a name, or the config already has a scene of
+    that name and of another kind.
     """
     scenes, own = {}, config.get("scenes") or {}
     for path in sorted(folder.glob("[!.]*.y*ml")):  # those with a dot are of an editor or a file system

@@ -106,7 +106,7 @@ class FocalLength:
 class SourceFrame:
     """Where the world lies in the file that it was imported from: a point p of the world is at origin + unit p @ axes.
 
-    Double precision: coordinates as large as those of UTM keep their millimetres.
+    Double precision keeps UTM coordinates accurate to the millimetre.
     """
 
     origin: tuple[float, float, float]

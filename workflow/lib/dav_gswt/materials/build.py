@@ -143,7 +143,7 @@ class FocusedFields:
 
 
 def find_cells(place: Exemplar, grid: Ground) -> tuple[slice, slice]:
-    """The cells of an exemplar whose middles lie in that of a grid."""
+    """The cells of an exemplar whose centres lie inside the exemplar of a grid."""
     west, south, side = grid.exemplar
     ends = [
         np.ceil((np.array([low, low + side]) - start) / place.spacing - 0.5).astype(int).clip(0, place.cells)

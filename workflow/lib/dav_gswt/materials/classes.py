@@ -8,7 +8,7 @@ from numpy import ndarray as Array
 from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
 from dav_gswt.materials import objects, segmentation, shading, standing
-from dav_gswt.materials.maps import NO_CLASS, GroundMaps, GroundMasks, Surroundings, unite
+from dav_gswt.materials.maps import NO_CLASS, GroundMaps, GroundMasks, Surroundings, find_wide_parts, unite
 from dav_gswt.materials.objects import Footprint, is_shade, linear_light
 
 MAX_MATERIALS = 4
@@ -201,12 +201,6 @@ def find_growth(classes: Int[Array, "m m"], chosen: list[int]) -> Bool[Array, "m
     if wooded and max(widths[number] for number in chosen) >= LEAST_WIDTH * m:
         growth &= ~find_wide_parts(growth, CROWNS * m)
     return growth if growth.mean() > objects.DENSE else np.zeros_like(growth)
-
-
-def find_wide_parts(cells: Bool[Array, "m m"], width: float) -> Bool[Array, "m m"]:
-    """Cells of a region that lie in a disc of some diameter within it (its opening); it goes on beyond the border."""
-    inner = distance_transform_edt(cells) >= width / 2
-    return cells & (distance_transform_edt(~inner) < width / 2) if inner.any() else inner
 
 
 def _measure_width(cells: Bool[Array, "m m"]) -> float:

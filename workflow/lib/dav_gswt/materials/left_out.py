@@ -22,8 +22,7 @@ from scipy.ndimage import (
     uniform_filter,
 )
 
-from dav_gswt.materials.classes import find_wide_parts
-from dav_gswt.materials.maps import HALF, GroundMaps, unite
+from dav_gswt.materials.maps import HALF, GroundMaps, find_wide_parts, unite
 from dav_gswt.materials.objects import BORDER, LARGEST, RING, SMALLEST_STANDING, Footprint
 
 ROUNDED = 0.35  # cells: such a deviation has every straight row of cells

@@ -102,6 +102,12 @@ def unite(parts: Sequence[Bool[Array, "m m"]], shape: tuple[int, ...]) -> Bool[A
     return np.any([np.zeros(shape, bool), *parts], axis=0)
 
 
+def find_wide_parts(cells: Bool[Array, "m m"], width: float) -> Bool[Array, "m m"]:
+    """Cells of a region that lie in a disc of some diameter within it (its opening); it goes on beyond the border."""
+    inner = distance_transform_edt(cells) >= width / 2
+    return cells & (distance_transform_edt(~inner) < width / 2) if inner.any() else inner
+
+
 def measure_ground(field: GaussianField, grid: Ground) -> GroundMaps:
     """The maps of a field's exemplar."""
     exemplar = Exemplar.from_grid(grid)

@@ -20,6 +20,7 @@ from scipy.ndimage import (
     label,
 )
 
+from dav_gswt.images.srgb import decode_srgb
 from dav_gswt.materials.maps import GroundMaps, Surroundings, unite
 
 AROUND = 1 / 10  # of the side: blur that gives the ground around a thing
@@ -260,7 +261,7 @@ def _clean(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"]:
 
 def linear_light(colour: Float[Array, "n 3"]) -> Float[Array, "3"]:
     """Mean linear light of sRGB colours."""
-    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4).mean(0)
+    return decode_srgb(colour).mean(0)
 
 
 def is_shade(light: Float[Array, "3"], other: Float[Array, "3"]) -> bool:

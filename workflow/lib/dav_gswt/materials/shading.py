@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from numpy import ndarray as Array
-from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.ndimage import gaussian_filter
 
 from dav_gswt.images.srgb import decode_srgb, encode_srgb
-from dav_gswt.materials.maps import GroundMaps
+from dav_gswt.materials.maps import GroundMaps, find_wide_parts
 
 _log = logging.getLogger(__name__)
 
@@ -62,7 +62,7 @@ def even_light(maps: GroundMaps, sun: Sun) -> GroundMaps:
     even = light / shading
     usual = gaussian_filter(even @ LUMINANCE, AROUND * maps.cells)
     dark = gaussian_filter(light @ LUMINANCE, RELIEF * maps.cells) < SHADE * usual
-    shade = _keep_wide(dark & (shading @ LUMINANCE < SHADE))
+    shade = find_wide_parts(dark & (shading @ LUMINANCE < SHADE), WIDE * maps.cells)
     return replace(maps, colour=encode_srgb(even), known=maps.known & ~shade)
 
 
@@ -109,10 +109,3 @@ def _average(layers: Float[Array, "m m c"], block: int) -> Float[Array, "k k c"]
     """Means of blocks of cells."""
     k = len(layers) // block
     return layers[: k * block, : k * block].reshape(k, block, k, block, -1).mean((1, 3))
-
-
-def _keep_wide(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"]:
-    """Cells of a region that lie in a disc of WIDE within it."""
-    radius = WIDE * len(cells) / 2
-    inner = distance_transform_edt(cells) >= radius
-    return cells & (distance_transform_edt(~inner) < radius) if inner.any() else inner

@@ -19,6 +19,7 @@ from dav_gswt.materials.objects import measure_size
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.fitting.plan import FitSettings, limit_discs
 from dav_gswt.reconstruction.ground import Ground, read_ground, write_ground
+from dav_gswt.reconstruction.top_view import render_top_view
 from dav_gswt.reconstruction.windows import FitWindow, measure_pixel_widths
 from dav_gswt.tiles.layout import Exemplar
 from dav_gswt.tiles.patches import box_sums
@@ -30,7 +31,7 @@ KNOTS = 16  # points along the exemplar's side where the width of a pixel is mea
 ENOUGH_VIEWS = 3  # photos of a place, of which more make it no better
 OWN = 0.5  # of a window that is its material, beyond the least window: what else is in it is fitted for nothing
 MOST = 0.8  # of what there is of a material: its window holds so much at most before it grows for variety
-AROUND_OBJECT = 2  # cells of the draft beside an object's skirt
+AROUND_OBJECT = 2  # cells of the maps beside an object's skirt
 SHRUNK = 0.97  # factor of the windows' sides, until they fit into the Gaussians allowed
 
 
@@ -55,7 +56,7 @@ class WindowsRecord:
 
 @dataclass(frozen=True)
 class _Box:
-    """A square in cells of the draft."""
+    """A square in cells of the maps."""
 
     row: int
     column: int
@@ -122,8 +123,8 @@ def _measure_quality(
     width = np.where(count > 0, width, np.nanmax(width))
     seen = np.minimum(count, ENOUGH_VIEWS) / ENOUGH_VIEWS
     index = np.minimum((np.arange(m) / step).astype(int), KNOTS - 1)
-    layers = (layer.reshape(KNOTS, KNOTS)[np.ix_(index, index)] for layer in (width, seen * (width.min() / width) ** 2))
-    return next(layers), next(layers)
+    pick, quality = np.ix_(index, index), seen * (width.min() / width) ** 2
+    return width.reshape(KNOTS, KNOTS)[pick], quality.reshape(KNOTS, KNOTS)[pick]
 
 
 def _find_least_side(own: Bool[Array, "m m"], tile_side: float) -> int:
@@ -191,6 +192,17 @@ def _enclose(one: _Box, two: _Box) -> _Box:
     """The smallest square about two."""
     low, high = np.minimum(one.corners[0], two.corners[0]), np.maximum(one.corners[1], two.corners[1])
     return _Box(int(low[0]), int(low[1]), int((high - low).max()))
+
+
+def take_uncertainty(focused: FocusedFields, draft: GaussianField, grid: Ground) -> FocusedFields:
+    """The windows with the uncertainty that a draft has there: a prior scores the draft, and tiles use its answer."""
+    above = render_top_view(draft, grid).uncertainty.astype(float)
+    layer = replace(grid, heights=above)
+    windows = [
+        (replace(field, uncertainty=layer.height_at(field.means).astype(np.float32)), own)
+        for field, own in focused.windows
+    ]
+    return replace(focused, windows=windows)
 
 
 def map_windows(maps: GroundMaps, fitted: Sequence[FittedWindow]) -> GroundMaps:

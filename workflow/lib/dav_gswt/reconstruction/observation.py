@@ -1,6 +1,7 @@
 """What the photos show of a scene before any fit: exposure, moving objects, relief, colours of the ground, and sky."""
 
 import logging
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -99,10 +100,12 @@ def ground_colours(
     return colour, known.reshape(grid.shape)
 
 
-def make_constraints(grid: Ground, relief: Relief, occluders: GaussianField, frame: SceneFrame) -> GroundConstraints:
-    """The constraints of a fit over this ground: how high objects may be, by cell."""
+def make_constraints(
+    grid: Ground, relief: Relief, occluders: GaussianField, frame: SceneFrame, **options: Any
+) -> GroundConstraints:
+    """The constraints of a fit over this ground: how high objects may be, by cell. options: of `GroundConstraints`."""
     ceiling = np.maximum(objects.compute_ceiling(grid, relief, occluders), MIN_CEILING * frame.flying_height)
-    return GroundConstraints(grid, ceiling)
+    return GroundConstraints(grid, ceiling, **options)
 
 
 def mask_to_ground(views: list[TrainingView], grid: Ground) -> list[TrainingView]:

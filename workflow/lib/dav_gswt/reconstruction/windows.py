@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
+from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry.scene_frame import SceneFrame, Square
 from dav_gswt.images import image_files
@@ -25,7 +26,6 @@ from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import FitPlan, FitReport, FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions
 from dav_gswt.reconstruction.ground import Ground, smooth
-from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 from dav_gswt.reconstruction.plane_sweep import sweep_heights
 
 _log = logging.getLogger(__name__)
@@ -94,22 +94,25 @@ def fit_windows(
     spacing: float,
     settings: FitSettings,
     rng: np.random.Generator,
-) -> list[Reconstruction]:
-    """Fit each window to the photos that show it, with cells of one width.
+) -> list[tuple[FitWindow, Reconstruction]]:
+    """Fit each window to the photos that show it, with cells of one width. An object that no photo shows is left out.
 
     Args:
         views: all photos of the draft at their full size, as `observation.observe` leaves them.
         spacing: width of the ground's cells, world units.
-        settings: its steps are those of a fit to all of these photos, its Gaussians those of all windows together.
+        settings: its steps are for a fit to all of these photos, its Gaussians for all windows together.
+    Raises: InputError: no photo shows a window that tiles are cut from.
     """
     grids = [make_grid(draft.grid, window, spacing) for window in windows]
     total = sum(grid.heights.size for grid in grids)
     fitted = []
-    for number, grid in enumerate(grids):
-        share = settings.max_gaussians * grid.heights.size / total
-        name = f"fit window {number + 1} of {len(grids)}"
-        fitted.append(_fit_window(draft, grid, views, replace(settings, max_gaussians=int(share)), rng, name))
-    return fitted
+    for number, (window, grid) in enumerate(zip(windows, grids, strict=True)):
+        own = replace(settings, max_gaussians=int(settings.max_gaussians * grid.heights.size / total))
+        name, seen = f"fit window {number + 1} of {len(grids)}", crop_views(views, grid)
+        if not seen and window.tiled:
+            raise InputError("no photo shows the ground that tiles are cut from: take photos of it, or use fewer masks")
+        fitted.append((window, _fit_window(draft, grid, views, seen, own, rng, name)) if seen else None)
+    return [each for each in fitted if each is not None]
 
 
 def make_grid(ground: Ground, window: FitWindow, spacing: float) -> Ground:
@@ -138,16 +141,14 @@ def _fit_window(
     draft: Draft,
     grid: Ground,
     views: list[TrainingView],
+    seen: list[TrainingView],
     settings: FitSettings,
     rng: np.random.Generator,
     name: str,
 ) -> Reconstruction:
-    """The field of one window, without what surrounds it."""
+    """The field of one window, without what surrounds it. views: all photos; seen: their parts that show the window."""
     plan = settings.plan_coarse_fit(len(views))
     around = draft.field[~grid.contains(draft.field.means)]
-    masked = observation.mask_for_fit(views, grid)
-    cropped = [crop_view(view, _middle(grid), grid.spacing / FINEST) for view in one_by_one(masked)]
-    seen = [view for view in cropped if view is not None]
     relief = sweep_heights(grid, seen, draft.frame.flying_height, grid.spacing / settings.spacing)
     shell = objects.make_shell(relief, seen)
     room = max(0, settings.max_gaussians - grid.heights.size - discs.count_underlay(grid))
@@ -161,8 +162,8 @@ def _fit_window(
     said = "%s: %d x %d cells of %.4g %s, %.1f times as wide as a pixel; %d photos"
     width = measure_pixel_widths(grid.centres[:: max(1, grid.heights.size // 100)], views)[0]
     _log.info(said, name, *grid.shape, grid.spacing, draft.frame.unit, grid.spacing / np.nanmedian(width), len(seen))
-    held = observation.make_constraints(grid, relief, occluders, draft.frame)
-    constraints = GroundConstraints(grid, held.ceiling.heights, SMOOTHING, len(around))
+    held = dict(smoothing=SMOOTHING, frozen=len(around))
+    constraints = observation.make_constraints(grid, relief, occluders, draft.frame, **held)
     steps = max(1, round(plan.steps * len(seen) / max(1, len(views))))
     plan = FitPlan(steps, settings.max_gaussians + len(around), settings.sh_degree)
     fit = trainer.fit_field(start, seen, plan, constraints, rng, FitOptions(name))
@@ -181,18 +182,26 @@ def _match_harmonics(field: GaussianField, like: GaussianField) -> GaussianField
     return replace(field, sh=sh)
 
 
+def crop_views(views: list[TrainingView], grid: Ground) -> list[TrainingView]:
+    """The parts of views that show a window: of those that show LEAST_PIXELS of it, or else of any that show some."""
+    masked = observation.mask_for_fit(views, grid)
+    many = [view for view in masked if (view.weight > 0).sum() >= LEAST_PIXELS]
+    cropped = [crop_view(view, _middle(grid), grid.spacing / FINEST) for view in one_by_one(many or masked)]
+    return [view for view in cropped if view is not None]
+
+
 def _middle(grid: Ground) -> Float[Array, "3"]:
     west, south, side = grid.exemplar
     return np.array([west + side / 2, south + side / 2, np.median(grid.heights)])
 
 
 def crop_view(view: TrainingView, at: Float[Array, "3"], pixel: float) -> TrainingView | None:
-    """The part of a view that counts, shrunk where its pixels are finer than `pixel`; None where hardly any counts.
+    """The part of a view that counts, shrunk where its pixels are finer than `pixel`; None where none counts.
 
     at: the point of the ground whose pixels are meant. pixel: width on the ground, world units.
     """
     counts = view.weight > 0
-    if counts.sum() < LEAST_PIXELS:
+    if not counts.any():
         return None
     rows, columns = (np.flatnonzero(counts.any(axis)) for axis in (1, 0))
     box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
