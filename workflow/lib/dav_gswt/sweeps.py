@@ -25,8 +25,9 @@ def tabulate_cell(cell: dict) -> dict:
     """Make the row of a cell; what was not measured is None.
 
     Columns: `psnr_is`, colour-corrected for photos, whose exposure changes, and else raw; `uncertainty`, the mean over
-    the tiles; `deep`, the share of tiles that keep all orders; `orders`, summed over tiles and levels; `bundle_mb` of
-    the chunks. Seconds are those of whole jobs; `recon_s` sums all jobs that lead to the field, except taking photos.
+    the tiles; `deep`, the share of tiles that are drawn in all orders; `orders`, summed over tiles and levels;
+    `bundle_mb` of the parts. Seconds are those of whole jobs; `recon_s` sums all jobs that lead to the field, except
+    taking photos.
     cell: the keys of CELL, `corrected`, `files` (metrics, manifest) and `times` (benchmark files by job).
     """
     files, row = cell["files"], {key: cell[key] for key in CELL} | dict.fromkeys(COLUMNS)
@@ -63,14 +64,13 @@ def read_tiles(path: Path | str) -> dict:
     """Read TILES and provenance from a bundle's manifest."""
     manifest = read_json(path)
     tiles, every = manifest["tiles"], len(manifest["directions"])
-    chunks = [chunk for tile in tiles for chunk in tile["chunks"]]
     return {
         "uncertainty": sum(tile["uncertainty"] for tile in tiles) / len(tiles),
-        "deep": sum(len(tile["chunks"][0]["orders"]) == every for tile in tiles) / len(tiles),
+        "deep": sum(len(tile["orders"]) == every for tile in tiles) / len(tiles),
         "levels": len(manifest["levels"]),
-        "splats": sum(chunk["count"] for chunk in chunks),
-        "orders": sum(len(chunk["orders"]) for chunk in chunks),
-        "bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA,
+        "splats": sum(chunk["count"] for tile in tiles for chunk in tile["chunks"]),
+        "orders": sum(len(tile["orders"]) * len(tile["chunks"]) for tile in tiles),
+        "bundle_mb": sum(part["bytes"] for part in manifest["parts"]) / MEGA,
     } | describe_origin(manifest["provenance"])
 
 
