@@ -86,7 +86,7 @@ class Recipe:
 
     levels: list[compose.BinnedLevel]
     trend: texture.Trend
-    corrections: list[Float32[Array, "tiles k k 4"]]
+    corrections: list[Float32[Array, "tiles _ _ 4"]]
 
 
 @dataclass(frozen=True)
