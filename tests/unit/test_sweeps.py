@@ -19,10 +19,10 @@ def metrics(folder):
 
 
 def manifest(folder):
-    chunks = [{"count": 10, "bytes": 500_000, "orders": [0, 1, 2]}, {"count": 2, "bytes": 100_000, "orders": [0]}]
-    shallow = [{"count": 4, "bytes": 200_000, "orders": [0, 2]}, {"count": 1, "bytes": 50_000, "orders": [0]}]
-    tiles = [{"uncertainty": u, "chunks": c} for u, c in ((0.8, chunks), (0.2, shallow))]
-    manifest = {"tiles": tiles, "levels": [{}, {}], "directions": [0, 1, 2], "provenance": ORIGIN}
+    deep = {"uncertainty": 0.8, "orders": [0, 1, 2], "chunks": [{"count": 10}, {"count": 2}]}
+    shallow = {"uncertainty": 0.2, "orders": [0, 2], "chunks": [{"count": 4}, {"count": 1}]}
+    manifest = {"tiles": [deep, shallow], "levels": [{}, {}], "directions": [0, 1, 2], "provenance": ORIGIN}
+    manifest["parts"] = [{"bytes": 800_000}, {"bytes": 50_000}]
     (path := folder / "davgswt.json").write_text(json.dumps(manifest))
     return str(path)
 
@@ -32,7 +32,7 @@ def test_a_row_has_quality_tiles_and_their_origin(tmp_path):
     row = sweeps.tabulate_cell(CELL | {"files": files, "times": {}})
     assert (row["psnr"], row["worst_psnr"], row["photos"], row["psnr_is"]) == (20, 15, 16, "raw")
     assert (row["uncertainty"], row["deep"], row["levels"], row["splats"]) == (0.5, 0.5, 2, 17)
-    assert (row["orders"], row["bundle_mb"], row["field"], row["renderer"]) == (7, 0.85, 12 * "f", "cpu x")
+    assert (row["orders"], row["bundle_mb"], row["field"], row["renderer"]) == (10, 0.85, 12 * "f", "cpu x")
     row = sweeps.tabulate_cell(CELL | {"corrected": True, "files": {"metrics": files["metrics"]}, "times": {}})
     assert (row["psnr"], row["worst_psnr"], row["psnr_is"]) == (21, 16, "colour-corrected")
     assert not [row[key] for key in (*sweeps.TILES, *sweeps.TIMES) if row[key] is not None]

@@ -1,9 +1,9 @@
 from dataclasses import replace
 
 import numpy as np
+from fixtures import bundles
 
-from dav_gswt.bundle import chunks
-from dav_gswt.bundle.encoding import Encoding
+from dav_gswt.bundle import manifest, store
 from dav_gswt.config import load
 from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
@@ -37,7 +37,7 @@ def test_a_run_ends_well_only_without_any_fault_and_fails_well_only_with_its_own
         assert not running.has_failed_as_expected(one, right | fault)
 
 
-def test_a_number_that_is_not_finite_is_found_in_a_table_in_a_field_and_in_a_chunk(tmp_path):
+def test_a_number_that_is_not_finite_is_found_in_a_table_in_a_field_and_in_a_bundle(tmp_path, monkeypatch):
     path = tmp_path / "a.csv"
     for word, finite in (("infinite", True), ("nan", False), ("-inf", False)):
         path.write_text(f"name,value\nx,1.5\ny,{word}\n")
@@ -47,15 +47,11 @@ def test_a_number_that_is_not_finite_is_found_in_a_table_in_a_field_and_in_a_chu
         given.means[4, 1] = value
         write_field(given, tmp_path / "a.ply")
         assert running.is_finite(tmp_path / "a.ply") == np.isfinite(value)
-    given, path = make_ground_field(3, 1.0), tmp_path / "chunks/lod0_tile_00.bin"
-    path.parent.mkdir()
-    code = Encoding.fit([given], 1.0, 0.01)
-    rows, order = code.encode(given), np.arange(len(given))[None]
-    entry = chunks.write_chunk(rows, order, tmp_path, "chunks/lod0_tile_00.bin", 0, [0])
-    beyond = replace(code, log_scale=[1000.0, 1.0])  # the exponential of it is no number
-    for encoding, finite in ((code, True), (beyond, False)):
-        manifest = {"tiles": [{"chunks": [vars(entry)]}], "encoding": vars(encoding)}
-        write_json(tmp_path / "davgswt.json", manifest)
+    bundles.write_bundle(tmp_path / "bundle", bundles.Ground(discs=2, levels=1))
+    path, read = tmp_path / "bundle/davgswt.json", manifest.read_manifest(tmp_path / "bundle")
+    beyond = replace(read, encoding=replace(read.encoding, log_scale=[1000.0, 1.0]))  # its exponential is no number
+    for value, finite in ((read, True), (beyond, False)):
+        monkeypatch.setattr(store, "read_manifest", lambda folder, value=value: value)
         assert running.is_finite(path) == finite
 
 

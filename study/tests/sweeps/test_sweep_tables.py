@@ -22,10 +22,10 @@ def metrics(folder):
 
 
 def manifest(folder):
-    chunks = [{"count": 10, "bytes": 500_000, "orders": [0, 1, 2]}, {"count": 2, "bytes": 100_000, "orders": [0]}]
-    shallow = [{"count": 4, "bytes": 200_000, "orders": [0, 2]}, {"count": 1, "bytes": 50_000, "orders": [0]}]
-    tiles = [{"uncertainty": u, "chunks": c} for u, c in ((0.8, chunks), (0.2, shallow))]
-    manifest = {"tiles": tiles, "levels": [{}, {}], "directions": [0, 1, 2], "provenance": ORIGIN}
+    deep = {"uncertainty": 0.8, "orders": [0, 1, 2], "chunks": [{"count": 10}, {"count": 2}]}
+    shallow = {"uncertainty": 0.2, "orders": [0, 2], "chunks": [{"count": 4}, {"count": 1}]}
+    manifest = {"tiles": [deep, shallow], "levels": [{}, {}], "directions": [0, 1, 2], "provenance": ORIGIN}
+    manifest["parts"] = [{"bytes": 800_000}, {"bytes": 50_000}]
     (path := folder / "davgswt.json").write_text(json.dumps(manifest))
     return str(path)
 
@@ -47,7 +47,7 @@ def test_a_row_holds_what_was_measured_and_where_it_comes_from_and_photos_have_t
     row = tables.tabulate_experiment(CELL | {"files": files, "times": {}})
     assert (row["psnr"], row["worst_psnr"], row["photos"], row["psnr_is"]) == (20, 15, 16, "raw")
     assert (row["uncertainty"], row["deep"], row["levels"], row["splats"]) == (0.5, 0.5, 2, 17)
-    assert (row["orders"], row["bundle_mb"]) == (3 + 1 + 2 + 1, 0.85)
+    assert (row["orders"], row["bundle_mb"]) == (2 * 3 + 2 * 2, 0.85)
     assert row["seam_lpips"] == pytest.approx(0.2) and row["seam_density"] == 0.4 and row["seam_psnr"] == 30
     assert (row["field"], row["tiles"], row["renderer"]) == (12 * "f", 12 * "t", "cpu x")
 

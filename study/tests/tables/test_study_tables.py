@@ -46,7 +46,7 @@ def test_variants_are_compared_in_pairs_with_the_baseline_of_their_sweep_in_the_
 
 
 def test_cells_of_the_terrain_are_as_uncertain_as_their_tiles():
-    tiles = [{"uncertainty": n / 16, "chunks": [{"orders": [0, 1, 2] if n > 7 else [0, 2]}]} for n in range(16)]
+    tiles = [{"uncertainty": n / 16, "orders": [0, 1, 2] if n > 7 else [0, 2]} for n in range(16)]
     manifest = {"tiles": tiles, "salt": 0, "directions": [0, 1, 2]}
     shown, deep = tile_uncertainty.read_cells(manifest, -3, -2, (5, 6))
     assert shown.shape == (5, 6) and (deep == (shown > 7 / 16)).all() and deep.any() and not deep.all()

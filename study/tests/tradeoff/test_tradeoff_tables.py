@@ -16,8 +16,9 @@ def cell(folder, setting, psnr, faster=1.0, grey=0.5, measure="views", most=Fals
     (place := folder / f"{knob}-{setting}").mkdir(exist_ok=True)
     mean = {"psnr": psnr, "ssim": 0.5, "lpips": 1 - psnr / 100, "worst_decile": {"psnr": psnr}, "groups": {}}
     files = {"metrics.json": mean | {"photos": 12, "gaussians": 9, "provenance": ORIGIN}}
-    tile = {"uncertainty": 0.5, "chunks": [{"count": 5, "bytes": 250_000, "orders": [0]}]}
+    tile = {"uncertainty": 0.5, "orders": [0], "chunks": [{"count": 5}]}
     files["davgswt.json"] = {"tiles": [tile], "levels": [{}], "directions": [0], "provenance": ORIGIN}
+    files["davgswt.json"]["parts"] = [{"bytes": 250_000}]
     for name, content in files.items():
         (place / name).write_text(json.dumps(content))
     image_files.write_png(place / "still.png", np.full((4, 6, 3), grey, np.float32))

@@ -1,22 +1,27 @@
-"""Bundles: values by hand, round trips, refusals, and the public renderer's rules."""
+"""Bundles of stored records: values by hand, round trips, refusals, and the public renderer's rules."""
 
 import hashlib
 import json
 import shutil
 import zipfile
+import zlib
 
 import numpy as np
 import pytest
 from fixtures.tile_sets import report_of
 
 from dav_gswt.bundle import build, level_distances, manifest, store
+from dav_gswt.bundle.blocks import unpack_block
 from dav_gswt.bundle.content import BundleContent
+from dav_gswt.bundle.parts import read_part
+from dav_gswt.bundle.recipes import coarsen_rotation
 from dav_gswt.errors import InputError
+from dav_gswt.export import gswt
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.tiles.build import TileSet
 
 SIDE = 2.0
-CHUNK = "chunks/lod0_tile_00.bin"
+PART = "parts/records0.bin"
 one = BundleContent.of_one_material
 
 
@@ -77,47 +82,67 @@ def test_a_bundle_reads_back_as_the_tiles_it_was_made_of(bundle, tiles):
     folder, written = bundle
     read = store.read_bundle(folder)
     assert read.manifest == written
-    along = np.array(written.directions)
     for number, tile in enumerate(read.manifest.tiles):
         for entry in tile.chunks:
             source = tiles.fields[entry.level][number]
-            field, order = read.chunk(number, entry.level)
-            rows, data = written.encoding.encode(source), (folder / entry.file).read_bytes()
-            assert data == rows.tobytes() + b"".join(row.astype("<u2").tobytes() for row in order)
+            field, rows = read.chunk(number, entry.level), written.encoding.encode(source)
+            rows["rotation"] = coarsen_rotation(rows["rotation"])
+            data = read_part(folder, written.parts[entry.part])
+            stored = unpack_block(data)[entry.first : entry.first + entry.count].to_records()
+            assert stored.tobytes() == rows.tobytes()
             # half a step of 2 / 65535 along x and y, of 0.2 / 65535 along z
             away = np.linalg.norm(field.means.astype(float) - source.means, axis=1).max()
             assert 0 < away <= np.hypot(np.hypot(1, 1), 0.1) / 65535 * 1.001
             assert np.abs(field.base_colours - source.base_colours).max() <= 0.5 / 255 + 1e-6
             assert field.means[:, 2].min() >= tile.z[0] and field.means[:, 2].max() <= tile.z[1]
-            for direction, row in zip(entry.orders, order, strict=True):
-                depth = source.means[row].astype(float) @ along[direction]
-                # depths are sorted in 65535 steps of what the tile spans, at most its diagonal
-                assert (np.diff(depth) <= 2 * SIDE / 65535).all()
-    uncertain = [len(tile.chunks[0].orders) for tile in written.tiles if tile.uncertainty >= 0.5]
-    plain = [len(tile.chunks[0].orders) for tile in written.tiles if tile.uncertainty < 0.5]
-    assert set(uncertain) == {len(along)} and set(plain) == {(len(along) + 1) // 2}
+    every = len(written.directions)
+    uncertain = {len(tile.orders) for tile in written.tiles if tile.uncertainty >= 0.5}
+    plain = {len(tile.orders) for tile in written.tiles if tile.uncertainty < 0.5}
+    assert uncertain == {every} and plain == {(every + 1) // 2}
 
 
-def test_the_same_tiles_give_the_same_bytes_whatever_the_threads(bundle, tiles, tmp_path):
+def test_parts_are_listed_coarse_before_fine_with_the_size_and_digest_of_their_files(bundle):
+    folder, written = bundle
+    assert [(part.kind, part.file) for part in written.parts] == [
+        ("records", "parts/records1.bin"),
+        ("records", "parts/records0.bin"),
+    ]
+    for part in written.parts:
+        data = (folder / part.file).read_bytes()
+        assert (len(data), hashlib.sha256(data).hexdigest()) == (part.bytes, part.sha256)
+        assert len(zlib.decompress(data)) == part.size
+
+
+def test_each_part_is_read_once_and_only_when_it_is_needed(copy_of, monkeypatch):
+    seen = []
+    monkeypatch.setattr(store, "read_part", lambda folder, part: seen.append(part.file) or read_part(folder, part))
+    (copy_of / "parts/records1.bin").unlink()
+    read = store.read_bundle(copy_of)
+    assert len(read.chunk(0, 0)) == len(read.chunk(15, 0)) == 60
+    assert seen == [PART]
+
+
+def test_the_same_tiles_give_the_same_bytes(bundle, tiles, tmp_path):
     folder, _ = bundle
-    options = build.BundleOptions(tau=0.5, salt=7, threads=3)
+    options = build.BundleOptions(tau=0.5, salt=7)
     build.write_bundle(one(tiles), tmp_path / "again", options, {"from": "a test"})
     names = sorted(p.relative_to(folder) for p in folder.rglob("*.*"))
-    assert len(names) == 2 + 32
+    assert len(names) == 1 + 2
     for name in names:
         assert (folder / name).read_bytes() == (tmp_path / "again" / name).read_bytes(), name
 
 
-def test_the_zip_holds_what_the_public_renderer_reads(bundle, tiles):
-    folder, _ = bundle
-    with zipfile.ZipFile(folder / "gswt.zip") as archive:
+def test_the_zip_holds_what_the_public_renderer_reads(bundle, tmp_path):
+    read = store.read_bundle(bundle[0])
+    gswt.export_archive(read, tmp_path / "gswt.zip")
+    with zipfile.ZipFile(tmp_path / "gswt.zip") as archive:
         assert archive.namelist() == [f"lod{level}_tile_{t:02d}.ply" for level in range(2) for t in range(16)]
         data = archive.read("lod1_tile_05.ply")
     header, body = data.split(b"end_header\n", 1)
     assert header.count(b"\n") == 65 and b"comment" not in header
     values = np.frombuffer(body, "<f4").reshape(-1, 62)
-    source = tiles.fields[1][5]
-    np.testing.assert_allclose(values[:, :3], 2 * source.means, rtol=1e-6)  # 2 wide to 4 wide, float32
+    source = read.chunk(5, 1)
+    np.testing.assert_allclose(values[:, :2], 2 * source.means[:, :2], rtol=1e-6)  # 2 wide to 4 wide, float32
     np.testing.assert_allclose(values[:, 55:58], source.log_scales + np.log(2), atol=1e-6)
     assert (values[:, 9:54] == 0).all() and (values[:, 3:6] == 0).all()
 
@@ -133,12 +158,12 @@ def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
 
 def test_a_new_bundle_replaces_the_old_one_and_leaves_its_neighbours(tiles, tmp_path):
     out = tmp_path / "b"
-    (out / "chunks").mkdir(parents=True)
-    (out / "chunks" / "stale.bin").write_bytes(b"x")
+    (out / "parts").mkdir(parents=True)
+    (out / "parts" / "stale.bin").write_bytes(b"x")
     (out / "terrain").mkdir()
     build.write_bundle(one(tiles), out, build.BundleOptions(tau=1.0), {})
-    assert sorted(p.name for p in out.iterdir()) == ["chunks", "davgswt.json", "gswt.zip", "terrain"]
-    assert not (out / "chunks" / "stale.bin").exists()
+    assert sorted(p.name for p in out.iterdir()) == ["davgswt.json", "parts", "terrain"]
+    assert not (out / "parts" / "stale.bin").exists()
 
 
 @pytest.fixture
@@ -154,24 +179,31 @@ def rewritten(folder, change):
     (folder / manifest.NAME).write_text(json.dumps(value))
 
 
-def twice(folder):
-    """An order that holds one splat twice, with a digest that fits."""
-    path = folder / CHUNK
-    data = bytearray(path.read_bytes())
-    data[-2:] = data[-4:-2]
-    path.write_bytes(data)
-    sha = hashlib.sha256(data).hexdigest()
-    rewritten(folder, lambda m: m["tiles"][0]["chunks"][0].update(sha256=sha))
+def replaced(folder, data):
+    """Another file for the last part, with its size and digest in the manifest."""
+    (folder / PART).write_bytes(data)
+    told = {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    rewritten(folder, lambda m: m["parts"][-1].update(told))
 
 
-def huge(value):
-    """2^40 Gaussians, of which the bytes are told in agreement."""
-    chunk = value["tiles"][0]["chunks"][0]
-    chunk.update(count=2**40, bytes=2**40 * (16 + 4 * len(chunk["orders"])))
+def inflated(folder):
+    return zlib.decompress((folder / PART).read_bytes())
+
+
+def bomb(folder):
+    """A part that inflates to a thousand times what the manifest says."""
+    replaced(folder, zlib.compress(bytes(1000 * len(inflated(folder)))))
+
+
+def in_pieces(folder):
+    """A part of as many bytes as the manifest says, of which the last splat is not whole."""
+    replaced(folder, zlib.compress(inflated(folder)[:-1]))
+    rewritten(folder, lambda m: m["parts"][-1].update(size=m["parts"][-1]["size"] - 1))
+    rewritten(folder, lambda m: m["tiles"][15]["chunks"][0].update(count=1))
 
 
 def linked(path):
-    """The chunk as a link to a file outside of the bundle."""
+    """The part as a link to a file outside of the bundle."""
     outside = path.rename(path.parents[2] / "elsewhere.bin")
     path.symlink_to(outside)
 
@@ -183,15 +215,23 @@ def cut(path, end, more=b""):
 @pytest.mark.parametrize(
     "spoil, message",
     [
+        pytest.param(lambda f: cut(f / PART, -4), "records0.bin: .* bytes where the manifest says", id="cut short"),
+        pytest.param(lambda f: cut(f / PART, -4, b"else"), "records0.bin: its digest is not", id="altered"),
+        pytest.param(lambda f: replaced(f, b"else"), r"records0.bin: not readable \(Error -3", id="not compressed"),
+        pytest.param(bomb, "records0.bin: does not hold .* bytes", id="inflates beyond its size"),
         pytest.param(
-            lambda f: cut(f / CHUNK, -4), "lod0_tile_00.bin: .* bytes where the manifest says", id="cut short"
+            lambda f: replaced(f, zlib.compress(inflated(f)[:-19])), "records0.bin: does not hold .* bytes", id="short"
         ),
-        pytest.param(lambda f: cut(f / CHUNK, -4, b"else"), "lod0_tile_00.bin: its digest is not", id="altered"),
-        pytest.param(twice, "lod0_tile_00.bin: an order does not hold every splat", id="no permutation"),
-        pytest.param(lambda f: (f / CHUNK).unlink(), "lod0_tile_00.bin: not readable", id="missing"),
-        pytest.param(lambda f: linked(f / CHUNK), "lod0_tile_00.bin: lies outside of the folder", id="a link outwards"),
-        pytest.param(lambda f: rewritten(f, huge), "lod0_tile_00.bin: .* bytes where the manifest says", id="huge"),
-        pytest.param(lambda f: rewritten(f, lambda m: m.update(version=1)), "version 3; make", id="another version"),
+        pytest.param(
+            lambda f: replaced(f, zlib.compress(inflated(f))[:-9]), "records0.bin: does not hold .* bytes", id="ends"
+        ),
+        pytest.param(
+            lambda f: replaced(f, zlib.compress(inflated(f)) + b"x"), "records0.bin: does not hold .* bytes", id="more"
+        ),
+        pytest.param(in_pieces, "records0.bin: does not hold whole splats", id="in pieces"),
+        pytest.param(lambda f: (f / PART).unlink(), "records0.bin: not readable", id="missing"),
+        pytest.param(lambda f: linked(f / PART), "records0.bin: lies outside of the folder", id="a link outwards"),
+        pytest.param(lambda f: rewritten(f, lambda m: m.update(version=3)), "version 4; make", id="another version"),
         pytest.param(lambda f: rewritten(f, lambda m: m.update(format="x")), "format 'davgswt'", id="another format"),
         pytest.param(lambda f: (f / "davgswt.json").write_text("{"), "not readable as JSON", id="no JSON"),
         pytest.param(lambda f: (f / "davgswt.json").write_text("[]"), "format 'davgswt'", id="no manifest"),
@@ -218,8 +258,17 @@ def test_a_manifest_as_large_as_no_manifest_is_not_read(copy_of, monkeypatch):
         ("levels must count up", lambda m: m["levels"][0].update(level=1)),
         ("distances", lambda m: m["levels"][0].update(distance=None)),
         ("16 C", lambda m: m["tiles"].append(m["tiles"][0])),
-        ("file", lambda m: m["tiles"][0]["chunks"][0].update(file="../secret.bin")),
-        ("bytes", lambda m: m["tiles"][0]["chunks"][0].update(count=5)),
+        ("file", lambda m: m["parts"][0].update(file="../secret.bin")),
+        ("a file is there twice", lambda m: m["parts"].append(m["parts"][0])),
+        ("size", lambda m: m["parts"][0].update(size=2**40)),
+        ("the records of level 0 are not there", lambda m: m["tiles"][15]["chunks"][0].update(count=61)),
+        ("the records of level 0 are not there", lambda m: m["tiles"][0]["chunks"][0].update(first=2**60)),
+        ("the records of level 0 are not there", lambda m: m["tiles"][0]["chunks"][0].update(part=2)),
+        ("the records of level 1 are not there", lambda m: m["parts"][0].update(kind="later")),
+        ("level 0 is neither composed nor stored", lambda m: m["tiles"][0]["chunks"][0].pop("first")),
+        ("one chunk a level", lambda m: m["tiles"][0]["chunks"].reverse()),
+        ("an order is there twice", lambda m: m["tiles"][0]["orders"].append(0)),
+        ("orders", lambda m: m["tiles"][0].update(orders=[])),
         ("direction", lambda m: m["directions"].pop()),
         ("log_scale makes no sense", lambda m: m["encoding"].update(log_scale=[59.0, 0.01])),
     ],

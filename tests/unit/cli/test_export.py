@@ -40,7 +40,7 @@ def test_it_writes_what_the_rule_writes(result, tmp_path):
     assert (tmp_path / "out/ground/ground.xml").is_file()
     read = store.read_bundle(bundle)
     terrain = endless.terrain_from_fields(
-        read.fields(), read.manifest, HILLS, [[read.object_chunk(0, level)[0] for level in range(2)]]
+        read.fields(), read.manifest, HILLS, [[read.object_chunk(0, level) for level in range(2)]]
     )
     settings = Export(columns=2, rows=3, formats=["glb", "ply"]).model_dump(mode="json", exclude_none=True)
     terrain_files.export_terrain(terrain, read.manifest, settings, tmp_path / "wanted")

@@ -13,7 +13,7 @@ from dav_gswt.inspect import plot, readers
     "where, shown",
     [
         ("{round}", "Gaussians"),
-        ("{round}/levels", "level 0, level 1 of 2"),
+        ("{round}/levels", "level 0, level 1, level 2 of 3"),
         ("{scored}", "12 candidates; 0 chosen"),
         ("{photos}", "3 cameras"),
         ("{start}/views.json", "3 cameras"),
@@ -37,7 +37,7 @@ def test_what_is_not_understood_is_answered_with_what_is(tree, tmp_path):
         (tmp_path / "notes.txt", {}, "files that are understood"),
         (tmp_path / "nothing.ply", {}, "no such file or folder"),
         (tree.round / "field.ply", {"channel": "Z"}, "--channel: means nothing .* knows --colour"),
-        (tree.round / "levels", {"level": 2}, "--level 2: .* has 0, 1"),
+        (tree.round / "levels", {"level": 3}, "--level 3: .* has 0, 1, 2"),
     ):
         with pytest.raises(InputError, match=said):
             readers.read_scene(path, 100, **options)

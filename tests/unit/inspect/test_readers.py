@@ -83,10 +83,12 @@ def test_a_field_is_coloured_by_what_is_asked_or_says_why_it_cannot_be(tmp_path)
 
 def test_levels_stand_side_by_side_from_the_west(tree):
     shown = readers.read_scene(tree.round / "levels", MOST)
-    first, second = (mesh.points for mesh, _ in shown.meshes[::3])
-    assert np.quantile(first[:, 0], 0.99) < np.quantile(second[:, 0], 0.01)
+    points = [mesh.points for mesh, _ in shown.meshes[::3]]
+    for west, east in zip(points, points[1:], strict=False):
+        assert np.quantile(west[:, 0], 0.99) < np.quantile(east[:, 0], 0.01)
+    assert len(points) == 3
     alone = readers.read_scene(tree.round / "levels", MOST, level=1)
-    assert (shown.notes[1], alone.notes[1]) == ("level 0, level 1 of 2 levels", "level 1 of 2 levels")
+    assert (shown.notes[1], alone.notes[1]) == ("level 0, level 1, level 2 of 3 levels", "level 1 of 3 levels")
 
 
 def test_colours_run_from_one_end_of_a_bar_to_the_other_and_what_is_no_number_is_grey():
@@ -192,7 +194,7 @@ def test_photos_hang_in_their_pyramids_upright(tree):
 
 @pytest.fixture(scope="module")
 def cut(tree):
-    return store.read_tiles(tree.tiles / "tiles", tree.tiles / "seams.json")
+    return store.read_tiles(tree.tiles / "tiles", tree.tiles / "seams.json", tree.round / "levels")
 
 
 def test_gaussians_have_the_patch_of_their_cell(cut):

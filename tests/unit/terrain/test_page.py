@@ -35,8 +35,8 @@ def viewer(tmp_path):
 
 @pytest.fixture
 def bundle(tmp_path):
-    bundles.write_bundle(tmp_path / "bundle", bundles.Ground(discs=2, levels=1))
-    (tmp_path / "bundle" / "chunks" / "not-named.bin").write_bytes(b"old")
+    bundles.write_bundle(tmp_path / "bundle", bundles.Ground(discs=2))
+    (tmp_path / "bundle" / "parts" / "not-named.bin").write_bytes(b"old")
     return tmp_path / "bundle"
 
 
@@ -44,16 +44,16 @@ def names(folder):
     return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
 
 
-def test_a_page_is_the_viewer_the_manifest_and_the_chunks_it_names(tmp_path, viewer, bundle):
+def test_a_page_is_the_viewer_the_manifest_and_the_parts_it_names(tmp_path, viewer, bundle):
     (tmp_path / "terrain" / ".page.part").mkdir(parents=True)  # what a killed run left behind
-    chunks = [f"chunks/lod0_tile_{tile:02d}.bin" for tile in range(16)]
+    parts = ["parts/records0.bin", "parts/records1.bin"]
     for _ in range(2):
         write_page(bundle, viewer, tmp_path / "terrain" / "page")
         assert names(tmp_path / "terrain") == [
-            f"page/{n}" for n in (*chunks, "davgswt.json", "draw/main.js", "index.html")
+            f"page/{n}" for n in ("davgswt.json", "draw/main.js", "index.html", *parts)
         ]
         (tmp_path / "terrain/page/old.js").write_text("gone soon")
-    assert (tmp_path / "terrain/page" / chunks[0]).read_bytes() == (bundle / chunks[0]).read_bytes()
+    assert (tmp_path / "terrain/page" / parts[0]).read_bytes() == (bundle / parts[0]).read_bytes()
     assert 'href="draw/main.js"' in (tmp_path / "terrain/page/index.html").read_text()
 
 
@@ -66,9 +66,9 @@ def test_the_front_of_a_scene_is_beside_its_page(root, tmp_path, viewer, bundle)
     assert json.loads((tmp_path / "page/story.json").read_text()) == story.value
 
 
-def test_a_missing_chunk_is_named(tmp_path, viewer, bundle):
-    (bundle / "chunks" / "lod0_tile_05.bin").unlink()
-    with pytest.raises(InputError, match=r"lod0_tile_05\.bin: this chunk is missing"):
+def test_a_missing_part_is_named(tmp_path, viewer, bundle):
+    (bundle / "parts" / "records1.bin").unlink()
+    with pytest.raises(InputError, match=r"records1\.bin: this part is missing"):
         write_page(bundle, viewer, tmp_path / "page")
     assert not (tmp_path / "page").exists()
 

@@ -17,8 +17,8 @@ from dav_gswt.terrain import serve
 def folder(tmp_path_factory):
     outside = tmp_path_factory.mktemp("served")
     page = outside / "page"
-    (page / "chunks").mkdir(parents=True)
-    for name in ("index.html", "davgswt.json", "main.js", "style.css", "chunks/a.bin"):
+    (page / "parts").mkdir(parents=True)
+    for name in ("index.html", "davgswt.json", "main.js", "style.css", "parts/a.bin"):
         (page / name).write_text(name)
     (outside / "secret.txt").write_text("secret")
     (page / "way-out.txt").symlink_to(outside / "secret.txt")
@@ -66,7 +66,7 @@ def test_files_have_the_type_that_browsers_ask_of_them(ask):
         ("/main.js?still", "text/javascript; charset=utf-8"),
         ("/style.css", "text/css; charset=utf-8"),
         ("/davgswt.json", "application/json"),
-        ("/chunks/a.bin", "application/octet-stream"),
+        ("/parts/a.bin", "application/octet-stream"),
     ):
         status, headers, body = ask(path)
         assert (status, headers["Content-Type"]) == (200, kind)
@@ -76,10 +76,10 @@ def test_files_have_the_type_that_browsers_ask_of_them(ask):
 @pytest.mark.parametrize(
     "path",
     [
-        *("/../secret.txt", "/%2e%2e/secret.txt", "/chunks/../../secret.txt", "/..%2fsecret.txt", "/way-out.txt"),
+        *("/../secret.txt", "/%2e%2e/secret.txt", "/parts/../../secret.txt", "/..%2fsecret.txt", "/way-out.txt"),
         *("/folder-out/secret.txt", "/..\\secret.txt", "/%252e%252e/secret.txt", "http://127.0.0.1/../secret.txt"),
         *("/%00", "/secret.txt%00.bin", "/%ed%a0%80", "/" + "x" * 5000, "/pipe.bin"),
-        *("/chunks/", "/chunks", "//chunks", "/nothing"),
+        *("/parts/", "/parts", "//parts", "/nothing"),
     ],
     ids=lambda path: path[:40],
 )

@@ -1,5 +1,6 @@
 """Tiles as Gaussians: no holes, no doubles, no seam at a border, equal heights; levels merged from their cells."""
 
+import io
 import json
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ from fixtures.tile_sets import splats
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import concatenate_fields
+from dav_gswt.lod import store as levels
 from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import compose, store
@@ -70,7 +72,7 @@ def test_things_follow_the_cell_under_their_centre(sample_ground):
     shift[1] = [16, 4]
     labels = np.zeros((n, n), np.uint8)
     labels[:, 4:] = 1
-    tile = compose.compose_tile(level, labels, shift)
+    tile = compose.compose_tile(level, labels, shift, np.zeros((n, n, 4)))
     found = tile[~tile.ground].means[:, :2].astype(float)
     field, e = sample_ground.levels[0], sample_ground.exemplar
     at = field[~field.ground].means[:, :2].astype(float) - [e.west, e.south]
@@ -86,10 +88,14 @@ def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, sample_g
     again = tile_sets.tiles_of(sample_ground)
     for name, made in (("a", tiles), ("b", again)):
         store.write_tiles([made], tmp_path / name / "tiles", tmp_path / name / "seams.json", {"from": "a test"})
-    back = store.read_tiles(tmp_path / "a" / "tiles", tmp_path / "a" / "seams.json")
+    levels.write_levels([tile_sets.levels_of(sample_ground)], tmp_path / "levels", {})
+    back = store.read_tiles(tmp_path / "a" / "tiles", tmp_path / "a" / "seams.json", tmp_path / "levels")
     np.testing.assert_array_equal(back.labels, tiles.labels)
     np.testing.assert_array_equal(back.shifts, tiles.shifts)
-    np.testing.assert_array_equal(back.fields[1][3].means, tiles.fields[1][3].means)
+    assert not list((tmp_path / "a").rglob("*.ply")), "composed tiles are known by their recipes"
+    for level in range(len(tiles.fields)):
+        np.testing.assert_array_equal(back.fields[level][3].means, tiles.fields[level][3].means)
+        np.testing.assert_array_equal(back.fields[level][3].sh, tiles.fields[level][3].sh)
     assert back.side == tiles.side and back.report == tiles.report
     for path in sorted((tmp_path / "a").rglob("*.*")):
         assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes(), path.name
@@ -99,25 +105,54 @@ def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, sample_g
     "changes", [{"levels": "x"}, {"tiles": 0}, {"side": None}, {"side": -1}, {"seams": []}, {"materials": 3}]
 )
 def test_a_set_that_is_none_is_refused_by_name(tiles, tmp_path, changes):
-    store.write_tiles([replace(tiles, fields=[])], tmp_path / "tiles", tmp_path / "seams.json", {})
+    store.write_tiles([replace(tiles, fields=[], recipe=None)], tmp_path / "tiles", tmp_path / "seams.json", {})
     values = json.loads((tmp_path / "seams.json").read_text()) | {"levels": 1}
     (tmp_path / "seams.json").write_text(json.dumps(values | changes))
     with pytest.raises(InputError, match="seams.json: not the table of a tile set"):
-        store.read_material_tiles(tmp_path / "tiles", tmp_path / "seams.json")
+        store.read_material_tiles(tmp_path / "tiles", tmp_path / "seams.json", tmp_path / "levels")
     (tmp_path / "seams.json").write_text(json.dumps(values))
     with pytest.raises(InputError, match="lod0_tile_00.ply"):
-        store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
+        store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json", tmp_path / "levels")
 
 
-def test_tiles_of_another_table_or_with_damaged_labels_are_refused(tiles, tmp_path):
-    store.write_tiles([replace(tiles, fields=tiles.fields[-1:])], tmp_path / "tiles", tmp_path / "seams.json", {})
-    (tmp_path / "tiles/labels.npz").write_bytes(b"PK")
-    with pytest.raises(InputError, match="labels.npz: not readable"):
-        store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
-    values = json.loads((tmp_path / "seams.json").read_text())
-    (tmp_path / "seams.json").write_text(json.dumps(values | {"counts": []}))
-    with pytest.raises(InputError, match="are not those of"):
-        store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
+@pytest.fixture
+def read_again(tiles, sample_ground, tmp_path):
+    """A function that reads the set from disk, with its labels.npz and seams.json changed and so many levels."""
+    store.write_tiles([tiles], tmp_path / "tiles", tmp_path / "seams.json", {})
+
+    def read(labels=None, counts=None, number=tile_sets.LEVELS):
+        given = tile_sets.levels_of(sample_ground)
+        given = replace(given, fields=given.fields[:number], grids=given.grids[:number])
+        levels.write_levels([given], tmp_path / "levels", {})
+        if labels is not None:
+            (tmp_path / "tiles/labels.npz").write_bytes(labels((tmp_path / "tiles/labels.npz").read_bytes()))
+        if counts is not None:
+            values = json.loads((tmp_path / "seams.json").read_text())
+            (tmp_path / "seams.json").write_text(json.dumps(values | {"counts": counts}))
+        return store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json", tmp_path / "levels")
+
+    return read
+
+
+def without_a_correction(data: bytes) -> bytes:
+    arrays, out = dict(np.load(io.BytesIO(data))), io.BytesIO()
+    del arrays["corrections2"]
+    np.savez(out, **arrays)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        pytest.param({"counts": []}, "are not those of", id="another table"),
+        pytest.param({"number": 2}, "are not those of", id="fewer levels"),
+        pytest.param({"labels": lambda data: b"PK"}, "labels.npz: not readable", id="damaged"),
+        pytest.param({"labels": without_a_correction}, "labels.npz: not of .*levels", id="without a correction"),
+    ],
+)
+def test_tiles_that_are_not_as_they_were_made_are_refused(read_again, changes, message):
+    with pytest.raises(InputError, match=message):
+        read_again(**changes)
 
 
 CELLS, SPACING = 16, 0.25
