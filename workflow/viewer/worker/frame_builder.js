@@ -1,6 +1,7 @@
 // From a view to what the GPU draws. Independent of the page and of messages, so worker, tests and benchmarks share it.
 
-import { MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
+import { createComposer, parseRecords, run } from "../data/compose.js";
+import { chunkKey, MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
 import { selectCells } from "../terrain/budget.js";
 import { lookUpCell, REACH } from "../terrain/cells.js";
 import { nearestOrder } from "../terrain/draw_order.js";
@@ -18,14 +19,22 @@ import { adjustCover, createTerrainTables, paintPoints } from "./terrain_tables.
  * @typedef {import("../terrain/camera.js").Camera} Camera
  * @typedef {import("./terrain_tables.js").TerrainTables} TerrainTables
  * @typedef {ReturnType<typeof placeObjects>} Groups
+ * @typedef {import("../terrain/budget.js").Selection} Selection
  *
  * What the GPU draws. i0, j0: the eye's cell (0 on a sphere); eye: its place; near: entries of the near block; marks: of its 9 cells; uploads: new
  * pages of orders; blocks: of far cells and objects; places: of objects; incomplete: batches were left out for lack of
- * time.
+ * time; work: so far.
  * @typedef {{ i0: number, j0: number, eye: number[], near: Uint32Array, marks: Uint32Array, blocks: Uint32Array, places: Uint32Array,
- *   uploads: { numbers: Uint32Array, data: Uint32Array }, incomplete: boolean,
+ *   uploads: { numbers: Uint32Array, data: Uint32Array }, incomplete: boolean, work: Work,
  *   milliseconds: { update: number, sort: number } }} FrameArrays
  * @typedef {import("../terrain/budget.js").Selection & FrameArrays} Frame
+ *
+ * Gaussians so far that were tested for staying in a cell, composed, and sorted for a batch; batches that were late so
+ * far, and that are kept; bytes of the chunks at hand.
+ * @typedef {{ tested: number, composed: number, sorted: number, late: number, batches: number, bytes: number }} Work
+ *
+ * onChunk: a chunk is at hand; onPart: a part was unpacked.
+ * @typedef {{ onChunk?: (chunk: import("./chunk_store.js").StoredChunk) => void, onPart?: (index: number) => void }} Handlers
  *
  * A frame as the worker posts it. drawn: six numbers a cell (di, dj, tile, lo, hi, direction); bytes: of all chunks.
  * @typedef {Omit<Frame, "cells" | "missing"> & { id: number, patient: boolean, missing: number[], bytes: number,
@@ -40,11 +49,11 @@ const BORDER_LIMIT = 0.2; // milliseconds of making those of single cells, which
 
 /**
  * @param {import("../data/manifest.js").Manifest} manifest
- * @param {import("../terrain/heights.js").HeightField} heights
+ * @param {import("../terrain/heights.js").HeightField} heights @param {Handlers} [handlers]
  */
-export function createFrameBuilder(manifest, heights) {
-  const terrain = createTerrainTables(manifest, heights);
-  const store = createChunkStore(terrain, manifest, recordRows(manifest), (tile) => batches.forget(tile));
+export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPart = () => {} } = {}) {
+  const terrain = createTerrainTables(manifest, heights), composer = createComposer(manifest);
+  const store = createChunkStore(terrain, recordRows(manifest), (tile) => batches.forget(tile));
   const borders = createBorders(terrain, store);
   const batches = createSortedBatches(store, terrain, borders, orderPages(manifest));
   const sortNear = createNearSorter(store, terrain, borders);
@@ -52,6 +61,117 @@ export function createFrameBuilder(manifest, heights) {
   const levels = new Uint16Array(terrain.tiles.length); // bits
   let stamp = 0;
   const ahead = { i0: 0, j0: 0, row: REACH + 1 }; // of the window about the eye, the next row to cover
+  let composed = 0;
+  /** @type {Generator<void, void>[]} */
+  const unpacking = []; // parts that came
+  /** @type {Generator<void, boolean> | null} */
+  let composing = null;
+  let coarsest = terrain.tiles.map((_, tile) => chunkKey(tile, terrain.levels - 1)); // keys of chunks that are always needed
+  /** @type {number[]} */
+  let wanted = []; // keys of chunks that the last view lacks, the nearest first
+  /** @type {number[]} */
+  let spare = []; // keys of chunks that may be needed next
+  /** @type {Cell[]} */
+  let drawn = []; // cells of the last view, until it is prepared for the next
+
+  /** Unpack a part. @param {number} index @param {ArrayBuffer} buffer */
+  function* unpack(index, buffer) {
+    yield* composer.add(index, buffer);
+    onPart(index);
+  }
+
+  /** Compose a chunk and keep it. Returns: was there room for it? @param {number} key */
+  function* bring(key) {
+    const tile = key >> 4, level = key & 15;
+    /** @param {number} other */
+    const isOther = (other) => other !== key;
+    [coarsest, wanted, spare] = [coarsest.filter(isOther), wanted.filter(isOther), spare.filter(isOther)];
+    const parsed = yield* parseRecords(yield* composer.compose(tile, level), manifest.encoding);
+    const count = parsed.sizes.length;
+    composed += count;
+    if (!store.add({ tile, level, count, ...parsed }, stamp)) return false;
+    onChunk(store.get(tile, level));
+    return true;
+  }
+
+  /** The key of the chunk to compose next. */
+  function nextKey() {
+    /** @param {number} key */
+    const isReady = (key) => composer.has(key >> 4, key & 15) && !((terrain.tiles[key >> 4].arrived >> (key & 15)) & 1);
+    /** @param {number} key */
+    const fits = (key) => isReady(key) && store.hasRoom(terrain.tiles[key >> 4].counts[key & 15]);
+    return coarsest.find(isReady) ?? wanted.find(isReady) ?? spare.find(fits);
+  }
+
+  /** Compose all that the last view lacks. Returns: is there more at hand than before? */
+  function bringAll() {
+    let more = composing !== null && run(composing);
+    composing = null;
+    spare = [];
+    for (let key = nextKey(); key !== undefined; key = nextKey()) more = run(bring(key)) || more;
+    return more;
+  }
+
+  /** A step of unpacking or composing. Returns: was there one? */
+  function bringAhead() {
+    const [part] = unpacking;
+    let over = true; // as it is after an error
+    if (part) {
+      try {
+        over = part.next().done === true;
+      } finally {
+        if (over) unpacking.shift();
+      }
+      return true;
+    }
+    if (!composing) {
+      const key = nextKey();
+      if (key === undefined) return false;
+      composing = bring(key);
+    }
+    try {
+      over = composing.next().done === true;
+    } finally {
+      if (over) composing = null;
+    }
+    return true;
+  }
+
+  /** List what a view lacks, the nearest first. @param {Selection} selection */
+  function listWanted({ cells, missing }) {
+    /** @type {Set<number>} */
+    const keys = new Set();
+    /** @param {number} tile */
+    const note = (tile) => {
+      for (let level = 0; level < terrain.levels; level++) {
+        if (missing.has(chunkKey(tile, level))) keys.add(chunkKey(tile, level));
+      }
+    };
+    for (let k = cells.length - 1; missing.size && k >= 0; k--) {
+      cells[k].tiles.forEach(note);
+      for (const { tile } of cells[k].things) note(tile);
+    }
+    wanted = [...new Set([...keys, ...missing])];
+    spare = [];
+    drawn = cells;
+  }
+
+  /** Prepare for the next view where tiles are uncertain: next finer levels, neighbouring orders. Returns: is there any? */
+  function prepare() {
+    /** @type {Set<number>} */
+    const keys = new Set();
+    for (let k = drawn.length - 1; k >= 0; k--) {
+      const { close, border, tile, tiles, lo, hi, direction } = drawn[k], { all, orders } = terrain.tiles[tile];
+      if (!all) continue;
+      if (lo) keys.add(chunkKey(tile, lo - 1));
+      if (close || border) continue;
+      for (const next of terrain.nearest[direction]) batches.prepare({ tile, tiles, border, lo, hi }, orders.indexOf(next));
+    }
+    spare = [...keys];
+    const many = drawn.length;
+    drawn = [];
+    return many > 0;
+  }
 
   /** Mark the chunks that are drawn, and those that the view needs. @param {Cell[]} cells @param {Groups} groups */
   function touch(cells, groups) {
@@ -65,7 +185,13 @@ export function createFrameBuilder(manifest, heights) {
       for (let level = 0; levels[tile] >> level; level++) {
         if ((levels[tile] >> level) & 1) store.touch(tile, level, stamp);
       }
-      if (!terrain.room) continue;
+    }
+    touchWish();
+  }
+
+  /** Mark the chunks that the view needs, where not all fit. */
+  function touchWish() {
+    for (let tile = 0; terrain.room && tile < levels.length; tile++) {
       const there = terrain.wish[tile] & terrain.tiles[tile].arrived;
       for (let level = 0; there >> level; level++) {
         if ((there >> level) & 1) store.touch(tile, level, stamp + WISHED);
@@ -120,7 +246,7 @@ export function createFrameBuilder(manifest, heights) {
       const cell = cells[k];
       if (cell.close) continue;
       const order = orderOf(cell, terrain, eye, i0, j0);
-      cell.direction = terrain.tiles[cell.tile].orders[cell.lo][order];
+      cell.direction = terrain.tiles[cell.tile].orders[order];
       made[k] = batches.get(cell, order, stamp, isLate);
     }
     return made;
@@ -136,6 +262,17 @@ export function createFrameBuilder(manifest, heights) {
     }
   }
 
+  /** What a view shows of the chunks at hand; a patient one composes what it lacks. @param {Camera} camera @param {number} budget @param {boolean} patient */
+  function select(camera, budget, patient) {
+    if (patient) for (const part of unpacking.splice(0)) run(part);
+    for (;;) {
+      const selection = selectCells(terrain, camera, budget), groups = placeObjects(terrain, camera, selection);
+      listWanted(selection);
+      if (patient) touchWish(); // what is composed must not evict it
+      if (!patient || !bringAll()) return { selection, groups };
+    }
+  }
+
   /** Cover the next row of the window about the eye. Returns: was there one? */
   function coverAhead() {
     const { i0, j0, row } = ahead;
@@ -148,26 +285,30 @@ export function createFrameBuilder(manifest, heights) {
   return {
     store,
     batches,
-    /** Gaussians so far that were tested for staying in a cell, and that were sorted for a batch. */
     get work() {
-      return { tested: borders.tested, sorted: batches.sorted };
+      return {
+        tested: borders.tested, composed, sorted: batches.sorted, late: batches.late, batches: batches.size,
+        bytes: store.bytes,
+      };
     },
     /** @param {Int32Array} points see `paintPoints` */
     paint: (points) => paintPoints(terrain, points),
     /** @param {import("./worker.js").Changes} changes */
     adjust: (changes) => adjustCover(terrain, changes),
-    /** @param {import("../data/bundle.js").Chunk} chunk */
-    add: (chunk) => store.add(chunk, stamp),
+    /** Take a part, to be unpacked between views. @param {number} index @param {ArrayBuffer} buffer */
+    addPart: (index, buffer) => void unpacking.push(unpack(index, buffer)),
+    /** Records of a chunk, whether it is kept or not; its parts were unpacked. @param {number} tile @param {number} level */
+    recordsOf: (tile, level) => run(composer.compose(tile, level)),
     /**
-     * Work ahead between two views: batches that were late for the last one, then the cells about its eye that have not
-     * been in view yet. Returns: is there more to do?
+     * Work ahead between two views: parts that came, batches that were late for the last view, chunks that it lacks, the
+     * cells about its eye that have not been in view yet, then what may be needed next. Returns: is there more to do?
      *
      * @param {number} milliseconds about as long
      */
     workAhead(milliseconds) {
       const end = performance.now() + milliseconds;
       while (performance.now() < end) {
-        if (!batches.makeLate(stamp) && !coverAhead()) return false;
+        if (!batches.makeDue(stamp) && !bringAhead() && !coverAhead() && !prepare()) return false;
       }
       return true;
     },
@@ -175,7 +316,7 @@ export function createFrameBuilder(manifest, heights) {
      * The frame of a view.
      *
      * @param {Camera} camera @param {number} budget
-     * @param {boolean} patient make every batch, however long that takes
+     * @param {boolean} patient compose every chunk whose parts are there and make every batch, however long that takes
      * @returns {Frame}
      */
     build(camera, budget, patient) {
@@ -184,8 +325,7 @@ export function createFrameBuilder(manifest, heights) {
       batches.begin();
       const { eye } = camera, i0 = Math.floor(eye[0] / terrain.side), j0 = Math.floor(eye[1] / terrain.side);
       if (i0 !== ahead.i0 || j0 !== ahead.j0 || stamp === 1) Object.assign(ahead, { i0, j0, row: -REACH });
-      const selection = selectCells(terrain, camera, budget), { cells } = selection;
-      const groups = placeObjects(terrain, camera, selection);
+      const { selection, groups } = select(camera, budget, patient), { cells } = selection;
       let incomplete = false;
       /** @type {import("./sorted_batches.js").IsLate} */
       const isLate = (border, spent) => {
@@ -210,7 +350,7 @@ export function createFrameBuilder(manifest, heights) {
       const near = sortNear(close, camera, selection, things);
       return {
         ...selection, ...lists.copy(), i0: terrain.sphere ? 0 : i0, j0: terrain.sphere ? 0 : j0, eye, near, marks,
-        uploads, incomplete,
+        uploads, incomplete, work: this.work,
         milliseconds: { update: updated - start, sort: performance.now() - updated },
       };
     },
@@ -218,7 +358,7 @@ export function createFrameBuilder(manifest, heights) {
 }
 
 /**
- * The order of a cell's batch: position among those that its finest drawn level keeps, which all its levels do.
+ * The order of a cell's batch: position among those of its tile.
  *
  * @param {Cell} cell @param {TerrainTables} terrain @param {number[]} eye @param {number} i0
  * @param {number} j0
@@ -226,13 +366,13 @@ export function createFrameBuilder(manifest, heights) {
 function orderOf(cell, { side, cache, z, directions, tiles, sphere }, eye, i0, j0) {
   const { at } = cell;
   if (sphere && cell.spot) {
-    return nearestOrder(directions, tiles[cell.tile].orders[cell.lo], lookAlong(sphere, side, cell.spot, z), 0, 0);
+    return nearestOrder(directions, tiles[cell.tile].orders, lookAlong(sphere, side, cell.spot, z), 0, 0);
   }
   const to = [
     (i0 + cell.di + 0.5) * side - eye[0], (j0 + cell.dj + 0.5) * side - eye[1],
     cache.h[at] + 0.5 * (z[0] + z[1]) - eye[2],
   ];
-  return nearestOrder(directions, tiles[cell.tile].orders[cell.lo], to, cache.east[at], cache.north[at]);
+  return nearestOrder(directions, tiles[cell.tile].orders, to, cache.east[at], cache.north[at]);
 }
 
 /**
