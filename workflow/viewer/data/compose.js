@@ -31,6 +31,8 @@ export function run(steps) {
 
 /** @param {number} v @param {number} most */
 const clamp = (v, most) => Math.min(Math.max(v, 0), most);
+/** A difference of two values, kept as 0, -1, 1, -2, ... @param {number} low @param {number} high */
+const difference = (low, high) => ((low | (high << 8)) >>> 1) ^ -(low & 1);
 /** @param {string} file @param {string} what */
 const broken = (file, what) => new PageError(`${file} makes no sense: ${what}. ${REMAKE}`);
 
@@ -65,8 +67,8 @@ function* unpackBlock(bytes, at, count, wide) {
     { length: PLANES }, (_, plane) => bytes.subarray(at + plane * count, at + (plane + 1) * count));
   for (let k = 0, w = 0, z = 0; k < count;) {
     for (const end = Math.min(count, k + STEP); k < end; k++, w += size) {
-      z = (z + (zl[k] | (zh[k] << 8))) & 65535;
-      const green = gl[k] | (gh[k] << 8), red = green + (rl[k] | (rh[k] << 8)), blue = green + (bl[k] | (bh[k] << 8));
+      z = (z + difference(zl[k], zh[k])) & 65535;
+      const green = gl[k] | (gh[k] << 8), red = green + difference(rl[k], rh[k]), blue = green + difference(bl[k], bh[k]);
       words[w] = xl[k] | (xh[k] << 8) | (yl[k] << 16) | (yh[k] << 24);
       words[w + 1] = z | (s0[k] << 16) | (s1[k] << 24);
       words[w + 2] = s2[k] | (r0[k] << 8) | (r1[k] << 16) | (r2[k] << 24);
@@ -87,9 +89,34 @@ const paintOf = (red, green, blue, opacity) =>
 /** Signed values in 16 bits, each the difference to the one before. @param {Uint8Array} bytes @param {Int16Array} out */
 function addUp(bytes, out) {
   for (let k = 0, sum = 0; k < out.length; k++) {
-    sum += bytes[k] | (bytes[out.length + k] << 8);
+    sum += difference(bytes[k], bytes[out.length + k]);
     out[k] = sum;
   }
+}
+
+/**
+ * What a tile shows at a level: of each cell the label that most of its finest cells have (of equally many the first),
+ * and the mean of what is added to these.
+ *
+ * @param {Recipe["maps"][0]} finest @param {number} side finest cells @param {number} level
+ */
+function coarsen({ labels, corrections }, side, level) {
+  const along = side >> level, cells = along ** 2, wide = 1 << level, counts = new Int32Array(LABELS), sums = [0, 0, 0, 0];
+  const made = { labels: new Uint8Array(cells), corrections: new Int16Array(4 * cells) };
+  for (let k = 0; k < cells; k++) {
+    const first = Math.floor(k / along) * wide * side + (k % along) * wide;
+    counts.fill(0);
+    for (let n = 0; n < wide * wide; n++) counts[labels[first + (n >> level) * side + (n & (wide - 1))]] += 1;
+    const label = counts.indexOf(Math.max(...counts)), many = counts[label];
+    sums.fill(0);
+    for (let n = 0; n < wide * wide; n++) {
+      const at = first + (n >> level) * side + (n & (wide - 1));
+      if (labels[at] === label) for (let c = 0; c < 4; c++) sums[c] += corrections[c * labels.length + at];
+    }
+    made.labels[k] = label;
+    for (let c = 0; c < 4; c++) made.corrections[c * cells + k] = Math.floor((2 * sums[c] + many) / (2 * many));
+  }
+  return made;
 }
 
 /** Chunks by tile, or object, and level. @param {Manifest} manifest */
@@ -136,21 +163,23 @@ export function createComposer(manifest) {
 
   /** @param {Uint8Array} bytes @param {string} file */
   function* unpackRecipes(bytes, file) {
-    const sizes = Array.from({ length: levels }, (_, level) => (side >> level) ** 2), made = [];
-    const long = 4 * LABELS + LABELS * sizes.reduce((sum, cells) => sum + cells, 0);
-    if (bytes.length !== long * manifest.tiles.length) throw broken(file, "it has another length than its recipes");
+    const cells = side ** 2, made = [];
+    if (bytes.length !== (4 * LABELS + LABELS * cells) * manifest.tiles.length) {
+      throw broken(file, "it has another length than its recipes");
+    }
     for (let tile = 0, at = 0; tile < manifest.tiles.length; tile++) {
       const shifts = new Int16Array(bytes.slice(at, at + 4 * LABELS).buffer);
       at += 4 * LABELS;
-      const maps = sizes.map((cells) => {
-        const labels = bytes.slice(at, at + cells), corrections = new Int16Array(4 * cells);
-        at += cells;
-        for (let n = 0; n < 4; n++, at += 2 * cells) {
-          addUp(bytes.subarray(at, at + 2 * cells), corrections.subarray(n * cells, (n + 1) * cells));
-        }
-        return { labels, corrections };
-      });
-      if (maps.some(({ labels }) => labels.some((label) => label >= LABELS))) throw broken(file, "a label is out of range");
+      const labels = bytes.slice(at, at + cells), corrections = new Int16Array(4 * cells), maps = [{ labels, corrections }];
+      if (labels.some((label) => label >= LABELS)) throw broken(file, "a label is out of range");
+      at += cells;
+      for (let c = 0; c < 4; c++, at += 2 * cells) {
+        addUp(bytes.subarray(at, at + 2 * cells), corrections.subarray(c * cells, (c + 1) * cells));
+      }
+      for (let level = 1; level < levels; level++) {
+        yield;
+        maps.push(coarsen(maps[0], side, level));
+      }
       made.push({ shifts, maps });
       yield;
     }

@@ -83,7 +83,7 @@ export async function readStream(stream, size, broken) {
     for (let step = await reader.read(); !step.done; step = await reader.read()) {
       if (at + step.value.length > size) {
         await reader.cancel();
-        throw broken("larger than it says");
+        throw broken("larger than was promised");
       }
       bytes.set(step.value, at);
       at += step.value.length;

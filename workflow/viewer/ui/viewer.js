@@ -262,7 +262,7 @@ export class Viewer {
   /** What is on the screen, in plain values. */
   state() {
     const { loaded, opened, error, overlay, pacing: { budget } } = this;
-    const view = this.scene ? describeScene(this.scene) : { drawn: [], count: 0, bytes: 0 };
+    const view = this.scene ? describeScene(this.scene) : { drawn: [], count: 0, work: null, missing: 0 };
     return { ...view, overlay: OVERLAYS[overlay], budget, loaded, opened, error, whole: this.resting.whole, mode: this.scene?.walker.mode };
   }
 
@@ -319,8 +319,8 @@ export class Viewer {
 /** Place and picture of a scene, in plain values. @param {Scene} scene */
 function describeScene({ manifest, walker, frame, heights }) {
   const { x, y, eye, yaw, pitch } = walker, drawn = frame ? listDrawnCells(frame) : [];
-  const { count = 0, reach, shrink, bytes = 0 } = frame ?? {};
-  return { x, y, eye, yaw, pitch, under: tileUnder(manifest, heights, x, y), drawn, count, reach, shrink, bytes };
+  const { count = 0, reach, shrink, work = null, missing = [] } = frame ?? {}, under = tileUnder(manifest, heights, x, y);
+  return { x, y, eye, yaw, pitch, under, drawn, count, reach, shrink, work, missing: missing.length };
 }
 
 /** One sentence for the person at the screen. @param {unknown} error */

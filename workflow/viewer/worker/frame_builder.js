@@ -1,7 +1,7 @@
 // From a view to what the GPU draws. Independent of the page and of messages, so worker, tests and benchmarks share it.
 
 import { createComposer, parseRecords, run } from "../data/compose.js";
-import { chunkKey, MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
+import { chunkKey, listChunks, MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
 import { selectCells } from "../terrain/budget.js";
 import { lookUpCell, REACH } from "../terrain/cells.js";
 import { nearestOrder } from "../terrain/draw_order.js";
@@ -36,8 +36,8 @@ import { adjustCover, createTerrainTables, paintPoints } from "./terrain_tables.
  * onChunk: a chunk is at hand; onPart: a part was unpacked.
  * @typedef {{ onChunk?: (chunk: import("./chunk_store.js").StoredChunk) => void, onPart?: (index: number) => void }} Handlers
  *
- * A frame as the worker posts it. drawn: six numbers a cell (di, dj, tile, lo, hi, direction); bytes: of all chunks.
- * @typedef {Omit<Frame, "cells" | "missing"> & { id: number, patient: boolean, missing: number[], bytes: number,
+ * A frame as the worker posts it. drawn: six numbers a cell (di, dj, tile, lo, hi, direction).
+ * @typedef {Omit<Frame, "cells" | "missing"> & { id: number, patient: boolean, missing: number[],
  *   drawn: Int32Array }} FrameAnswer
  */
 
@@ -297,6 +297,11 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
     adjust: (changes) => adjustCover(terrain, changes),
     /** Take a part, to be unpacked between views. @param {number} index @param {ArrayBuffer} buffer */
     addPart: (index, buffer) => void unpacking.push(unpack(index, buffer)),
+    /** Have all chunks at hand whose parts came, for measuring what views cost. */
+    fill() {
+      for (const part of unpacking.splice(0)) run(part);
+      for (const { tile, entry } of listChunks(manifest)) run(bring(chunkKey(tile, entry.level)));
+    },
     /** Records of a chunk, whether it is kept or not; its parts were unpacked. @param {number} tile @param {number} level */
     recordsOf: (tile, level) => run(composer.compose(tile, level)),
     /**

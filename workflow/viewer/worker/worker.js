@@ -48,7 +48,7 @@ function answerView({ id, camera, budget, patient }) {
   const { near, marks, blocks, places, uploads } = frame;
   const moved = [near, marks, blocks, places, drawn, uploads.numbers, uploads.data].map((array) => array.buffer);
   post({
-    kind: "frame", frame: { ...frame, drawn, id, patient, missing: [...missing], bytes: builder.store.bytes },
+    kind: "frame", frame: { ...frame, drawn, id, patient, missing: [...missing] },
   }, moved);
 }
 
