@@ -107,7 +107,9 @@ function coarsen({ labels, corrections }, side, level) {
     const first = Math.floor(k / along) * wide * side + (k % along) * wide;
     counts.fill(0);
     for (let n = 0; n < wide * wide; n++) counts[labels[first + (n >> level) * side + (n & (wide - 1))]] += 1;
-    const label = counts.indexOf(Math.max(...counts)), many = counts[label];
+    let label = 0;
+    for (let n = 1; n < LABELS; n++) if (counts[n] > counts[label]) label = n;
+    const many = counts[label];
     sums.fill(0);
     for (let n = 0; n < wide * wide; n++) {
       const at = first + (n >> level) * side + (n & (wide - 1));
@@ -149,11 +151,13 @@ export function createComposer(manifest) {
         if (at + PLANES * starts[cells] > bytes.length) throw broken(file, "it is cut short");
         const words = yield* unpackBlock(bytes, at, starts[cells], true);
         at += PLANES * starts[cells];
-        for (let w = 0; w < words.length; w += WIDE) {
-          if ((words[w] & 65535) > most || words[w] >>> 16 > most) throw broken(file, "a splat lies outside of its cell");
+        for (let w = 0; w < words.length;) {
+          for (const end = Math.min(words.length, w + WIDE * STEP); w < end; w += WIDE) {
+            if ((words[w] & 65535) > most || words[w] >>> 16 > most) throw broken(file, "a splat lies outside of its cell");
+          }
+          yield;
         }
         pair.push({ starts, words });
-        yield;
       }
       made.push(pair);
     }

@@ -265,6 +265,7 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
   /** What a view shows of the chunks at hand; a patient one composes what it lacks. @param {Camera} camera @param {number} budget @param {boolean} patient */
   function select(camera, budget, patient) {
     if (patient) for (const part of unpacking.splice(0)) run(part);
+    for (const key of coarsest) if (composer.has(key >> 4, key & 15)) run(bring(key)); // else nothing would be shown there
     for (;;) {
       const selection = selectCells(terrain, camera, budget), groups = placeObjects(terrain, camera, selection);
       listWanted(selection);
