@@ -89,8 +89,9 @@ export function createRecentCache(most, sizeOf, onForget = () => {}) {
  * what was used at the current stamp is never evicted.
  *
  * @param {number} capacity @param {(key: number) => void} [onEvict]
+ * @param {number} [ahead] pages that are made free besides those that are needed: to look for them takes long
  */
-export function createPagePool(capacity, onEvict = () => {}) {
+export function createPagePool(capacity, onEvict = () => {}, ahead = 0) {
   const free = Uint32Array.from({ length: capacity }, (_, k) => capacity - 1 - k);
   /** @type {Map<number, PoolEntry>} */
   const entries = new Map();
@@ -109,7 +110,7 @@ export function createPagePool(capacity, onEvict = () => {}) {
     const old = [...entries].filter(([, entry]) => entry.stamp < stamp)
       .sort(([, a], [, b]) => Number(a.kept) - Number(b.kept) || a.stamp - b.stamp);
     for (const [key] of old) {
-      if (left >= count) break;
+      if (left >= count + ahead) break;
       evict(key);
     }
     return left >= count;

@@ -44,6 +44,8 @@ import { adjustCover, createTerrainTables, paintPoints } from "./terrain_tables.
 /** @type {Thing[]} */
 const NONE = [];
 const MIDDLE = { di: 0, dj: 0 }; // an object's place does not count from its block's cell
+const WINDOW = 2 * REACH + 1; // cells along the side of the window about the eye
+const COVER = 16; // cells of it that are covered in one step
 const TIME_LIMIT = 4; // milliseconds of making batches in an update that somebody waits for
 const BORDER_LIMIT = 0.2; // milliseconds of making those of single cells, which all have a substitute
 
@@ -60,7 +62,7 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
   const lists = createDrawLists(terrain);
   const levels = new Uint16Array(terrain.tiles.length); // bits
   let stamp = 0;
-  const ahead = { i0: 0, j0: 0, row: REACH + 1 }; // of the window about the eye, the next row to cover
+  const ahead = { i0: 0, j0: 0, next: WINDOW ** 2 }; // of the window about the eye, the next cell to cover
   let composed = 0;
   /** @type {Generator<void, void>[]} */
   const unpacking = []; // parts that came
@@ -274,12 +276,12 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
     }
   }
 
-  /** Cover the next row of the window about the eye. Returns: was there one? */
+  /** Cover the next cells of the window about the eye. Returns: were there any? */
   function coverAhead() {
-    const { i0, j0, row } = ahead;
-    if (row > REACH || terrain.sphere) return false;
-    for (let di = -REACH; di <= REACH; di++) lookUpCell(terrain, i0 + di, j0 + row);
-    ahead.row += 1;
+    const { i0, j0, next } = ahead, end = Math.min(next + COVER, WINDOW ** 2);
+    if (next >= end || terrain.sphere) return false;
+    for (let k = next; k < end; k++) lookUpCell(terrain, i0 + (k % WINDOW) - REACH, j0 + Math.floor(k / WINDOW) - REACH);
+    ahead.next = end;
     return true;
   }
 
@@ -330,7 +332,7 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
       stamp += 1;
       batches.begin();
       const { eye } = camera, i0 = Math.floor(eye[0] / terrain.side), j0 = Math.floor(eye[1] / terrain.side);
-      if (i0 !== ahead.i0 || j0 !== ahead.j0 || stamp === 1) Object.assign(ahead, { i0, j0, row: -REACH });
+      if (i0 !== ahead.i0 || j0 !== ahead.j0 || stamp === 1) Object.assign(ahead, { i0, j0, next: 0 });
       const { selection, groups } = select(camera, budget, patient), { cells } = selection;
       let incomplete = false;
       /** @type {import("./sorted_batches.js").IsLate} */

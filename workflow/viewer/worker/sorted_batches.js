@@ -24,6 +24,7 @@ import { materialAt } from "../terrain/scatter.js";
  */
 
 const STEP = 16384; // Gaussians of a batch that are gathered in one step
+const AHEAD = 1 / 32; // of all pages
 const MOST_BYTES = 64e6; // of indices of Gaussians that stay, of all cells
 
 /**
@@ -69,7 +70,7 @@ export function createBorders({ keeper, each }, store, most = MOST_BYTES) {
  * @param {number} capacity pages
  */
 export function createSortedBatches(store, terrain, borders, capacity) {
-  const pool = createPagePool(capacity), sort = createDepthSorter();
+  const pool = createPagePool(capacity, undefined, AHEAD * capacity), sort = createDepthSorter();
   const owners = terrain.tiles.length, orderKeys = MAX_LEVELS * MAX_LEVELS * MAX_ORDERS;
   /** @type {{ pages: Uint32Array, entries: Uint32Array }[]} */
   let filled = [];
@@ -95,6 +96,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
         const { centres, entries, count } = store.get(tile, level), kept = border && borders.keep(border, tile, level);
         const many = kept ? kept.length : count;
         makeRoom(n, n + many);
+        if (kept) yield; // finding them takes long
         for (let m = 0; m < many;) {
           for (const end = Math.min(many, m + STEP); m < end; m++, n++) {
             const k = kept ? kept[m] : m;

@@ -22,7 +22,7 @@ import { createFrameBuilder } from "./frame_builder.js";
  *   | { kind: "frame", frame: import("./frame_builder.js").FrameAnswer }} Reply
  */
 
-const SLICE = 2; // milliseconds of work between two looks for messages
+const SLICE = 1; // milliseconds of work between two looks for messages
 
 /** @type {ReturnType<typeof createFrameBuilder>} */
 let builder;
