@@ -33,8 +33,8 @@ UPDATE = """async hills => {
   const side = manifest.tile_side;
   const surface = { kind: "hills", height: 3 * side, wavelength: 20 * side, octaves: 4, salt: 1 };
   const heights = createHeights(hills ? surface : undefined), builder = createFrameBuilder(manifest, heights);
-  await readParts(manifest, source, { take: (index, buffer) => builder.addPart(index, buffer) });
-  builder.fill();
+  await readParts(manifest, source, { take: (index, buffer) => builder.supply.addPart(index, buffer) });
+  builder.supply.fill();
   const times = { update: [], sort: [], both: [] };
   let seen;
   for (let k = 0; k < 160; k++) {

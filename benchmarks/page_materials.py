@@ -47,8 +47,8 @@ SETUP = """async () => {
     { eye: 1, pitch: -8, yaw: 30 * Math.sin(k / 20), x: 0.05 * k * side, y: 0.02 * k * side }), 1920, 1080, heights);
   const begin = () => {
     const builder = createFrameBuilder(manifest, heights);
-    for (const [index, buffer] of parts) builder.addPart(index, buffer.slice());
-    builder.fill();
+    for (const [index, buffer] of parts) builder.supply.addPart(index, buffer.slice());
+    builder.supply.fill();
     return builder;
   };
   const countDrawn = ({ near, blocks }) => {

@@ -83,7 +83,9 @@ def bomb(manifest, size: int = 1000):
     [
         pytest.param(MADE.files(recipes=recipes_with(36, b"\t")), "a label is out of range", id="label"),
         pytest.param(
-            MADE.files(recipes=recipes_with(0, np.full(18, 4, "<i2").tobytes())), "tile 3 shows what is not", id="beyond"
+            MADE.files(recipes=recipes_with(0, np.full(18, 4, "<i2").tobytes())),
+            "tile 3 shows what is not",
+            id="beyond",
         ),
         pytest.param(
             MADE.files(recipes=recipes_with(0, np.full(18, -2, "<i2").tobytes())), "tile 3 shows what is", id="before"

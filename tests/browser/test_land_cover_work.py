@@ -20,8 +20,8 @@ OPEN = """
   // with every chunk at hand
   const fill = () => {
     const filled = createFrameBuilder(manifest, heights);
-    for (const [index, buffer] of parts) filled.addPart(index, buffer.slice());
-    filled.fill();
+    for (const [index, buffer] of parts) filled.supply.addPart(index, buffer.slice());
+    filled.supply.fill();
     return filled;
   };
   const builder = fill();

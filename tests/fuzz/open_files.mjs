@@ -25,7 +25,7 @@ async function read({ files, zip }) {
   const source = await sourceOf(named), manifest = await readManifest(source);
   const pixels = await readHeightMap(manifest, source), heights = createHeights(manifest.heights, pixels);
   const builder = createFrameBuilder(structuredClone(manifest), heights);
-  await readParts(manifest, source, { take: (index, buffer) => builder.addPart(index, buffer) });
+  await readParts(manifest, source, { take: (index, buffer) => builder.supply.addPart(index, buffer) });
   const place = { x: 1, y: 1, eye: manifest.eye_floor, yaw: 30, pitch: -20 };
   const frame = builder.build(cameraAt(place, 320, 200, heights), 1e6, true);
   return { finite: isFinite(frame, builder), count: frame.count };

@@ -93,7 +93,7 @@ export async function readHeightMap({ heights }, source) {
 
 /** The parts of a bundle that this page reads, in order. @param {Manifest} manifest */
 export const listParts = ({ parts }) =>
-  parts.map((part, index) => ({ part, index })).filter(({ part: { kind } }) => KINDS.has(kind));
+  parts.map((part, index) => ({ part, index })).filter(({ part }) => KINDS.has(part.kind));
 
 /** Bytes to read. @param {Manifest} manifest */
 export const sizeOf = (manifest) => listParts(manifest).reduce((sum, { part }) => sum + part.bytes, 0);
@@ -143,7 +143,9 @@ export async function readParts(manifest, source, { take, onProgress = () => {},
 /** @param {ArrayBuffer} packed @param {PartEntry} part */
 async function inflate(packed, { file, size }) {
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return (await readStream(stream, size, (what) => new PageError(`${file} is ${what} where it is unpacked. ${REMAKE}`))).buffer;
+  /** @param {string} what */
+  const broken = (what) => new PageError(`${file} is ${what} where it is unpacked. ${REMAKE}`);
+  return (await readStream(stream, size, broken)).buffer;
 }
 
 /**
@@ -153,17 +155,19 @@ async function inflate(packed, { file, size }) {
  * @param {import("./source.js").ReadOptions} [options]
  */
 async function readChecked(source, entry, { signal, onBytes = () => {} } = {}) {
+  let came = 0;
+  /** @param {number} bytes */
+  const count = (bytes) => {
+    came += bytes;
+    onBytes(bytes);
+  };
   for (const pause of source.pauses ?? []) {
-    let came = 0;
     try {
-      return await readOnce(source, entry, { signal, onBytes(bytes) {
-        came += bytes;
-        onBytes(bytes);
-      } });
+      return await readOnce(source, entry, { signal, onBytes: count });
     } catch (error) {
-      onBytes(-came);
       if (signal?.aborted) throw error;
     }
+    count(-came);
     await new Promise((done) => setTimeout(done, pause));
   }
   return readOnce(source, entry, { signal, onBytes });

@@ -68,7 +68,8 @@ function* unpackBlock(bytes, at, count, wide) {
   for (let k = 0, w = 0, z = 0; k < count;) {
     for (const end = Math.min(count, k + STEP); k < end; k++, w += size) {
       z = (z + difference(zl[k], zh[k])) & 65535;
-      const green = gl[k] | (gh[k] << 8), red = green + difference(rl[k], rh[k]), blue = green + difference(bl[k], bh[k]);
+      const green = gl[k] | (gh[k] << 8);
+      const red = green + difference(rl[k], rh[k]), blue = green + difference(bl[k], bh[k]);
       words[w] = xl[k] | (xh[k] << 8) | (yl[k] << 16) | (yh[k] << 24);
       words[w + 1] = z | (s0[k] << 16) | (s1[k] << 24);
       words[w + 2] = s2[k] | (r0[k] << 8) | (r1[k] << 16) | (r2[k] << 24);
@@ -86,7 +87,7 @@ function* unpackBlock(bytes, at, count, wide) {
 const paintOf = (red, green, blue, opacity) =>
   clamp(red, 255) | (clamp(green, 255) << 8) | (clamp(blue, 255) << 16) | (opacity << 24);
 
-/** Signed values in 16 bits, each the difference to the one before. @param {Uint8Array} bytes @param {Int16Array} out */
+/** Values of 16 bits, of differences to the one before. @param {Uint8Array} bytes @param {Int16Array} out */
 function addUp(bytes, out) {
   for (let k = 0, sum = 0; k < out.length; k++) {
     sum += difference(bytes[k], bytes[out.length + k]);
@@ -101,7 +102,8 @@ function addUp(bytes, out) {
  * @param {Recipe["maps"][0]} finest @param {number} side finest cells @param {number} level
  */
 function coarsen({ labels, corrections }, side, level) {
-  const along = side >> level, cells = along ** 2, wide = 1 << level, counts = new Int32Array(LABELS), sums = [0, 0, 0, 0];
+  const along = side >> level, cells = along ** 2, wide = 1 << level;
+  const counts = new Int32Array(LABELS), sums = [0, 0, 0, 0];
   const made = { labels: new Uint8Array(cells), corrections: new Int16Array(4 * cells) };
   for (let k = 0; k < cells; k++) {
     const first = Math.floor(k / along) * wide * side + (k % along) * wide;
@@ -123,8 +125,8 @@ function coarsen({ labels, corrections }, side, level) {
 
 /** Chunks by tile, or object, and level. @param {Manifest} manifest */
 export function createComposer(manifest) {
-  const { parts, composition, encoding: { origin, step } } = manifest, each = manifest.tiles.length / manifest.materials.length;
-  const owners = [...manifest.tiles, ...manifest.objects ?? []].map(({ chunks }) => (
+  const { parts, tiles, composition, encoding: { origin, step } } = manifest, each = tiles.length / manifest.materials.length;
+  const owners = [...tiles, ...manifest.objects ?? []].map(({ chunks }) => (
     [...chunks].sort((a, b) => a.level - b.level)));
   const [west, south] = [0, 1].map((axis) => Math.round(-origin[axis] / step[axis]));
   const { side = 0, cell = 0, levels = 0, exemplars = [] } = composition ?? {};
@@ -153,7 +155,8 @@ export function createComposer(manifest) {
         at += PLANES * starts[cells];
         for (let w = 0; w < words.length;) {
           for (const end = Math.min(words.length, w + WIDE * STEP); w < end; w += WIDE) {
-            if ((words[w] & 65535) > most || words[w] >>> 16 > most) throw broken(file, "a splat lies outside of its cell");
+            if ((words[w] & 65535) <= most && words[w] >>> 16 <= most) continue;
+            throw broken(file, "a splat lies outside of its cell");
           }
           yield;
         }
@@ -168,10 +171,8 @@ export function createComposer(manifest) {
   /** @param {Uint8Array} bytes @param {string} file */
   function* unpackRecipes(bytes, file) {
     const cells = side ** 2, made = [];
-    if (bytes.length !== (4 * LABELS + LABELS * cells) * manifest.tiles.length) {
-      throw broken(file, "it has another length than its recipes");
-    }
-    for (let tile = 0, at = 0; tile < manifest.tiles.length; tile++) {
+    if (bytes.length !== LABELS * (4 + cells) * tiles.length) throw broken(file, "it has another length than its recipes");
+    for (let at = 0; at < bytes.length;) {
       const shifts = new Int16Array(bytes.slice(at, at + 4 * LABELS).buffer);
       at += 4 * LABELS;
       const labels = bytes.slice(at, at + cells), corrections = new Int16Array(4 * cells), maps = [{ labels, corrections }];
@@ -190,8 +191,9 @@ export function createComposer(manifest) {
     return made;
   }
 
-  /** The cells of the exemplar that a tile shows at a level, or -1. @param {Recipe} recipe @param {number} level @param {number} cells */
-  function sourcesOf({ shifts, maps }, level, cells) {
+  /** The cells of the exemplar that a tile shows at a level; -1: outside. @param {number} tile @param {number} level */
+  function sourcesOf(tile, level) {
+    const { shifts, maps } = /** @type {Recipe[]} */ (recipes)[tile], cells = exemplars[Math.floor(tile / each)] >> level;
     const { labels } = maps[level], along = side >> level, found = new Int32Array(labels.length);
     for (let k = 0; k < labels.length; k++) {
       const x = shifts[2 * labels[k]], y = shifts[2 * labels[k] + 1];
@@ -207,10 +209,12 @@ export function createComposer(manifest) {
     if (!recipes || !layers[level]) return;
     const { file } = /** @type {import("./manifest.js").PartEntry} */ (parts.find(({ kind }) => kind === "recipes"));
     for (let tile = 0; tile < recipes.length; tile++) {
-      const material = Math.floor(tile / each), sources = sourcesOf(recipes[tile], level, exemplars[material] >> level);
+      const material = Math.floor(tile / each), sources = sourcesOf(tile, level);
       if (sources.includes(-1)) throw broken(file, `tile ${tile} shows what is not in the exemplar`);
       let count = 0;
-      for (const { starts } of layers[level][material]) for (const cell of sources) count += starts[cell + 1] - starts[cell];
+      for (const { starts } of layers[level][material]) {
+        for (const cell of sources) count += starts[cell + 1] - starts[cell];
+      }
       if (count !== owners[tile][level].count) {
         throw broken(file, `tile ${tile} has ${count} splats at level ${level}, not ${owners[tile][level].count}`);
       }
@@ -252,15 +256,15 @@ export function createComposer(manifest) {
       const { part, first = 0, count } = owners[tile][level];
       const stored = part === undefined ? undefined : records[part];
       if (stored) return stored.subarray(4 * first, 4 * (first + count));
-      const out = new Uint32Array(4 * count), material = Math.floor(tile / each), along = side >> level, pace = cell << level;
-      const recipe = /** @type {Recipe[]} */ (recipes)[tile], { corrections } = recipe.maps[level];
-      const sources = sourcesOf(recipe, level, exemplars[material] >> level), many = sources.length;
+      const { corrections } = /** @type {Recipe[]} */ (recipes)[tile].maps[level], along = side >> level, pace = cell << level;
+      const out = new Uint32Array(4 * count), sources = sourcesOf(tile, level), many = sources.length;
       let n = 0, due = 4 * STEP;
-      for (const { starts, words } of layers[level][material]) {
+      for (const { starts, words } of layers[level][Math.floor(tile / each)]) {
         for (let k = 0; k < many; k++) {
           const x = west + (k % along) * pace, y = south + Math.floor(k / along) * pace;
-          const dz = corrections[k], dg = corrections[many + k], dr = corrections[2 * many + k], db = corrections[3 * many + k];
-          for (let w = WIDE * starts[sources[k]], end = WIDE * starts[sources[k] + 1]; w < end; w += WIDE, n += 4) {
+          const dz = corrections[k], dg = corrections[many + k], dr = corrections[2 * many + k];
+          const db = corrections[3 * many + k], end = WIDE * starts[sources[k] + 1];
+          for (let w = WIDE * starts[sources[k]]; w < end; w += WIDE, n += 4) {
             const place = words[w], second = words[w + 1], third = words[w + 3], last = words[w + 4];
             out[n] = ((place & 65535) + x) | (((place >>> 16) + y) << 16);
             out[n + 1] = (second & 0xffff0000) | clamp((second & 65535) + dz, 65535);

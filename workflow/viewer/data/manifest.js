@@ -45,7 +45,6 @@ const MAX_FACE = 1 << 24; // cells along the side of a planet's face
 const WIDEST = 8; // of deviations, in tile sides
 const MAX_TERMS = 64, MAX_OBJECTS = 256, MAX_CELLS = 64; // of a rule; of a terrain; of the scatter along a tile's side
 const MAX_PARTS = 4096, MAX_UNPACKED = 2 ** 30; // bytes of all parts
-const MAX_CELLS_ALONG = 4096; // of a tile or an exemplar
 const WHOLE = 1e-9; // relative error of a tile's side in steps
 const MAX_WAVES = 4096; // cells of the jitter along a tile's side
 const UNTURNED = 180; // degrees
@@ -178,8 +177,8 @@ function isPart(part) {
 /** @param {any} composition @param {any} m */
 function isComposition(composition, { tile_side: long, encoding: { origin, step }, levels, materials, parts }) {
   const { side, cell, levels: many, exemplars } = composition ?? {};
-  if (!isWhole(many, 1, levels.length) || !isWhole(side, 1, MAX_CELLS_ALONG) || side % 2 ** (many - 1) !== 0) return false;
-  if (!isWhole(cell, 1, MAX_STEPS) || !isList(exemplars, materials.length, (m) => isWhole(m, 1, MAX_CELLS_ALONG))) return false;
+  if (![side, cell].every((n) => isWhole(n, 1, MAX_STEPS)) || !isWhole(many, 1, levels.length)) return false;
+  if (side % 2 ** (many - 1) || !isList(exemplars, materials.length, (m) => isWhole(m, 1, MAX_STEPS))) return false;
   const fits = [0, 1].every((axis) => Math.abs(side * cell * step[axis] - long) <= WHOLE * long
     && isWhole(Math.round(-origin[axis] / step[axis]) || 0, 0, MAX_STEPS - side * cell));
   /** @param {string} kind */

@@ -72,8 +72,15 @@ export function createDepthSorter() {
     }
     const bits = new Uint32Array(depths.buffer, depths.byteOffset, n);
     counts.fill(0);
-    for (let k = 0; k < n; k += STEP) {
-      countDigits(bits, keys, counts, k, Math.min(n, k + STEP));
+    for (let k = 0; k < n;) {
+      for (const end = Math.min(n, k + STEP); k < end; k++) {
+        const b = bits[k];
+        const key = b >>> 31 ? b : ~b & 0x7fffffff; // float bits as integers that rise as depths fall
+        keys[k] = key;
+        counts[key & (DIGITS - 1)]++;
+        counts[DIGITS + ((key >>> BITS) & (DIGITS - 1))]++;
+        counts[2 * DIGITS + (key >>> (2 * BITS))]++;
+      }
       yield;
     }
     for (let pass = 0; pass < 3; pass++) {
@@ -84,9 +91,14 @@ export function createDepthSorter() {
       }
     }
     let [from, to] = indices;
+    for (let k = 0; k < n; k++) from[k] = k;
     for (let pass = 0; pass < 3; pass++) {
-      for (let k = 0; k < n; k += STEP) {
-        moveDigits(keys, pass ? from : null, to, counts, pass, [k, Math.min(n, k + STEP)]);
+      const base = pass * DIGITS, shift = pass * BITS;
+      for (let k = 0; k < n;) {
+        for (const end = Math.min(n, k + STEP); k < end; k++) {
+          const index = from[k];
+          to[counts[base + ((keys[index] >>> shift) & (DIGITS - 1))]++] = index;
+        }
         yield;
       }
       [from, to] = [to, from];
@@ -94,34 +106,4 @@ export function createDepthSorter() {
     return from.subarray(0, n);
   }
   return Object.assign((/** @type {Float32Array} */ depths, /** @type {number} */ n) => run(steps(depths, n)), { steps });
-}
-
-/**
- * Keys of float bits in a range: integers that rise as depths fall; and how often each has a digit.
- *
- * @param {Uint32Array} bits @param {Uint32Array} keys @param {Uint32Array} counts @param {number} from
- * @param {number} end
- */
-function countDigits(bits, keys, counts, from, end) {
-  for (let k = from; k < end; k++) {
-    const b = bits[k], key = b >>> 31 ? b : ~b & 0x7fffffff;
-    keys[k] = key;
-    counts[key & (DIGITS - 1)]++;
-    counts[DIGITS + ((key >>> BITS) & (DIGITS - 1))]++;
-    counts[2 * DIGITS + (key >>> (2 * BITS))]++;
-  }
-}
-
-/**
- * A pass of the sort over a range. from: null for the first.
- *
- * @param {Uint32Array} keys @param {Uint32Array | null} from @param {Uint32Array} to @param {Uint32Array} counts
- * @param {number} pass @param {number[]} range
- */
-function moveDigits(keys, from, to, counts, pass, [begin, end]) {
-  const base = pass * DIGITS, shift = pass * BITS;
-  for (let k = begin; k < end; k++) {
-    const index = from ? from[k] : k;
-    to[counts[base + ((keys[index] >>> shift) & (DIGITS - 1))]++] = index;
-  }
 }

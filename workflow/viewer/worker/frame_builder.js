@@ -1,7 +1,6 @@
 // From a view to what the GPU draws. Independent of the page and of messages, so worker, tests and benchmarks share it.
 
-import { createComposer, parseRecords, run } from "../data/compose.js";
-import { chunkKey, listChunks, MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
+import { chunkKey, MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
 import { selectCells } from "../terrain/budget.js";
 import { lookUpCell, REACH } from "../terrain/cells.js";
 import { nearestOrder } from "../terrain/draw_order.js";
@@ -11,6 +10,7 @@ import { createChunkStore, WISHED } from "./chunk_store.js";
 import { createDrawLists } from "./draw_lists.js";
 import { createNearSorter } from "./near_sort.js";
 import { createBorders, createSortedBatches } from "./sorted_batches.js";
+import { createSupply } from "./supply.js";
 import { adjustCover, createTerrainTables, paintPoints } from "./terrain_tables.js";
 
 /**
@@ -33,9 +33,6 @@ import { adjustCover, createTerrainTables, paintPoints } from "./terrain_tables.
  * far, and that are kept; bytes of the chunks at hand.
  * @typedef {{ tested: number, composed: number, sorted: number, late: number, batches: number, bytes: number }} Work
  *
- * onChunk: a chunk is at hand; onPart: a part was unpacked.
- * @typedef {{ onChunk?: (chunk: import("./chunk_store.js").StoredChunk) => void, onPart?: (index: number) => void }} Handlers
- *
  * A frame as the worker posts it. drawn: six numbers a cell (di, dj, tile, lo, hi, direction).
  * @typedef {Omit<Frame, "cells" | "missing"> & { id: number, patient: boolean, missing: number[],
  *   drawn: Int32Array }} FrameAnswer
@@ -51,10 +48,10 @@ const BORDER_LIMIT = 0.2; // milliseconds of making those of single cells, which
 
 /**
  * @param {import("../data/manifest.js").Manifest} manifest
- * @param {import("../terrain/heights.js").HeightField} heights @param {Handlers} [handlers]
+ * @param {import("../terrain/heights.js").HeightField} heights @param {import("./supply.js").Handlers} [handlers]
  */
-export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPart = () => {} } = {}) {
-  const terrain = createTerrainTables(manifest, heights), composer = createComposer(manifest);
+export function createFrameBuilder(manifest, heights, handlers = {}) {
+  const terrain = createTerrainTables(manifest, heights);
   const store = createChunkStore(terrain, recordRows(manifest), (tile) => batches.forget(tile));
   const borders = createBorders(terrain, store);
   const batches = createSortedBatches(store, terrain, borders, orderPages(manifest));
@@ -63,102 +60,11 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
   const levels = new Uint16Array(terrain.tiles.length); // bits
   let stamp = 0;
   const ahead = { i0: 0, j0: 0, next: WINDOW ** 2 }; // of the window about the eye, the next cell to cover
-  let composed = 0;
-  /** @type {Generator<void, void>[]} */
-  const unpacking = []; // parts that came
-  /** @type {Generator<void, boolean> | null} */
-  let composing = null;
-  let coarsest = terrain.tiles.map((_, tile) => chunkKey(tile, terrain.levels - 1)); // keys of chunks that are always needed
-  /** @type {number[]} */
-  let wanted = []; // keys of chunks that the last view lacks, the nearest first
-  /** @type {number[]} */
-  let spare = []; // keys of chunks that may be needed next
+  const supply = createSupply(manifest, terrain, store, handlers);
   /** @type {Cell[]} */
   let drawn = []; // cells of the last view, until it is prepared for the next
 
-  /** Unpack a part. @param {number} index @param {ArrayBuffer} buffer */
-  function* unpack(index, buffer) {
-    yield* composer.add(index, buffer);
-    onPart(index);
-  }
-
-  /** Compose a chunk and keep it. Returns: was there room for it? @param {number} key */
-  function* bring(key) {
-    const tile = key >> 4, level = key & 15;
-    /** @param {number} other */
-    const isOther = (other) => other !== key;
-    [coarsest, wanted, spare] = [coarsest.filter(isOther), wanted.filter(isOther), spare.filter(isOther)];
-    const parsed = yield* parseRecords(yield* composer.compose(tile, level), manifest.encoding);
-    const count = parsed.sizes.length;
-    composed += count;
-    if (!store.add({ tile, level, count, ...parsed }, stamp)) return false;
-    onChunk(store.get(tile, level));
-    return true;
-  }
-
-  /** The key of the chunk to compose next. */
-  function nextKey() {
-    /** @param {number} key */
-    const isReady = (key) => composer.has(key >> 4, key & 15) && !((terrain.tiles[key >> 4].arrived >> (key & 15)) & 1);
-    /** @param {number} key */
-    const fits = (key) => isReady(key) && store.hasRoom(terrain.tiles[key >> 4].counts[key & 15]);
-    return coarsest.find(isReady) ?? wanted.find(isReady) ?? spare.find(fits);
-  }
-
-  /** Compose all that the last view lacks. Returns: is there more at hand than before? */
-  function bringAll() {
-    let more = composing !== null && run(composing);
-    composing = null;
-    spare = [];
-    for (let key = nextKey(); key !== undefined; key = nextKey()) more = run(bring(key)) || more;
-    return more;
-  }
-
-  /** A step of unpacking or composing. Returns: was there one? */
-  function bringAhead() {
-    const [part] = unpacking;
-    let over = true; // as it is after an error
-    if (part) {
-      try {
-        over = part.next().done === true;
-      } finally {
-        if (over) unpacking.shift();
-      }
-      return true;
-    }
-    if (!composing) {
-      const key = nextKey();
-      if (key === undefined) return false;
-      composing = bring(key);
-    }
-    try {
-      over = composing.next().done === true;
-    } finally {
-      if (over) composing = null;
-    }
-    return true;
-  }
-
-  /** List what a view lacks, the nearest first. @param {Selection} selection */
-  function listWanted({ cells, missing }) {
-    /** @type {Set<number>} */
-    const keys = new Set();
-    /** @param {number} tile */
-    const note = (tile) => {
-      for (let level = 0; level < terrain.levels; level++) {
-        if (missing.has(chunkKey(tile, level))) keys.add(chunkKey(tile, level));
-      }
-    };
-    for (let k = cells.length - 1; missing.size && k >= 0; k--) {
-      cells[k].tiles.forEach(note);
-      for (const { tile } of cells[k].things) note(tile);
-    }
-    wanted = [...new Set([...keys, ...missing])];
-    spare = [];
-    drawn = cells;
-  }
-
-  /** Prepare for the next view where tiles are uncertain: next finer levels, neighbouring orders. Returns: is there any? */
+  /** Prepare for the next view where tiles are uncertain: finer levels, neighbouring orders. Returns: is there any? */
   function prepare() {
     /** @type {Set<number>} */
     const keys = new Set();
@@ -167,9 +73,10 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
       if (!all) continue;
       if (lo) keys.add(chunkKey(tile, lo - 1));
       if (close || border) continue;
-      for (const next of terrain.nearest[direction]) batches.prepare({ tile, tiles, border, lo, hi }, orders.indexOf(next));
+      const source = { tile, tiles, border, lo, hi };
+      for (const next of terrain.nearest[direction]) batches.prepare(source, orders.indexOf(next));
     }
-    spare = [...keys];
+    supply.prepare([...keys]);
     const many = drawn.length;
     drawn = [];
     return many > 0;
@@ -183,22 +90,20 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
       for (let n = 0; n < tiles.length; n++) levels[tiles[n]] |= bits;
       for (let n = 0; group && n < group.length; n++) levels[group[n].tile] |= (2 << group[n].hi) - (1 << group[n].lo);
     }
-    for (let tile = 0; tile < levels.length; tile++) {
-      for (let level = 0; levels[tile] >> level; level++) {
-        if ((levels[tile] >> level) & 1) store.touch(tile, level, stamp);
-      }
-    }
+    for (let tile = 0; tile < levels.length; tile++) mark(tile, levels[tile], stamp);
     touchWish();
   }
 
   /** Mark the chunks that the view needs, where not all fit. */
   function touchWish() {
     for (let tile = 0; terrain.room && tile < levels.length; tile++) {
-      const there = terrain.wish[tile] & terrain.tiles[tile].arrived;
-      for (let level = 0; there >> level; level++) {
-        if ((there >> level) & 1) store.touch(tile, level, stamp + WISHED);
-      }
+      mark(tile, terrain.wish[tile] & terrain.tiles[tile].arrived, stamp + WISHED);
     }
+  }
+
+  /** Mark chunks of a tile as used. @param {number} tile @param {number} bits of levels @param {number} at a stamp */
+  function mark(tile, bits, at) {
+    for (let level = 0; bits >> level; level++) if ((bits >> level) & 1) store.touch(tile, level, at);
   }
 
   /**
@@ -264,15 +169,20 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
     }
   }
 
-  /** What a view shows of the chunks at hand; a patient one composes what it lacks. @param {Camera} camera @param {number} budget @param {boolean} patient */
+  /**
+   * What a view shows of the chunks at hand; a patient one composes what it lacks.
+   *
+   * @param {Camera} camera @param {number} budget @param {boolean} patient
+   */
   function select(camera, budget, patient) {
-    if (patient) for (const part of unpacking.splice(0)) run(part);
-    for (const key of coarsest) if (composer.has(key >> 4, key & 15)) run(bring(key)); // else nothing would be shown there
+    if (patient) supply.finish();
+    supply.begin(stamp);
     for (;;) {
       const selection = selectCells(terrain, camera, budget), groups = placeObjects(terrain, camera, selection);
-      listWanted(selection);
+      supply.want(selection);
+      drawn = selection.cells;
       if (patient) touchWish(); // what is composed must not evict it
-      if (!patient || !bringAll()) return { selection, groups };
+      if (!patient || !supply.bringWanted()) return { selection, groups };
     }
   }
 
@@ -288,25 +198,15 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
   return {
     store,
     batches,
+    supply,
     get work() {
-      return {
-        tested: borders.tested, composed, sorted: batches.sorted, late: batches.late, batches: batches.size,
-        bytes: store.bytes,
-      };
+      const { tested } = borders, { composed } = supply, { sorted, late, size } = batches;
+      return { tested, composed, sorted, late, batches: size, bytes: store.bytes };
     },
     /** @param {Int32Array} points see `paintPoints` */
     paint: (points) => paintPoints(terrain, points),
     /** @param {import("./worker.js").Changes} changes */
     adjust: (changes) => adjustCover(terrain, changes),
-    /** Take a part, to be unpacked between views. @param {number} index @param {ArrayBuffer} buffer */
-    addPart: (index, buffer) => void unpacking.push(unpack(index, buffer)),
-    /** Have all chunks at hand whose parts came, for measuring what views cost. */
-    fill() {
-      for (const part of unpacking.splice(0)) run(part);
-      for (const { tile, entry } of listChunks(manifest)) run(bring(chunkKey(tile, entry.level)));
-    },
-    /** Records of a chunk, whether it is kept or not; its parts were unpacked. @param {number} tile @param {number} level */
-    recordsOf: (tile, level) => run(composer.compose(tile, level)),
     /**
      * Work ahead between two views: parts that came, batches that were late for the last view, chunks that it lacks, the
      * cells about its eye that have not been in view yet, then what may be needed next. Returns: is there more to do?
@@ -316,7 +216,7 @@ export function createFrameBuilder(manifest, heights, { onChunk = () => {}, onPa
     workAhead(milliseconds) {
       const end = performance.now() + milliseconds;
       while (performance.now() < end) {
-        if (!batches.makeDue(stamp) && !bringAhead() && !coverAhead() && !prepare()) return false;
+        if (!batches.makeDue(stamp) && !supply.advance() && !coverAhead() && !prepare()) return false;
       }
       return true;
     },

@@ -192,10 +192,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
   function isDue({ source, order, spare }, stamp) {
     const { tiles, lo, hi } = source, levels = (2 << hi) - (1 << lo);
     if (!tiles.every((tile) => (terrain.tiles[tile].arrived & levels) === levels)) return false;
-    if (!spare) return true;
-    let pages = 0;
-    for (let level = lo; level <= hi; level++) pages += padded(terrain.tiles[source.tile].counts[level]) / PAGE;
-    return pages <= pool.left && !pool.use(keyOf(source, order), stamp);
+    return !spare || (pool.left > AHEAD * capacity && !pool.use(keyOf(source, order), stamp));
   }
 
   return {
@@ -205,7 +202,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
       due = [];
       making = null;
     },
-    /** Make a batch between views if there is room for it: it may be needed next. @param {Source} source @param {number} order */
+    /** Make a batch between views if there is room: it may be needed next. @param {Source} source @param {number} order */
     prepare: (source, order) => due.push({ source, order, spare: true }),
     /** A step of making a batch that is due. Returns: was there one? @param {number} stamp */
     makeDue(stamp) {

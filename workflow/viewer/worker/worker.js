@@ -73,13 +73,13 @@ function answer(request) {
       onChunk: postRecords, onPart: (index) => post({ kind: "part", index }),
     });
   } else if (request.kind === "part") {
-    builder.addPart(request.index, request.buffer);
+    builder.supply.addPart(request.index, request.buffer);
     beBusy();
   } else if (request.kind === "view") {
     answerView(request);
     beBusy();
   } else if (request.kind === "ask") {
-    const records = builder.recordsOf(request.tile, request.level).slice();
+    const records = builder.supply.recordsOf(request.tile, request.level).slice();
     post({ kind: "told", id: request.id, records }, [records.buffer]);
   }
   else if (request.kind === "paint") builder.paint(request.points);
