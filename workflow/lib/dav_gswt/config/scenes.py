@@ -126,12 +126,6 @@ class SyntheticScene(_PhotographedScene):
         "photos to start from, with `agent: replay`; all if left out", None, read_by=("split_views",), ge=2, le=200
     )
     test: int = key("views that only test", read_by=(*RENDERED, "split_views"), ge=0, le=200)
-    layout: Literal["ring", "cap", "paper"] = key(
-        "how photos are placed: `ring`, one from above and the others around it at 65 degrees; `cap`, evenly over the "
-        "hemisphere above `min_elevation`; `paper`, 36 on a circle at 45 degrees and the others as `cap`",
-        "ring",
-        read_by=RENDERED,
-    )
     min_elevation: float = key(
         "lowest elevation of candidates and of test views",
         30,
@@ -140,14 +134,6 @@ class SyntheticScene(_PhotographedScene):
         agents=("render",),
         ge=5,
         le=85,
-    )
-    oblique: int = key("further test views around the exemplar at 45 degrees", 0, read_by=RENDERED, ge=0, le=200)
-    walkers: int = key(
-        "further test views at eye level, 0.8, 1.6 and 3.2 m above the ground in turn",
-        0,
-        read_by=RENDERED,
-        ge=0,
-        le=200,
     )
     size: int = key(
         "width and height of the photos",
