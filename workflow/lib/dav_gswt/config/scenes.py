@@ -222,7 +222,7 @@ class FieldScene(_Scene):
     """A finished Gaussian splat instead of photos."""
 
     kind: Literal["field"]
-    field: Text = key("a finished splat: `.ply` of any trainer, plain or compressed, `.spz` or `.splat`")
+    field: Text = key("a finished splat: `.ply` of any trainer, plain or compressed, or `.spz`")
     up: Corner | None = key(
         "a direction that points roughly up in the file; the side on which things stand if left out",
         None,
@@ -239,10 +239,10 @@ class FieldScene(_Scene):
     @classmethod
     def _require_splat(cls, path: str) -> str:
         suffix = Path(path).suffix.lower()
-        if suffix in (".ksplat", ".sog"):
-            raise ValueError(advise_conversion(Path(path), "sog" if suffix == ".sog" else "ksplat"))
-        if suffix not in (".ply", ".spz", ".splat"):
-            raise ValueError("a finished splat ends in .ply, .spz or .splat")
+        if unread := {".ksplat": "ksplat", ".sog": "sog", ".splat": "splat"}.get(suffix):
+            raise ValueError(advise_conversion(Path(path), unread))
+        if suffix not in (".ply", ".spz"):
+            raise ValueError("a finished splat ends in .ply or .spz")
         return path
 
     @model_validator(mode="after")
