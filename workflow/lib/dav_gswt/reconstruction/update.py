@@ -97,9 +97,7 @@ def _prepare_start(
     occluders = field[grid.heights.size + discs.count_underlay(grid) :]
     added = _drop_near(objects.make_shell(relief, views), occluders, relief.grid.spacing)
     added = observation.thin_at_random(added, settings.max_gaussians - len(field), rng)
-    sh = np.zeros((len(added), *field.sh.shape[1:]), np.float32)
-    sh[:, :1] = added.sh[:, :1]
-    added = replace(added, sh=sh)
+    added = added.with_harmonics(field.sh.shape[1])
     _log.info("objects: %d Gaussians where nothing stood", len(added))
     field, occluders = concatenate_fields([field, added]), concatenate_fields([occluders, added])
     colour, known = observation.ground_colours(grid, views, occluders)
