@@ -86,6 +86,12 @@ class _PhotographedScene(_Scene):
         read_by=POSE_READERS,
         agents=POSED,
     )
+    exemplar: Literal["focus", "whole"] = key(
+        "what the last fit of a preset with `choose_with` spends its Gaussians on: `focus`, the windows of the ground "
+        "that tiles and objects are cut from, at the resolution of the photos; `whole`, all of the exemplar, for the "
+        "reconstruction itself. Ground that is tiled as one (`materials: one`) or inpainted is always fitted whole",
+        "focus",
+    )
 
 
 def _materials(default: str):
@@ -95,18 +101,6 @@ def _materials(default: str):
         "name, as `{lawn: lawn.png, road: road.png, exclude: other.png}`: those materials and no others, and `exclude` "
         "nowhere (docs/photos.md)",
         default,
-    )
-
-
-Exemplar = Literal["focus", "whole"]
-
-
-def _exemplar():
-    return key(
-        "what the last fit of a preset with `choose_with` spends its Gaussians on: `focus`, the windows of the ground "
-        "that tiles and objects are cut from, at the resolution of the photos; `whole`, all of the exemplar, for the "
-        "reconstruction itself. Ground that is tiled as one (`materials: one`) or inpainted is always fitted whole",
-        "focus",
     )
 
 
@@ -144,7 +138,6 @@ class SyntheticScene(_PhotographedScene):
         le=4096,
     )
     materials: Materials = _materials("one")
-    exemplar: Exemplar = _exemplar()
     agent: SyntheticAgent = key(
         "`render`: photos are rendered at the chosen poses; `replay`: chosen from those rendered beforehand",
         read_by=POSE_READERS,
@@ -195,7 +188,6 @@ class PhotoScene(_PhotographedScene):
         "where EXIF has none or is wrong", None, unit="mm (35 mm equivalent)", read_by=REGISTERED, ge=4, le=2000
     )
     materials: Materials = _materials("auto")
-    exemplar: Exemplar = _exemplar()
     masks: Text | None = key(
         "a folder of masks named as the photos: black pixels are not ground. Left out: NAME_mask.* beside a photo, and "
         "a folder `masks` in the photos' folder or beside one called `images`",

@@ -17,8 +17,7 @@ from dav_gswt.photos.colmap_model import (
     model_from_reconstruction,
     write_colmap_model,
 )
-from dav_gswt.photos.sfm.registration import SfmOptions
-from dav_gswt.photos.sfm.triangulation import triangulate_features
+from dav_gswt.photos.sfm.registration import SfmOptions, triangulate_features
 from dav_gswt.photos.synthetic import mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 
