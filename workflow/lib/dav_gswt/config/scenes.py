@@ -7,7 +7,7 @@ from pydantic import Field, FiniteFloat, field_validator, model_validator
 
 from dav_gswt.capture.agents import list_agents
 from dav_gswt.config.base import ConfigModel, Name, PhotoSize, Seed, Text, key
-from dav_gswt.images.file_kinds import advise_conversion
+from dav_gswt.images.file_kinds import BY_SUFFIX, advise_conversion
 
 if TYPE_CHECKING:
     SyntheticAgent = PhotoAgent = str
@@ -231,8 +231,8 @@ class FieldScene(_Scene):
     @classmethod
     def _require_splat(cls, path: str) -> str:
         suffix = Path(path).suffix.lower()
-        if unread := {".ksplat": "ksplat", ".sog": "sog", ".splat": "splat"}.get(suffix):
-            raise ValueError(advise_conversion(Path(path), unread))
+        if suffix == ".sog" or suffix in BY_SUFFIX:
+            raise ValueError(advise_conversion(Path(path), BY_SUFFIX.get(suffix, "sog")))
         if suffix not in (".ply", ".spz"):
             raise ValueError("a finished splat ends in .ply or .spz")
         return path
