@@ -182,6 +182,7 @@ def source_files(scene):
     found["video"] = [dated(path, f"{where}.folder") for path in videos]
     found["masks"] = [dated(path, f"{where}.masks") for path in listing.masks.values()]
     found["model"] = files_of_model(given["model"], f"{where}.model") if "model" in given else []
+    found["positions"] = [dated(path, f"{where}.folder") for path in list_geo_files(list(listing.photos.values()))]
     return found
 
 

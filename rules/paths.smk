@@ -15,6 +15,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import is_from_future, locate_path
 from dav_gswt.images.lpips_weights import locate_weights
 from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
+from dav_gswt.photos.geo_file import list_geo_files
 from dav_gswt.photos.photo_listing import drop_twins, list_photos, locate_source
 from dav_gswt.sweeps import CELL
 from dav_gswt.views.policies import NEEDS_PHOTOS, POLICY_NAMES, PRIOR_POLICIES

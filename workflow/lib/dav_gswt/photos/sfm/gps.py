@@ -2,6 +2,7 @@
 
 Receivers in cameras lag and drift. A robust similarity aligns the cameras with the positions; where the residuals
 exceed the error of receivers, the positions are not used. Otherwise they are priors of the last bundle adjustment.
+A geo.txt beside the photos, as OpenDroneMap reads it, counts before their EXIF.
 """
 
 import logging
@@ -15,6 +16,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.photos.colmap_model import ColmapModel, bundle_adjust, model_from_reconstruction
+from dav_gswt.photos.geo_file import read_geo_files
 from dav_gswt.photos.ground_frame import fit_plane, make_upright_rotation
 from dav_gswt.photos.photo_files import read_gps_position
 
@@ -42,7 +44,8 @@ class GpsPositions:
 
 def read_gps_positions(paths: list[Path]) -> GpsPositions | None:
     """The positions of a set's photos; None, with the reason in the log, where they cannot place it."""
-    found = np.array([read_gps_position(path) or (np.nan,) * 3 for path in paths], float)
+    listed = read_geo_files(paths)
+    found = np.array([listed.get(path) or read_gps_position(path) or (np.nan,) * 3 for path in paths], float)
     placed = np.isfinite(found[:, :2]).all(1)
     if not placed.any():
         return None
