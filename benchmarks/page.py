@@ -27,13 +27,14 @@ UPDATE = """async hills => {
   const { createHeights } = await import("./terrain/heights.js");
   const { cameraAt } = await import("./terrain/camera.js");
   const { createWalker } = await import("./ui/walker.js");
-  const manifest = await (await fetch("davgswt.json")).json();
+  const { readManifest, readParts } = await import("./data/bundle.js");
+  const { webSource } = await import("./data/source.js");
+  const source = webSource(new URL("./", location.href)), manifest = await readManifest(source);
   const side = manifest.tile_side;
   const surface = { kind: "hills", height: 3 * side, wavelength: 20 * side, octaves: 4, salt: 1 };
   const heights = createHeights(hills ? surface : undefined), builder = createFrameBuilder(manifest, heights);
-  for (const { tile, chunks } of manifest.tiles) for (const { level, count, file } of chunks) {
-    builder.add({ tile, level, count, buffer: await (await fetch(file)).arrayBuffer() });
-  }
+  await readParts(manifest, source, { take: (index, buffer) => builder.supply.addPart(index, buffer) });
+  builder.supply.fill();
   const times = { update: [], sort: [], both: [] };
   let seen;
   for (let k = 0; k < 160; k++) {

@@ -37,16 +37,18 @@ SETUP = """async () => {
   const { createHeights } = await import("./terrain/heights.js");
   const { cameraAt } = await import("./terrain/camera.js");
   const { createWalker } = await import("./ui/walker.js");
-  const { listChunks } = await import("./data/layout.js");
-  const manifest = await (await fetch("davgswt.json")).json(), side = manifest.tile_side;
+  const { readManifest, readParts } = await import("./data/bundle.js");
+  const { webSource } = await import("./data/source.js");
+  const source = webSource(new URL("./", location.href)), parts = [];
+  const manifest = await readManifest(source), side = manifest.tile_side;
   const heights = createHeights({ kind: "hills", height: 3 * side, wavelength: 20 * side, octaves: 4, salt: 1 });
-  const chunks = await Promise.all(listChunks(manifest).map(async ({ tile, entry: { level, count, file } }) => (
-    { tile, level, count, buffer: await (await fetch(file)).arrayBuffer() })));
+  await readParts(manifest, source, { take: (...part) => void parts.push(part) });
   const camera = k => cameraAt(createWalker(manifest,
     { eye: 1, pitch: -8, yaw: 30 * Math.sin(k / 20), x: 0.05 * k * side, y: 0.02 * k * side }), 1920, 1080, heights);
   const begin = () => {
     const builder = createFrameBuilder(manifest, heights);
-    for (const chunk of chunks) builder.add(chunk);
+    for (const [index, buffer] of parts) builder.supply.addPart(index, buffer.slice());
+    builder.supply.fill();
     return builder;
   };
   const countDrawn = ({ near, blocks }) => {

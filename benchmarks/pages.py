@@ -22,8 +22,9 @@ def page_of(ground: bundles.Ground) -> Iterator[str]:
         start = time.perf_counter()
         write_page(bundle, VIEWER, page)
         written = time.perf_counter() - start
-        chunks = [chunk for tile in manifest["tiles"] for chunk in tile["chunks"]]
-        count, size = (sum(chunk[key] for chunk in chunks) for key in ("count", "bytes"))
-        print(f"page of {count:,} Gaussians, {size / 1e6:.1f} MB, {len(chunks)} chunks; written in {written:.2f} s")
+        count = sum(chunk["count"] for tile in manifest["tiles"] for chunk in tile["chunks"])
+        size = sum(part["bytes"] for part in manifest["parts"])
+        parts = len(manifest["parts"])
+        print(f"page of {count:,} Gaussians, {size / 1e6:.1f} MB, {parts} parts; written in {written:.2f} s")
         with served(page) as address:
             yield address

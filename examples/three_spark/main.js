@@ -13,7 +13,7 @@ async function open() {
   const response = await fetch(`${EXPORT}terrain.json`);
   if (!response.ok) throw new Error("There is no export: see examples/README.md");
   const facts = await response.json(), terrain = await load("/page/");
-  terrain.end(); // heights need no chunks
+  terrain.end(); // heights need no tiles
   const splats = new SplatMesh({ url: `${EXPORT}terrain.spz` });
   await splats.initialized;
   return { facts, terrain, splats };

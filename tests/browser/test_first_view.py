@@ -19,7 +19,7 @@ RUN_AXE = """async () => {
 def test_a_still_is_shown_until_the_terrain_is_as_sharp(visit, fronted):
     seen = visit(320, 180, reduced_motion="reduce")
     held = []
-    seen.page.route("**/chunks/*", lambda route: held.append(route))
+    seen.page.route("**/parts/*", lambda route: held.append(route))
     seen.open(fronted, wait=False)
     seen.until("document.getElementById('first')?.complete")
     box = seen.page.locator("#first").bounding_box()

@@ -12,12 +12,19 @@ OPEN = """
   const { createFrameBuilder } = await import("./worker/frame_builder.js");
   const { createHeights } = await import("./terrain/heights.js");
   const { cameraAt } = await import("./terrain/camera.js");
-  const { listChunks } = await import("./data/layout.js");
-  const manifest = await (await fetch("davgswt.json")).json(), heights = createHeights(manifest.heights);
-  const builder = createFrameBuilder(manifest, heights), chunks = listChunks(manifest);
-  const read = await Promise.all(chunks.map(async ({ tile, entry: { level, count, file } }) => (
-    { tile, level, count, buffer: await (await fetch(file)).arrayBuffer() })));
-  for (const chunk of read) builder.add({ ...chunk, buffer: chunk.buffer.slice() });
+  const { readManifest, readParts } = await import("./data/bundle.js");
+  const { webSource } = await import("./data/source.js");
+  const source = webSource(new URL("./", location.href)), parts = [];
+  const manifest = await readManifest(source), heights = createHeights(manifest.heights);
+  await readParts(manifest, source, { take: (...part) => void parts.push(part) });
+  // with every chunk at hand
+  const fill = () => {
+    const filled = createFrameBuilder(manifest, heights);
+    for (const [index, buffer] of parts) filled.supply.addPart(index, buffer.slice());
+    filled.supply.fill();
+    return filled;
+  };
+  const builder = fill();
   const view = (place, patient = true) => {
     const before = builder.work, frame = builder.build(cameraAt(place, 640, 400, heights), 1e6, patient);
     const { work } = builder, did = name => work[name] - before[name];
@@ -48,11 +55,6 @@ AHEAD = """async () => {
 }"""
 HURRY = """async () => {
   // frames by a builder in a hurry, until they are complete, and the frame of one that is patient
-  const fill = () => {
-    const filled = createFrameBuilder(manifest, heights);
-    for (const chunk of read) filled.add({ ...chunk, buffer: chunk.buffer.slice() });
-    return filled;
-  };
   const camera = cameraAt(place, 640, 400, heights), real = performance.now.bind(performance);
   const hurried = fill(), frames = [], last = fill().build(camera, 1e6, true);
   let now = 0;

@@ -1,4 +1,4 @@
-"""Loading: coarse levels first, nothing from outside, and one readable message where something is wrong."""
+"""Loading: in the manifest's order, nothing from outside, and one readable message where something is wrong."""
 
 import pytest
 from fixtures.browser import served
@@ -15,54 +15,89 @@ def test_no_request_leaves_the_page_and_nothing_is_complained_about(visit, plain
     seen.open(plain)
     assert complaints == []
     assert {url.startswith((plain, "data:")) for url in asked} == {True}
-    assert len(asked) > 32
+    parts = [url for url in asked if "/parts/" in url]
+    assert len(asked) > 32 and 0 < len(parts) == len(set(parts))
 
 
-def test_chunks_are_read_the_coarsest_level_first_and_told_in_bytes(modules):
-    queue, told, asked = modules.evaluate(
+def test_parts_are_read_in_order_each_once_and_told_in_bytes(modules):
+    listed, told, asked, most = modules.evaluate(
         """async () => {
-          const { initialChunks, readChunks, readManifest } = await import("./data/bundle.js");
+          const { listParts, readManifest, readParts } = await import("./data/bundle.js");
           const { webSource } = await import("./data/source.js");
-          const source = webSource(new URL("./", location.href)), queue = initialChunks(await readManifest(source));
-          const told = [], asked = [], read = (file, ...rest) => (asked.push(file), source.read(file, ...rest));
-          await readChunks(queue, { read }, { take: () => {}, onProgress: progress => told.push({ ...progress }) });
-          return [queue.map(({ tile, entry }) => [entry.level, tile, entry.file, entry.bytes]), told, asked];
+          const source = webSource(new URL("./", location.href)), manifest = await readManifest(source);
+          const told = [], asked = [];
+          let open = 0, most = 0;
+          const read = async (file, ...rest) => {
+            asked.push(file);
+            most = Math.max(most, ++open);
+            return source.read(file, ...rest).finally(() => { open -= 1; });
+          };
+          await readParts(manifest, { read }, { take: () => {}, onProgress: progress => told.push({ ...progress }) });
+          return [listParts(manifest).map(({ part }) => [part.file, part.bytes]), told, asked, most];
         }"""
     )
-    assert [(level, tile) for level, tile, *_ in queue] == [(level, tile) for level in (1, 0) for tile in range(16)]
-    assert asked == [file for _, _, file, _ in queue]
-    total = sum(size for *_, size in queue)
-    assert told[-1] == {"bytes": total, "total": total, "chunks": 32, "of": 32}
+    assert asked == [file for file, _ in listed] and most <= 3
+    total = sum(size for _, size in listed)
+    assert told[-1] == {"bytes": total, "total": total, "parts": len(listed), "of": len(listed)}
     assert [one["bytes"] for one in told] == sorted(one["bytes"] for one in told)
 
 
+FAIL = """async ({ failures, pauses, many }) => {
+  // `many` parts, of which the third fails so often
+  const { readParts } = await import("./data/bundle.js");
+  const parts = Array.from({ length: many }, (_, k) => ({ kind: "plain", file: `p${k}`, bytes: 16, size: 16 }));
+  const asked = [], told = [];
+  const read = async (file, size, { onBytes }) => {
+    asked.push(file);
+    await new Promise(done => setTimeout(done, 5));
+    onBytes(7);
+    if (file === "p2" && asked.filter(name => name === file).length <= failures) throw new Error("the third");
+    onBytes(9);
+    return new ArrayBuffer(16);
+  };
+  const taken = [], take = index => void taken.push(index), onProgress = ({ bytes }) => told.push(bytes);
+  const said = await readParts({ parts }, { read, pauses }, { take, onProgress }).catch(error => error.message);
+  return { said: said ?? null, asked, taken, bytes: told.at(-1) };
+}"""
+
+
 def test_the_first_failure_ends_all_reading_and_is_thrown(modules):
-    message, asked = modules.evaluate(
-        """async () => {
-          const { readChunks } = await import("./data/bundle.js");
-          let asked = 0;
-          const read = async () => {
-            if (++asked === 3) throw new Error("the third");
-            await new Promise(done => setTimeout(done, 5));
-            return new ArrayBuffer(0);
-          };
-          const entry = { file: "x", bytes: 0, count: 0, orders: [] };
-          const queue = Array.from({ length: 90 }, (_, tile) => ({ tile, entry }));
-          const said = await readChunks(queue, { read }, { take: () => {} }).catch(error => error.message);
-          return [said, asked];
-        }"""
-    )
-    assert message == "the third" and asked <= 12
+    found = modules.evaluate(FAIL, {"failures": 9, "pauses": [], "many": 90})
+    assert found["said"] == "the third" and len(found["asked"]) <= 6
+
+
+def test_a_part_that_fails_is_asked_for_again_before_that_is_told(modules):
+    found = modules.evaluate(FAIL, {"failures": 3, "pauses": [5, 10, 20], "many": 6})
+    assert found["said"] is None and sorted(found["taken"]) == list(range(6))
+    assert found["asked"].count("p2") == 4 and len(found["asked"]) == 9
+    assert found["bytes"] == 6 * 16, "what came in vain does not count"
+    found = modules.evaluate(FAIL, {"failures": 4, "pauses": [5, 10, 20], "many": 6})
+    assert found["said"] == "the third" and found["asked"].count("p2") == 4
+
+
+def test_a_part_that_the_server_misses_once_is_no_failure(visit, plain):
+    seen, asked = visit(160, 100), []
+
+    def answer(route):
+        asked.append(route.request.url)
+        if len(asked) == 1:
+            route.fulfill(status=503)
+        else:
+            route.continue_()
+
+    seen.page.route("**/parts/*", answer)
+    seen.open(plain)
+    assert seen.state["error"] is None and asked.count(asked[0]) == 2
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "spoil, message",
     [
-        (lambda f: (f / "chunks/lod0_tile_02.bin").unlink(), "lod0_tile_02.bin is not there"),
+        (lambda f: min((f / "parts").iterdir()).unlink(), ".bin is not there"),
         (lambda f: (f / "davgswt.json").unlink(), "davgswt.json is not there (the server answered 404)"),
     ],
-    ids=["no chunk", "no manifest"],
+    ids=["no part", "no manifest"],
 )
 def test_a_spoilt_bundle_is_named_with_what_to_do(visit, page_of, spoil, message):
     folder = page_of(Ground(discs=4))

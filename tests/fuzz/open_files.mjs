@@ -6,7 +6,7 @@ import { pathToFileURL } from "node:url";
 
 const viewer = pathToFileURL(`${process.argv[2]}/`);
 const load = (name) => import(new URL(name, viewer));
-const { initialChunks, readChunks, readHeightMap, readManifest, sourceOf } = await load("data/bundle.js");
+const { readHeightMap, readManifest, readParts, sourceOf } = await load("data/bundle.js");
 const { PageError } = await load("data/checks.js");
 const { openZip } = await load("data/zip.js");
 const { cameraAt } = await load("terrain/camera.js");
@@ -25,7 +25,7 @@ async function read({ files, zip }) {
   const source = await sourceOf(named), manifest = await readManifest(source);
   const pixels = await readHeightMap(manifest, source), heights = createHeights(manifest.heights, pixels);
   const builder = createFrameBuilder(structuredClone(manifest), heights);
-  await readChunks(initialChunks(manifest), source, { take: (chunk) => builder.add(chunk) });
+  await readParts(manifest, source, { take: (index, buffer) => builder.supply.addPart(index, buffer) });
   const place = { x: 1, y: 1, eye: manifest.eye_floor, yaw: 30, pitch: -20 };
   const frame = builder.build(cameraAt(place, 320, 200, heights), 1e6, true);
   return { finite: isFinite(frame, builder), count: frame.count };
@@ -34,8 +34,7 @@ async function read({ files, zip }) {
 /** Are all numbers of a frame finite, and all entries Gaussians of chunks that are there? */
 function isFinite(frame, builder) {
   const chunks = [...builder.store.all()];
-  const sound = chunks.every(({ centres, orders, count }) => centres.every(Number.isFinite)
-    && orders.every((index) => index < count));
+  const sound = chunks.every(({ centres }) => centres.every(Number.isFinite));
   const known = new Set(chunks.flatMap(({ entries }) => [...entries].map((entry) => entry & 0x3fffff)));
   return sound && Number.isFinite(frame.count) && Number.isFinite(frame.reach) && frame.reach > 0
     && frame.near.every((entry) => known.has(entry & 0x3fffff));

@@ -52,7 +52,7 @@ export interface Update {
   /** Distance at which level l gives way to l + 1, and half the width of that fade. */
   switches: number[];
   bands: number[];
-  /** False: more chunks arrive, or orders are still being made; another update shows more. */
+  /** False: tiles are still being composed or sorted; another update shows more. */
   complete: boolean;
 }
 
@@ -80,7 +80,7 @@ export interface Order {
   /** Index of `directions`. */
   number: number;
   direction: number[];
-  indices: Uint16Array | Uint32Array;
+  indices: Uint32Array;
 }
 
 /** Draws the last update on a WebGL2 context. */
@@ -94,7 +94,7 @@ export interface Painter {
 export interface Progress {
   bytes: number;
   total: number;
-  chunks: number;
+  parts: number;
   of: number;
 }
 
@@ -114,7 +114,7 @@ export interface Terrain {
   objects: string[];
   /** Height of each object's foot above the surface. */
   feet: number[];
-  /** Resolves when all chunks are read, or as many as are kept at a time (192 MB); the rest is read for updates. */
+  /** Resolves when all parts of the bundle are read; tiles are composed of them when a view needs them. */
   loaded: Promise<void>;
   height(x: number, y: number): number;
   normal(x: number, y: number): Vector;

@@ -14,7 +14,7 @@ const BUDGET = 1_000_000; // Gaussians of an update
 
 /**
  * Open a terrain: the address of a page folder or a bundle, its zip, or its files. Resolves when its manifest is read;
- * `loaded` resolves when its chunks are read: all of them, or the coarsest level of a set that is larger than the cache.
+ * `loaded` resolves when all its parts are read.
  *
  * @param {string | URL | Blob | Iterable<File>} where
  * @param {{ onProgress?: (progress: import("./data/bundle.js").Progress) => void, onError?: (error: Error) => void }} [options]
@@ -42,7 +42,7 @@ export async function load(where, { onProgress, onError = console.error } = {}) 
     },
     onError,
   });
-  const loaded = open.readAll(onProgress).then(() => {});
+  const whole = open.readAll(onProgress), loaded = whole.then(() => {});
   loaded.catch(onError); // whoever waits for it learns of it too
   return {
     unit: manifest.unit, tileSide: manifest.tile_side, eyeFloor: manifest.eye_floor, lift: open.lift,
@@ -51,7 +51,7 @@ export async function load(where, { onProgress, onError = console.error } = {}) 
     feet: (manifest.objects ?? []).map(({ ground }) => ground),
     loaded,
     ...createGround(open),
-    ...createChunkReader(open),
+    ...createChunkReader(open, whole, checkRunning),
     /** @param {import("./terrain/camera.js").Place} place @param {number} width @param {number} height */
     camera: (place, width, height) => checkCamera(cameraAt(place, width, height, open.heights)),
     /** @param {import("./terrain/camera.js").Camera} camera @param {{ budget?: number, exact?: boolean }} [options] */

@@ -1,19 +1,20 @@
 // What other pages ask of a terrain: the ground, Gaussians for renderers of their own, and a painter for their context.
 // What they pass in is checked before it reaches the worker: a NaN there would draw nothing and say nothing.
 
-import { readChunks } from "../data/bundle.js";
-import { chunkKey, deviationOf, listChunks, MAX_TURN, parseChunk, TURN_STEPS } from "../data/layout.js";
+import { parseRecords, run } from "../data/compose.js";
+import { chunkKey, deviationOf, MAX_TURN, TURN_STEPS } from "../data/layout.js";
 import { OVERLAYS } from "../draw/overlays.js";
 import { createRenderer } from "../draw/renderer.js";
 import { backdropOptions } from "../scene/open_terrain.js";
 import { hitGround } from "../terrain/camera.js";
 import { REACH, tileUnder } from "../terrain/cells.js";
+import { createDepthSorter } from "../terrain/draw_order.js";
 
 /**
  * @typedef {import("../scene/open_terrain.js").OpenTerrain} OpenTerrain
  * @typedef {{ count: number, centres: Float32Array, deviations: Float32Array, turns: Float32Array,
  *   colours: Float32Array }} Gaussians
- * @typedef {{ number: number, direction: number[], indices: Uint16Array | Uint32Array }} Order
+ * @typedef {{ number: number, direction: number[], indices: Uint32Array }} Order
  */
 
 /**
@@ -94,25 +95,39 @@ export function createGround({ manifest, heights, lift }) {
   };
 }
 
-/** A tile's Gaussians and their orders. @param {Pick<OpenTerrain, "manifest" | "source">} terrain */
-export function createChunkReader({ manifest, source }) {
-  const chunks = listChunks(manifest), { tiles, objects = [], levels, encoding, directions } = manifest;
-  /** @type {{ key: number, chunk: Promise<import("../data/bundle.js").Chunk> } | null} */
+/**
+ * A tile's Gaussians and their orders.
+ *
+ * @param {Pick<OpenTerrain, "manifest" | "client">} terrain
+ * @param {Promise<boolean>} whole all parts were read
+ * @param {() => void} checkRunning throws where the terrain was ended
+ */
+export function createChunkReader({ manifest, client }, whole, checkRunning) {
+  const { tiles, objects = [], levels, encoding, directions } = manifest, sort = createDepthSorter();
+  /** @type {{ key: number, chunk: ReturnType<typeof compose> } | null} */
   let last = null;
+
+  /** @param {number} tile @param {number} level */
+  async function compose(tile, level) {
+    await whole;
+    checkRunning();
+    const records = await client.recordsOf(tile, level);
+    checkRunning();
+    return run(parseRecords(records ?? new Uint32Array(0), encoding));
+  }
 
   /** @param {number} tile @param {number} level */
   async function read(tile, level) {
     checkIndex("tile", tile, tiles.length + objects.length);
     checkIndex("level", level, levels.length);
-    const key = chunkKey(tile, level), found = chunks.filter((one) => chunkKey(one.tile, one.entry.level) === key);
+    const key = chunkKey(tile, level);
     if (last?.key !== key) {
-      /** @type {Promise<import("../data/bundle.js").Chunk>} */
-      const chunk = new Promise((take, refuse) => readChunks(found, source, { take }).catch(refuse));
+      const chunk = compose(tile, level);
       last = { key, chunk };
       chunk.catch(() => (last = null));
     }
-    const { buffer, count } = await last.chunk;
-    return { ...parseChunk(buffer, count, encoding), count, kept: found[0].entry.orders };
+    const { records, centres, sizes } = await last.chunk;
+    return { records, centres, count: sizes.length, kept: (tiles[tile] ?? objects[tile - tiles.length]).orders };
   }
 
   return {
@@ -124,10 +139,12 @@ export function createChunkReader({ manifest, source }) {
     },
     /** @param {number} tile @param {number} level @returns {Promise<Order[]>} */
     async orders(tile, level) {
-      const { orders, count, kept } = await read(tile, level);
-      return kept.map((number, k) => ({
-        number, direction: directions[number], indices: orders.slice(k * count, (k + 1) * count),
-      }));
+      const { centres, count, kept } = await read(tile, level), depths = new Float32Array(count);
+      return kept.map((number) => {
+        const [x, y, z] = directions[number];
+        for (let k = 0; k < count; k++) depths[k] = centres[3 * k] * x + centres[3 * k + 1] * y + centres[3 * k + 2] * z;
+        return { number, direction: directions[number], indices: sort(depths, count).slice() };
+      });
     },
   };
 }

@@ -1,28 +1,23 @@
-// Reading a bundle: where it comes from, then davgswt.json, its height map and its chunks, coarse levels first, each
-// checked before it is used.
+// Reading a bundle: where it comes from, then davgswt.json, its height map and its parts in the manifest's order, each
+// once, and checked before it is used.
 
 import { isCoordinate, PageError, REMAKE } from "./checks.js";
 import { gswtSource, isGswt } from "./gswt.js";
-import { indexType, listChunks, RECORD, viewRoom } from "./layout.js";
-import { findFault, NAME, pickKnown } from "./manifest.js";
-import { fileSource, webSource } from "./source.js";
+import { findFault, KINDS, NAME, pickKnown } from "./manifest.js";
+import { fileSource, readStream, webSource } from "./source.js";
 import { openZip } from "./zip.js";
 
 /**
  * @typedef {import("./manifest.js").Manifest} Manifest
- * @typedef {import("./manifest.js").ChunkEntry} ChunkEntry
+ * @typedef {import("./manifest.js").PartEntry} PartEntry
  * @typedef {import("./source.js").Source} Source
  * @typedef {import("./source.js").Files} Files
  *
- * A chunk to read, and a chunk that was read.
- * @typedef {{ tile: number, entry: ChunkEntry }} QueueItem
- * @typedef {{ tile: number, level: number, count: number, buffer: ArrayBuffer }} Chunk
- *
- * Bytes and chunks so far, of all.
- * @typedef {{ bytes: number, total: number, chunks: number, of: number }} Progress
+ * Bytes and parts so far, of all.
+ * @typedef {{ bytes: number, total: number, parts: number, of: number }} Progress
  */
 
-const PARALLEL = 6; // requests at a time
+const PARALLEL = 3; // requests at a time
 
 /**
  * The source of a terrain: the address of its folder, the folder's files (paths as a directory picker gives them), or
@@ -96,73 +91,86 @@ export async function readHeightMap({ heights }, source) {
   return pixels;
 }
 
-/**
- * The chunks to read first, the coarsest level first: all, or the coarsest level alone if the set does not fit into the
- * cache. The worker then asks for what a view needs.
- *
- * @param {Manifest} manifest
- * @returns {QueueItem[]}
- */
-export function initialChunks(manifest) {
-  const queue = listChunks(manifest);
-  queue.sort((a, b) => b.entry.level - a.entry.level || a.tile - b.tile);
-  return viewRoom(manifest) ? queue.filter(({ entry }) => entry.level === manifest.levels.length - 1) : queue;
-}
+/** The parts of a bundle that this page reads, in order. @param {Manifest} manifest */
+export const listParts = ({ parts }) =>
+  parts.map((part, index) => ({ part, index })).filter(({ part }) => KINDS.has(part.kind));
+
+/** Bytes to read. @param {Manifest} manifest */
+export const sizeOf = (manifest) => listParts(manifest).reduce((sum, { part }) => sum + part.bytes, 0);
 
 /**
- * Read chunks and hand each to `take` as it arrives. The first failure stops all other requests and is thrown.
+ * Read all parts, and hand the number and the unpacked bytes of each to `take` as it arrives; waits for what that
+ * returns. The first failure stops all other requests and is thrown.
  *
- * @param {QueueItem[]} queue @param {Source} source
- * @param {{ take: (chunk: Chunk) => void, onProgress?: (progress: Progress) => void, signal?: AbortSignal }} options
+ * @param {Manifest} manifest @param {Source} source
+ * @param {{ take: (index: number, buffer: ArrayBuffer) => void | Promise<void>,
+ *   onProgress?: (progress: Progress) => void, signal?: AbortSignal }} options
  */
-export async function readChunks(queue, source, { take, onProgress = () => {}, signal }) {
-  const total = queue.reduce((sum, { entry }) => sum + entry.bytes, 0);
-  const progress = { bytes: 0, total, chunks: 0, of: queue.length };
+export async function readParts(manifest, source, { take, onProgress = () => {}, signal }) {
+  const queue = listParts(manifest), progress = { bytes: 0, total: sizeOf(manifest), parts: 0, of: queue.length };
   const stop = new AbortController();
   signal?.addEventListener("abort", () => stop.abort(signal.reason), { once: true });
+  /** @type {unknown} */
+  let first = null;
   let next = 0;
+  /** @param {unknown} error */
+  const fail = (error) => {
+    first ??= error;
+    stop.abort();
+  };
+  /** @type {(void | Promise<void>)[]} */
+  const taken = [];
   /** @param {number} bytes */
   const onBytes = (bytes) => {
     progress.bytes += bytes;
     onProgress(progress);
   };
   const readNext = async () => {
-    while (next < queue.length) {
-      const { tile, entry } = queue[next++];
-      const buffer = await readChecked(source, entry, { signal: stop.signal, onBytes });
-      checkOrders(buffer, entry);
+    while (next < queue.length && !stop.signal.aborted) {
+      const { part, index } = queue[next++], read = await readChecked(source, part, { signal: stop.signal, onBytes });
+      const buffer = part.kind === "plain" ? read : await inflate(read, part);
       stop.signal.throwIfAborted();
-      take({ tile, level: entry.level, count: entry.count, buffer });
-      progress.chunks += 1;
+      taken.push(Promise.resolve(take(index, buffer)).catch(fail));
+      progress.parts += 1;
       onProgress(progress);
     }
   };
-  /** @type {unknown} */
-  let first = null;
-  const guarded = () => readNext().catch((error) => {
-    first ??= error;
-    stop.abort();
-  });
-  await Promise.all(Array.from({ length: PARALLEL }, guarded));
+  await Promise.all(Array.from({ length: PARALLEL }, () => readNext().catch(fail)));
+  await Promise.all(taken);
   if (first) throw first;
 }
 
+/** @param {ArrayBuffer} packed @param {PartEntry} part */
+async function inflate(packed, { file, size }) {
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  /** @param {string} what */
+  const broken = (what) => new PageError(`${file} is ${what} where it is unpacked. ${REMAKE}`);
+  return (await readStream(stream, size, broken)).buffer;
+}
+
 /**
- * Every order must hold each Gaussian once: entries beyond the chunk would draw what is not there.
+ * The bytes of a file, asked for again where that may help.
  *
- * @param {ArrayBuffer} buffer @param {ChunkEntry} entry
+ * @param {Source} source @param {{ file: string, bytes: number, sha256?: string }} entry
+ * @param {import("./source.js").ReadOptions} [options]
  */
-function checkOrders(buffer, { file, count, orders }) {
-  const indices = new (indexType(count))(buffer, count * RECORD), seen = new Uint8Array(count);
-  for (let d = 1, at = 0; d <= orders.length; d++) {
-    for (let k = 0; k < count; k++, at++) {
-      const index = indices[at];
-      if (index >= count || seen[index] === d) {
-        throw new PageError(`${file}: an order does not hold every splat once. ${REMAKE}`);
-      }
-      seen[index] = d;
+async function readChecked(source, entry, { signal, onBytes = () => {} } = {}) {
+  let came = 0;
+  /** @param {number} bytes */
+  const count = (bytes) => {
+    came += bytes;
+    onBytes(bytes);
+  };
+  for (const pause of source.pauses ?? []) {
+    try {
+      return await readOnce(source, entry, { signal, onBytes: count });
+    } catch (error) {
+      if (signal?.aborted) throw error;
     }
+    count(-came);
+    await new Promise((done) => setTimeout(done, pause));
   }
+  return readOnce(source, entry, { signal, onBytes });
 }
 
 /**
@@ -172,7 +180,7 @@ function checkOrders(buffer, { file, count, orders }) {
  * @param {Source} source @param {{ file: string, bytes: number, sha256?: string }} entry
  * @param {import("./source.js").ReadOptions} [options]
  */
-async function readChecked(source, { file, bytes, sha256 }, options) {
+async function readOnce(source, { file, bytes, sha256 }, options) {
   const buffer = await source.read(file, bytes, options);
   if (!globalThis.crypto?.subtle || sha256 === undefined) return buffer;
   const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", buffer));

@@ -1,9 +1,8 @@
-// A gswt.zip: tiles as PLY files for the public GSWT renderer, converted to a bundle. It holds no orders, distances or
-// surface; these are computed as dav_gswt/bundle/level_distances.py and orders.py do, with a fixed number of directions.
+// A gswt.zip: tiles as PLY files for the public GSWT renderer, converted to a bundle of plain records. It holds no
+// distances or surface; these are computed as dav_gswt/bundle/level_distances.py does.
 
-import { createDepthSorter } from "../terrain/draw_order.js";
 import { PageError, REMAKE_SET } from "./checks.js";
-import { chunkBytes, indexType, MAX_LEVELS, RECORD, VERSION } from "./layout.js";
+import { MAX_LEVELS, RECORD, VERSION } from "./layout.js";
 import { MAX_TILES, NAME } from "./manifest.js";
 import { fitEncoding, writeRecords } from "./quantize.js";
 import { fileSource, tooLarge } from "./source.js";
@@ -38,16 +37,17 @@ export const isGswt = (files) => [...files.keys()].some((name) => FILE.test(name
  */
 export async function gswtSource(files) {
   /** @type {import("./source.js").Files} */
-  const chunks = new Map();
+  const made = new Map();
   const { sets, levels, tiles } = await readSets(files);
+  sets.sort((a, b) => b.level - a.level || a.tile - b.tile); // as they are to be read
   const manifest = makeManifest(sets, levels, tiles);
-  for (const set of sets) {
-    const size = chunkBytes(set.count, manifest.directions.length);
-    chunks.set(chunkName(set), { size, open: async () => makeChunk(set, manifest) });
-  }
+  sets.forEach((set, k) => {
+    const { file, size } = manifest.parts[k];
+    made.set(file, { size, open: async () => makeRecords(set, manifest) });
+  });
   const text = new TextEncoder().encode(JSON.stringify(manifest)).buffer;
-  chunks.set(NAME, { size: text.byteLength, open: async () => text });
-  return fileSource(chunks);
+  made.set(NAME, { size: text.byteLength, open: async () => text });
+  return fileSource(made);
 }
 
 /** @param {import("./source.js").Files} files */
@@ -82,9 +82,6 @@ async function readSets(files) {
   return { sets, levels, tiles };
 }
 
-/** @param {{ tile: number, level: number }} set */
-const chunkName = ({ tile, level }) => `lod${level}_tile_${tile}.bin`;
-
 /**
  * The manifest of a set. Throws a PageError: it spreads too far.
  *
@@ -96,12 +93,13 @@ function makeManifest(sets, levels, tiles) {
   const sums = Array.from({ length: levels }, () => ({ scale: 0, count: 0, colour: [0, 0, 0] }));
   /** @type {import("./manifest.js").TileEntry[]} */
   const entries = Array.from({ length: tiles }, (_, tile) => (
-    { tile, uncertainty: 0, z: [Infinity, -Infinity], chunks: [] }));
-  for (const set of sets) {
+    { tile, uncertainty: 0, z: [Infinity, -Infinity], orders, chunks: [] }));
+  const parts = sets.map((set, part) => {
     const { tile, level, count } = set, { z, chunks } = entries[tile];
     addToSums(set, sums[level], z);
-    chunks.push({ level, file: chunkName(set), bytes: chunkBytes(count, orders.length), count, orders });
-  }
+    chunks.push({ level, count, part, first: 0 });
+    return { kind: "plain", file: `parts/lod${level}_tile_${tile}.bin`, bytes: RECORD * count, size: RECORD * count };
+  });
   const scales = sums.map(({ scale, count }) => scale / Math.max(1, count)), last = sums[levels - 1];
   const spacing = SIDE / Math.sqrt(sums[0].count / tiles), v = Math.atan((9 / 16) * Math.tan(Math.PI / 6));
   const encoding = fitEncoding(sets, SIDE, spacing / FLOOR_PIXELS);
@@ -109,7 +107,7 @@ function makeManifest(sets, levels, tiles) {
   const colour = last.colour.map((sum) => Math.min(Math.max(sum / Math.max(1, last.count), 0), 1));
   return {
     format: "davgswt", version: VERSION, unit: "unit", tile_side: SIDE, salt: 0, sky: SKY, encoding, directions,
-    tiles: entries, materials: [{ name: "ground", share: 1, first_tile: 0, ground_colour: colour }],
+    tiles: entries, parts, materials: [{ name: "ground", share: 1, first_tile: 0, ground_colour: colour }],
     eye_floor: (((spacing * FOCAL) / FLOOR_PIXELS) * Math.sin(Math.PI / 6 + v)) / Math.cos(v),
     ground_colour: colour,
     levels: scales.map((scale, level) => {
@@ -142,18 +140,11 @@ function orderDirections() {
   return [...ring, [0, 0, -1]];
 }
 
-const sort = createDepthSorter();
-
-/** The bytes of a chunk. @param {GaussianSet} set @param {Manifest} manifest */
-function makeChunk(set, { encoding, directions }) {
-  const { count, centres } = set, chunk = new ArrayBuffer(chunkBytes(count, directions.length));
-  writeRecords(chunk, set, encoding);
-  const orders = new (indexType(count))(chunk, count * RECORD), depths = new Float32Array(count);
-  directions.forEach(([x, y, z], d) => {
-    for (let k = 0; k < count; k++) depths[k] = centres[3 * k] * x + centres[3 * k + 1] * y + centres[3 * k + 2] * z;
-    orders.set(sort(depths, count), d * count);
-  });
-  return chunk;
+/** The records of a set. @param {GaussianSet} set @param {Manifest} manifest */
+function makeRecords(set, { encoding }) {
+  const buffer = new ArrayBuffer(RECORD * set.count);
+  writeRecords(buffer, set, encoding);
+  return buffer;
 }
 
 /**

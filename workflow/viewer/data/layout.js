@@ -1,7 +1,6 @@
-// Layout of a chunk's bytes, and of what the worker hands to the GPU: record rows, pages of orders, blocks of
-// instances, places of objects. A chunk has one 16-byte record a Gaussian (a texel of four 32-bit words), then its
-// orders. dav_gswt/bundle/encoding.py writes it, and quantize.js for sets that the page converts; draw/shaders.js
-// decodes it. An object of the terrain is numbered like a tile, after all tiles.
+// Layout of what the worker hands to the GPU: record rows, pages of orders, blocks of instances, places of objects. A
+// chunk has one 16-byte record a Gaussian (a texel of four 32-bit words). compose.js makes it, and quantize.js for sets
+// that the page converts; draw/shaders.js decodes it. An object of the terrain is numbered like a tile, after all tiles.
 
 /**
  * @typedef {import("./manifest.js").Manifest} Manifest
@@ -11,18 +10,16 @@
  * @typedef {{ origin: number[], step: number[], log_scale: number[], sh_degree: number }} Encoding
  */
 
-export const VERSION = 3, OLDEST = 2; // of the manifest; version 2 does not name its only material
+export const VERSION = 4; // of the manifest
 export const RECORD = 16; // bytes: position 3 x 16 bits; deviations, rotation 3 x 8 bits each; colour and opacity
-const WIDE = 65536; // from this number of Gaussians on, an index of an order takes four bytes
+const HELD = 33; // bytes of a Gaussian of a chunk in the worker: record, centre, index, size
 export const FARTHEST = 1e9; // of all lengths: single precision keeps their squares finite
-const MAX_STEPS = 65535, MAX_LOG = 60; // of the grid; of the logarithm of a deviation
+export const MAX_STEPS = 65535; // of the grid
+const MAX_LOG = 60; // of the logarithm of a deviation
 export const MAX_TURN = Math.sin(Math.PI / 8), TURN_STEPS = 127; // largest of a quaternion's x, y, z, and its steps
 
-/** Type of a chunk's orders. @param {number} count */
-export const indexType = (count) => (count < WIDE ? Uint16Array : Uint32Array);
-
-/** Bytes of a chunk. @param {number} count @param {number} orders */
-export const chunkBytes = (count, orders) => count * (RECORD + orders * indexType(count).BYTES_PER_ELEMENT);
+/** Bytes that a chunk takes in the worker. @param {number} count */
+export const chunkBytes = (count) => HELD * count;
 
 /** Is this an encoding that can be decoded? @param {any} value @returns {value is Encoding} */
 export function isEncoding(value) {
@@ -40,26 +37,6 @@ export function isEncoding(value) {
  * @param {Encoding} encoding @param {number} byte
  */
 export const deviationOf = ({ log_scale: [least, rise] }, byte) => Math.exp(least + rise * byte);
-
-/**
- * The parts of a chunk: records as words, all orders in one list, and of each Gaussian its centre and the byte of its
- * largest deviation.
- *
- * @param {ArrayBuffer} buffer @param {number} count @param {Encoding} encoding
- */
-export function parseChunk(buffer, count, { origin, step }) {
-  const records = new Uint32Array(buffer, 0, (count * RECORD) / 4);
-  const orders = new (indexType(count))(buffer, count * RECORD);
-  const centres = new Float32Array(3 * count), sizes = new Uint8Array(count);
-  for (let k = 0; k < count; k++) {
-    const first = records[4 * k], second = records[4 * k + 1];
-    centres[3 * k] = origin[0] + step[0] * (first & 65535);
-    centres[3 * k + 1] = origin[1] + step[1] * (first >>> 16);
-    centres[3 * k + 2] = origin[2] + step[2] * (second & 65535);
-    sizes[k] = Math.max((second >>> 16) & 255, second >>> 24, records[4 * k + 2] & 255);
-  }
-  return { records, orders, centres, sizes };
-}
 
 export const ROW = 1024; // Gaussians in a row of the record texture
 export const PAGE = 64; // entries of an order: Gaussians of one block of instances
@@ -85,36 +62,42 @@ const MAX_PAGES = 131072, MIN_PAGES = 1024; // of orders on the GPU: at most 8M 
 const BORDER_PAGES = 65536; // at least with several materials: a cell where they meet has orders of its own
 
 /**
- * All chunks of a manifest, and the number of the tile or object that each belongs to.
+ * All chunks of a manifest, or those of a level, and the number of the tile or object that each belongs to.
  *
- * @param {Manifest} manifest
+ * @param {Manifest} manifest @param {number} [level]
  */
-export function listChunks({ tiles, objects = [] }) {
-  return [...tiles, ...objects].flatMap(({ chunks }, tile) => chunks.map((entry) => ({ tile, entry })));
+export function listChunks({ tiles, objects = [] }, level) {
+  const all = [...tiles, ...objects].flatMap(({ chunks, orders }, tile) => chunks.map((entry) => ({ tile, entry, orders })));
+  return level === undefined ? all : all.filter(({ entry }) => entry.level === level);
 }
+
+/** Bytes in the worker, and rows of the record texture, of chunks. @param {{ entry: { count: number } }[]} chunks */
+const sizeOf = (chunks) => ({
+  bytes: chunks.reduce((sum, { entry }) => sum + chunkBytes(entry.count), 0),
+  rows: chunks.reduce((sum, { entry }) => sum + Math.ceil(entry.count / ROW), 0),
+});
 
 /**
  * Rows of the record texture: for all chunks, or for as many as the cache holds.
  *
  * @param {Manifest} manifest
  */
-export function recordRows(manifest) {
-  const all = listChunks(manifest).reduce((sum, { entry }) => sum + Math.ceil(entry.count / ROW), 0);
-  return Math.max(1, Math.min(all, Math.floor(CACHE_BYTES / (RECORD * ROW)), MAX_ROWS));
-}
+export const recordRows = (manifest) => (
+  Math.max(1, Math.min(sizeOf(listChunks(manifest)).rows, Math.floor(CACHE_BYTES / (RECORD * ROW)), MAX_ROWS)));
 
 /**
- * What a view may use of the chunk cache in a set that does not fit into it. The rest keeps chunks of the views before, so
- * that turning around or walking a few steps finds them. null: the whole set fits.
+ * What a view may use of the chunk cache, beside the coarsest level, in a set that does not fit into it. The rest keeps
+ * chunks of the views before, so that turning around or walking a few steps finds them. null: the whole set fits.
+ * Negative: not even the coarsest level does.
  *
  * @param {Manifest} manifest
  * @returns {{ bytes: number, rows: number } | null}
  */
 export function viewRoom(manifest) {
-  const chunks = listChunks(manifest), rows = recordRows(manifest);
-  const allBytes = chunks.reduce((sum, { entry }) => sum + entry.bytes, 0);
-  const allRows = chunks.reduce((sum, { entry }) => sum + Math.ceil(entry.count / ROW), 0);
-  return allBytes <= CACHE_BYTES && allRows <= rows ? null : { bytes: VIEW_SHARE * CACHE_BYTES, rows: VIEW_SHARE * rows };
+  const all = sizeOf(listChunks(manifest)), rows = recordRows(manifest);
+  if (all.bytes <= CACHE_BYTES && all.rows <= rows) return null;
+  const coarsest = sizeOf(listChunks(manifest, manifest.levels.length - 1));
+  return { bytes: VIEW_SHARE * (CACHE_BYTES - coarsest.bytes), rows: VIEW_SHARE * (rows - coarsest.rows) };
 }
 
 /**
@@ -123,7 +106,7 @@ export function viewRoom(manifest) {
  * @param {Manifest} manifest
  */
 export function orderPages(manifest) {
-  const all = listChunks(manifest).reduce((sum, { entry: { count, orders } }) => (
+  const all = listChunks(manifest).reduce((sum, { entry: { count }, orders }) => (
     sum + 3 * orders.length * Math.ceil(count / PAGE)), 0);
   return Math.min(MAX_PAGES, Math.max(manifest.classes ? BORDER_PAGES : MIN_PAGES, Math.ceil(all / 32) * 32));
 }

@@ -9,40 +9,50 @@ import {
   brief, isColour, isCoordinate, isDigest, isDirection, isFilled, isInside, isLength, isList, isName, isNatural,
   isRange, isSalt, isShare, isSize, isVector, isWhole, REMAKE,
 } from "./checks.js";
+import { PLANES } from "./compose.js";
 import {
-  CACHE_BYTES, chunkBytes, deviationOf, isEncoding, MAX_COUNT, MAX_LEVELS, MAX_ORDERS, OLDEST, VERSION,
+  CACHE_BYTES, chunkBytes, deviationOf, isEncoding, MAX_COUNT, MAX_LEVELS, MAX_ORDERS, MAX_STEPS, RECORD, VERSION,
+  viewRoom,
 } from "./layout.js";
+import { MAX_RATIO } from "./zip.js";
 
 /**
- * @typedef {{ level: number, file: string, bytes: number, count: number, orders: number[],
- *   sha256?: string }} ChunkEntry
- * @typedef {{ tile: number, uncertainty?: number, z: number[], chunks: ChunkEntry[] }} TileEntry
+ * A file of the bundle, and what it unpacks to; a chunk: of records from `first` on in a part, or composed; and how the
+ * composed levels are made.
+ * @typedef {{ kind: string, file: string, bytes: number, size: number, sha256?: string, level?: number }} PartEntry
+ * @typedef {{ level: number, count: number, part?: number, first?: number }} ChunkEntry
+ * @typedef {{ side: number, cell: number, levels: number, exemplars: number[] }} Composition
+ * @typedef {{ tile: number, uncertainty?: number, z: number[], orders: number[], chunks: ChunkEntry[] }} TileEntry
  * @typedef {{ level: number, mean_scale?: number, distance: number | null, band?: number }} LevelEntry
  * @typedef {{ zenith: number[], horizon: number[], sun?: { direction: number[], colour?: number[] } }} Sky
  * @typedef {{ name: string, share: number, first_tile: number, ground_colour: number[] }} MaterialEntry
  * @typedef {{ name: string, radius: number, z: number[], ground: number, material: number, density: number,
- *   probability: number, chunks: ChunkEntry[] }} ObjectEntry
+ *   probability: number, orders: number[], chunks: ChunkEntry[] }} ObjectEntry
  * @typedef {{ format: string, version: number, unit: string, tile_side: number, salt: number, eye_floor: number,
  *   ground_colour: number[], sky: Sky, encoding: import("./layout.js").Encoding, directions: number[][],
- *   levels: LevelEntry[], tiles: TileEntry[], materials: MaterialEntry[],
+ *   levels: LevelEntry[], parts: PartEntry[], composition?: Composition, tiles: TileEntry[], materials: MaterialEntry[],
  *   classes?: import("../terrain/classes.js").ClassesEntry, objects?: ObjectEntry[],
  *   scatter?: import("../terrain/scatter.js").ScatterEntry,
  *   heights?: import("../terrain/heights.js").HeightsEntry }} Manifest
  */
 
 export const NAME = "davgswt.json";
+export const KINDS = new Set(["records", "plain", "recipes", "level"]); // of parts; others are for later pages
 export const MAX_TILES = 256; // of a material
 export const MAX_CANDIDATES = 512; // objects on a tile at most
 const FORMAT = "davgswt", MAX_SIDE = 4096; // pixels along a side of a height map
 const MAX_FACE = 1 << 24; // cells along the side of a planet's face
 const WIDEST = 8; // of deviations, in tile sides
 const MAX_TERMS = 64, MAX_OBJECTS = 256, MAX_CELLS = 64; // of a rule; of a terrain; of the scatter along a tile's side
+const MAX_PARTS = 4096, MAX_UNPACKED = 2 ** 30; // bytes of all parts
+const WHOLE = 1e-9; // relative error of a tile's side in steps
 const MAX_WAVES = 4096; // cells of the jitter along a tile's side
 const UNTURNED = 180; // degrees
 const DEEPEST = 6; // levels of lists and objects within a manifest
 const KEYS = new Set(`format version unit tile_side salt eye_floor ground_colour sky zenith horizon
   sun direction colour encoding origin step log_scale sh_degree directions levels level mean_scale
   distance band tiles tile uncertainty z chunks file bytes count orders sha256 heights kind height
+  parts part first composition side cell exemplars
   wavelength octaves radius cells rows columns width materials name share first_tile classes
   rule weight wavelengths biases material low high soft jitter amplitude rise slope most ground
   clearance painted objects density probability scatter turn size`.split(/\s+/));
@@ -70,6 +80,11 @@ const PARTS = {
   materials: (materials, { tiles }) => Array.isArray(materials) && isWhole(materials.length, 1, MAX_MATERIALS)
     && tiles.length % (16 * materials.length) === 0
     && materials.every((one, m) => isMaterial(one, (m * tiles.length) / materials.length)),
+  parts: (parts) => isFilled(parts) && parts.length <= MAX_PARTS && parts.every(isPart)
+    && parts.reduce((/** @type {number} */ sum, /** @type {any} */ { kind, size }) => (
+      KINDS.has(kind) ? sum + size : sum), 0) <= MAX_UNPACKED,
+  composition: (composition, m) => (composition === undefined
+    ? !m.parts.some((/** @type {any} */ { kind }) => kind === "recipes" || kind === "level") : isComposition(composition, m)),
   classes: (classes, { materials: { length } }) => (length > 1 ? areClasses(classes, length) : classes === undefined),
   objects: (objects, { materials, tile_side: side }) => objects === undefined
     || (isFilled(objects) && objects.length <= MAX_OBJECTS
@@ -80,7 +95,7 @@ const PARTS = {
 };
 
 /**
- * Why a manifest cannot be used, or null. Version 2 does not name its only material: it is added.
+ * Why a manifest cannot be used, or null.
  *
  * @param {any} m parsed JSON
  * @returns {string | null}
@@ -89,12 +104,9 @@ export function findFault(m) {
   if (m === null || typeof m !== "object" || m.format !== FORMAT) {
     return `this is not a terrain (format “${brief(m?.format)}”, “${FORMAT}” is needed).`;
   }
-  if (m.version !== VERSION && m.version !== OLDEST) {
-    return `the terrain has version ${brief(m.version)}, this page reads version ${OLDEST} and ${VERSION}. ${REMAKE}`;
-  }
-  if (m.version === OLDEST) {
-    const only = { name: "ground", share: 1, first_tile: 0, ground_colour: m.ground_colour };
-    Object.assign(m, { materials: [only], classes: undefined, objects: undefined, scatter: undefined });
+  if (m.version !== VERSION) {
+    return `the terrain is a bundle of version ${brief(m.version)}, this page reads version ${VERSION}. `
+      + "Make it again: “dav-gswt make” (or the workflow) on its scene.";
   }
   for (const [key, isSound] of Object.entries(PARTS)) {
     if (!isSound(m[key], m)) return `“${key}” is missing or makes no sense. ${REMAKE}`;
@@ -102,12 +114,16 @@ export function findFault(m) {
   const { tiles, objects = [] } = m;
   for (const [t, tile] of tiles.entries()) {
     const sound = tile?.tile === t && isRange(tile.z) && isShare(tile.uncertainty ?? 0);
-    const fault = findChunkFault(m, sound ? tile.chunks : null, `tile ${t}`);
+    const fault = findChunkFault(m, sound ? tile : {}, `tile ${t}`, m.composition?.levels ?? 0);
     if (fault) return fault;
   }
-  for (const [k, { chunks }] of objects.entries()) {
-    const fault = findChunkFault(m, chunks, `object ${k}`);
+  for (const [k, object] of objects.entries()) {
+    const fault = findChunkFault(m, object, `object ${k}`, 0);
     if (fault) return fault;
+  }
+  const room = viewRoom(m);
+  if (room && Math.min(room.bytes, room.rows) < 0) {
+    return "its coarsest level has more splats than this page holds. Make fewer tiles, or another level.";
   }
   return findCrowd(m);
 }
@@ -121,23 +137,55 @@ function findCrowd({ objects, scatter }) {
   return `up to ${most} objects stand on a tile, this page draws ${MAX_CANDIDATES}. Make fewer, or smaller tiles.`;
 }
 
-/** @param {any} m @param {any} chunks @param {string} owner */
-function findChunkFault(m, chunks, owner) {
+/** @param {any} m @param {any} entry @param {string} owner @param {number} composed levels */
+function findChunkFault(m, { chunks, orders }, owner, composed) {
   if (!Array.isArray(chunks)) return `${owner} is missing or makes no sense. ${REMAKE}`;
+  if (!areOrders(orders, m.directions.length)) return `the orders of ${owner} make no sense. ${REMAKE}`;
   const levels = new Set(chunks.map((/** @type {any} */ chunk) => chunk?.level));
   if (levels.size !== m.levels.length || chunks.length !== m.levels.length) {
     return `${owner} does not have one chunk for each of ${m.levels.length} levels. ${REMAKE}`;
   }
   for (const chunk of chunks) {
     const sound = isNatural(chunk?.level) && chunk.level < m.levels.length && isNatural(chunk.count) && chunk.count > 0
-      && areOrders(chunk.orders, m.directions.length)
-      && chunk.bytes === chunkBytes(chunk.count, chunk.orders.length) && isInside(chunk.file) && isDigest(chunk.sha256);
-    if (!sound) return `the entry of chunk “${brief(chunk?.file)}” contradicts itself. ${REMAKE}`;
-    if (chunk.count > MAX_COUNT || chunk.bytes > CACHE_BYTES) {
-      return `the chunk “${chunk.file}” has ${chunk.bytes} bytes, more than this page holds. Make smaller tiles.`;
+      && (chunk.level < composed ? chunk.part === undefined : isStored(chunk, m.parts));
+    if (!sound) return `the chunk of level ${brief(chunk?.level)} of ${owner} contradicts itself. ${REMAKE}`;
+    if (chunk.count > MAX_COUNT || chunkBytes(chunk.count) > CACHE_BYTES) {
+      return `level ${chunk.level} of ${owner} has ${chunk.count} splats, more than this page holds. Make smaller tiles.`;
     }
   }
   return null;
+}
+
+/** Does a part hold the records of a chunk? @param {any} chunk @param {any[]} parts */
+function isStored({ part, first, count }, parts) {
+  const { kind, size } = isNatural(part) && parts[part] || {};
+  return isNatural(first) && ((kind === "records" && PLANES * (first + count) <= size)
+    || (kind === "plain" && RECORD * (first + count) <= size));
+}
+
+/** @param {any} part */
+function isPart(part) {
+  if (typeof part?.kind !== "string") return false;
+  if (!KINDS.has(part.kind)) return true;
+  const { kind, file, bytes, size, sha256, level } = part;
+  return typeof file === "string" && /^parts\/\w{1,100}\.bin$/.test(file) && isDigest(sha256)
+    && isWhole(bytes, 1, MAX_UNPACKED) && isWhole(size, 1, MAX_RATIO * bytes)
+    && (kind !== "records" || size % PLANES === 0) && (kind !== "plain" || (size === bytes && size % RECORD === 0))
+    && (kind === "level") === (level !== undefined) && (kind !== "level" || isNatural(level));
+}
+
+/** @param {any} composition @param {any} m */
+function isComposition(composition, { tile_side: long, encoding: { origin, step }, levels, materials, parts }) {
+  const { side, cell, levels: many, exemplars } = composition ?? {};
+  if (![side, cell].every((n) => isWhole(n, 1, MAX_STEPS)) || !isWhole(many, 1, levels.length)) return false;
+  if (side % 2 ** (many - 1) || !isList(exemplars, materials.length, (m) => isWhole(m, 1, MAX_STEPS))) return false;
+  const fits = [0, 1].every((axis) => Math.abs(side * cell * step[axis] - long) <= WHOLE * long
+    && isWhole(Math.round(-origin[axis] / step[axis]) || 0, 0, MAX_STEPS - side * cell));
+  /** @param {string} kind */
+  const listed = (kind) => parts.filter((/** @type {any} */ part) => part.kind === kind);
+  const stored = listed("level").map((/** @type {any} */ { level }) => level);
+  return fits && listed("recipes").length === 1 && stored.length === many && new Set(stored).size === many
+    && stored.every((/** @type {number} */ level) => level < many);
 }
 
 /**

@@ -48,7 +48,7 @@ export function fitEncoding(sets, side, pixel) {
 }
 
 /**
- * Write Gaussians' records to the beginning of a chunk.
+ * Write Gaussians' records to the beginning of a buffer.
  *
  * @param {ArrayBuffer} buffer @param {Gaussians} gaussians @param {Encoding} encoding
  */

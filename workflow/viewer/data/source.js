@@ -4,10 +4,12 @@
 import { PageError, REMAKE } from "./checks.js";
 
 /**
- * `read(file, size, options)` gives exactly `size` bytes (null: at most MAX_BYTES), or throws a PageError.
+ * `read(file, size, options)` gives exactly `size` bytes (null: at most MAX_BYTES), or throws a PageError. pauses:
+ * milliseconds before it is worth another try.
  *
  * @typedef {{ signal?: AbortSignal, onBytes?: (bytes: number) => void }} ReadOptions
- * @typedef {{ read: (file: string, size: number | null, options?: ReadOptions) => Promise<ArrayBuffer> }} Source
+ * @typedef {{ read: (file: string, size: number | null, options?: ReadOptions) => Promise<ArrayBuffer>,
+ *   pauses?: number[] }} Source
  *
  * Files by name: their size, and how they are read.
  * @typedef {{ size: number, open: () => Promise<ArrayBuffer> }} FileEntry
@@ -16,6 +18,7 @@ import { PageError, REMAKE } from "./checks.js";
 
 export const MAX_BYTES = 2 ** 26; // of a file whose size nothing says, such as a manifest
 export const MAX_FILES = 4096; // in a folder or a zip
+const PAUSES = [300, 900, 2700]; // milliseconds
 
 /** @param {string} file */
 const shortName = (file) => file.split("/").slice(-2).join("/");
@@ -23,6 +26,7 @@ const shortName = (file) => file.split("/").slice(-2).join("/");
 /** Files below a URL. @param {URL} base @returns {Source} */
 export function webSource(base) {
   return {
+    pauses: PAUSES,
     async read(file, size, { signal, onBytes = () => {} } = {}) {
       const response = await request(new URL(file, base), file, signal), most = size ?? MAX_BYTES;
       const reader = /** @type {ReadableStream<Uint8Array>} */ (response.body).getReader(), parts = [];
@@ -64,6 +68,31 @@ export function fileSource(files) {
       return buffer;
     },
   };
+}
+
+/**
+ * The bytes of a stream, which are exactly `size`: it is stopped at the first one more.
+ *
+ * @param {ReadableStream<Uint8Array>} stream @param {number} size
+ * @param {(what: string) => PageError} broken
+ */
+export async function readStream(stream, size, broken) {
+  const bytes = new Uint8Array(size), reader = stream.getReader();
+  let at = 0;
+  try {
+    for (let step = await reader.read(); !step.done; step = await reader.read()) {
+      if (at + step.value.length > size) {
+        await reader.cancel();
+        throw broken("larger than was promised");
+      }
+      bytes.set(step.value, at);
+      at += step.value.length;
+    }
+  } catch (error) {
+    throw error instanceof PageError ? error : broken("damaged");
+  }
+  if (at < size) throw broken("cut short");
+  return bytes;
 }
 
 /** @param {string} file */

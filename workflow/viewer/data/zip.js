@@ -2,12 +2,12 @@
 // anything is allocated, checksums after. Stored and deflated entries; no zip64.
 
 import { PageError } from "./checks.js";
-import { MAX_FILES } from "./source.js";
+import { MAX_FILES, readStream } from "./source.js";
 
 const END = 0x06054b50, ENTRY = 0x02014b50, LOCAL = 0x04034b50; // signatures of records
 const END_SIZE = 22, ENTRY_SIZE = 46, LOCAL_SIZE = 30, MAX_COMMENT = 65535;
 const MAX_TABLE = 2 ** 24; // bytes of the table of entries
-const MAX_RATIO = 1032; // bytes that a deflated byte unpacks to, at most
+export const MAX_RATIO = 1032; // bytes that a deflated byte unpacks to, at most
 const MAX_BYTES = 2 ** 31; // of all entries unpacked
 
 /** @typedef {{ name: string, method: number, crc: number, packed: number, size: number, local: number }} Entry */
@@ -80,23 +80,9 @@ async function unpack(blob, { name, method, crc, packed, size, local }) {
   }
   const begin = local + LOCAL_SIZE + head.getUint16(26, true) + head.getUint16(28, true);
   if (begin + packed > blob.size) throw broken(`${name} is cut short`);
-  const stored = blob.slice(begin, begin + packed), bytes = new Uint8Array(size);
-  const stream = method === 0 ? stored.stream() : stored.stream().pipeThrough(new DecompressionStream("deflate-raw"));
-  const reader = stream.getReader();
-  let at = 0;
-  try {
-    for (let step = await reader.read(); !step.done; step = await reader.read()) {
-      if (at + step.value.length > size) {
-        await reader.cancel();
-        throw broken(`${name} is larger than the table says`);
-      }
-      bytes.set(step.value, at);
-      at += step.value.length;
-    }
-  } catch (error) {
-    throw error instanceof PageError ? error : broken(`${name} is damaged`);
-  }
-  if (at < size) throw broken(`${name} is cut short`);
+  const stored = blob.slice(begin, begin + packed).stream();
+  const stream = method === 0 ? stored : stored.pipeThrough(new DecompressionStream("deflate-raw"));
+  const bytes = await readStream(stream, size, (what) => broken(`${name} is ${what}`));
   if (crc32(bytes) !== crc) throw broken(`${name} is damaged (its checksum is another)`);
   return bytes.buffer;
 }

@@ -1,14 +1,12 @@
-// An open terrain: its manifest and surface, the worker that chooses what is drawn, and the reading of its chunks. The
+// An open terrain: its manifest and surface, the worker that chooses what is drawn, and the reading of its parts. The
 // page and the importable terrain (terrain_api.js) have this in common.
 
-import { initialChunks, readChunks, readHeightMap, readManifest } from "../data/bundle.js";
-import { chunkKey, listChunks } from "../data/layout.js";
+import { readHeightMap, readManifest, readParts } from "../data/bundle.js";
+import { PageError } from "../data/checks.js";
 import { REACH } from "../terrain/cells.js";
 import { createHeights } from "../terrain/heights.js";
 import { findEnd, findReach } from "../terrain/sphere_cells.js";
 
-const MOST_PENDING = 12; // chunks on their way while a view waits for more: it may have changed before they arrive
-const TURN = 4; // milliseconds until what is pending is looked at again
 const WIDER = 1.25; // times the picture's size, so that a turn finds tiles before the worker has answered
 const MIN_LOW = 1e-4; // sine of the angle below the horizon at which tiles end, at least
 
@@ -25,7 +23,6 @@ const MIN_LOW = 1e-4; // sine of the angle below the horizon at which tiles end,
  *
  * @typedef {{ onRecords: (records: import("../worker/worker.js").Records) => void,
  *   onFrame: (frame: FrameAnswer) => void, onError: (error: Error) => void }} Handlers
- * @typedef {Handlers & { onRefused: (chunk: import("../worker/worker.js").Refused) => void }} ClientHandlers
  * @typedef {ReturnType<typeof createWorkerClient>} WorkerClient
  * @typedef {ReturnType<typeof openTerrain>} OpenTerrain
  */
@@ -42,87 +39,24 @@ export async function readTerrain(source) {
 }
 
 /** Start the worker of a terrain. @param {TerrainFiles} files @param {Handlers} handlers */
-export function openTerrain({ source, manifest, pixels }, { onRecords, onFrame, onError }) {
-  let begun = false; // the first chunks were read
-  /** @type {FrameAnswer | null} */
-  let last = null;
-  /** @type {unknown} */
-  let failure = null; // of reading a chunk that a view needs
-  /** @type {Set<number>} */
-  const pending = new Set(); // keys of chunks that are being read, or on their way to the worker
-  const stop = new AbortController();
-  const client = createWorkerClient({ manifest, pixels }, {
-    onRecords(records) {
-      pending.delete(chunkKey(records.tile, records.level));
-      onRecords(records);
-    },
-    onRefused: ({ tile, level }) => pending.delete(chunkKey(tile, level)),
-    onFrame(frame) {
-      last = frame;
-      onFrame(frame);
-      if (begun) readMissing(frame.missing);
-    },
-    onError,
-  });
-
-  /**
-   * Read chunks. Those that fail stay pending, so they are not requested in every frame.
-   *
-   * @param {import("../data/bundle.js").QueueItem[]} queue
-   * @param {(progress: import("../data/bundle.js").Progress) => void} [onProgress]
-   */
-  function read(queue, onProgress) {
-    for (const { tile, entry } of queue) pending.add(chunkKey(tile, entry.level));
-    return readChunks(queue, source, { take: (chunk) => client.add(chunk), onProgress, signal: stop.signal });
-  }
-
-  /** Read chunks that a view needs, the coarsest first, a few at a time. @param {number[]} missing */
-  function readMissing(missing) {
-    const keys = new Set(missing.filter((key) => !pending.has(key))), room = MOST_PENDING - pending.size;
-    if (!keys.size || room <= 0) return;
-    const queue = listChunks(manifest).filter(({ tile, entry }) => keys.has(chunkKey(tile, entry.level)));
-    queue.sort((a, b) => b.entry.level - a.entry.level);
-    read(queue.slice(0, room)).catch((error) => {
-      if (stop.signal.aborted) return;
-      failure = error;
-      onError(error);
-    });
-  }
-
+export function openTerrain({ source, manifest, pixels }, handlers) {
+  const stop = new AbortController(), client = createWorkerClient({ manifest, pixels }, handlers);
   return {
-    source, manifest, client, pending, heights: createHeights(manifest.heights, pixels),
+    manifest, client, heights: createHeights(manifest.heights, pixels),
     /** Mean height of the ground of its tiles above the surface. */
     lift: mean(manifest.classes?.rise.ground ?? [0]),
     /**
-     * Read the first chunks, the coarsest level first. Returns: were they read, and not ended meanwhile? Throws a PageError.
+     * Read all parts. Returns: were they unpacked, and not ended meanwhile? Throws a PageError.
      *
      * @param {(progress: import("../data/bundle.js").Progress) => void} [onProgress]
      */
     async readAll(onProgress) {
       try {
-        await read(initialChunks(manifest), onProgress);
+        await readParts(manifest, source, { take: client.addPart, onProgress, signal: stop.signal });
       } catch (error) {
-        if (stop.signal.aborted) return false;
-        throw error;
+        if (!stop.signal.aborted) throw error;
       }
-      begun = true;
-      return true;
-    },
-    /**
-     * Ask the worker for the exact frame of a camera until no chunk of it is missing; while the first chunks are read,
-     * once. Throws what the reading throws.
-     *
-     * @param {import("../terrain/camera.js").Camera} camera @param {number} budget
-     */
-    async askForAll(camera, budget) {
-      do {
-        client.ask(camera, budget, true);
-        await client.answered();
-        while (begun && last?.missing.length && pending.size && !stop.signal.aborted) {
-          if (failure) throw failure;
-          await new Promise((done) => setTimeout(done, TURN));
-        }
-      } while (begun && last?.missing.length && !stop.signal.aborted);
+      return !stop.signal.aborted;
     },
     /** Stop the worker and all reading. */
     end() {
@@ -135,18 +69,30 @@ export function openTerrain({ source, manifest, pixels }, { onRecords, onFrame, 
 /**
  * The page's end of the worker: views go out, frames come back; the page draws the last frame and never waits.
  *
- * @param {Omit<import("../worker/worker.js").Begin, "kind">} bundle @param {ClientHandlers} handlers
+ * @param {Omit<import("../worker/worker.js").Begin, "kind">} bundle @param {Handlers} handlers
  */
-function createWorkerClient(bundle, { onRecords, onRefused, onFrame, onError }) {
+function createWorkerClient(bundle, { onRecords, onFrame, onError }) {
   const worker = new Worker(new URL("../worker/worker.js", import.meta.url), { type: "module" });
   let id = 0, answered = 0, busy = false, ended = false;
   /** @type {{ id: number, resolve: () => void, reject: (error: Error) => void }[]} */
   let waiting = [];
+  let asked = 0;
+  /** @type {Map<string, { resolve: (records?: Uint32Array) => void, reject: (error: Error) => void }>} */
+  const promised = new Map(); // parts to be unpacked, and records that were asked for
+  /** @param {string} key @returns {Promise<Uint32Array | undefined>} */
+  const promise = (key) => (
+    ended ? Promise.resolve(undefined) : new Promise((resolve, reject) => promised.set(key, { resolve, reject })));
+  /** @param {string} key @param {Uint32Array} [records] */
+  const keep = (key, records) => {
+    promised.get(key)?.resolve(records);
+    promised.delete(key);
+  };
   /** @param {import("../worker/worker.js").Request} request @param {Transferable[]} [moved] */
   const post = (request, moved = []) => worker.postMessage(request, moved);
   /** @param {Error} error */
   const fail = (error) => {
-    for (const { reject } of waiting.splice(0)) reject(error);
+    for (const { reject } of [...waiting.splice(0), ...promised.values()]) reject(error);
+    promised.clear();
     onError(error);
   };
   /** @param {FrameAnswer} frame */
@@ -161,10 +107,12 @@ function createWorkerClient(bundle, { onRecords, onRefused, onFrame, onError }) 
   worker.addEventListener("message", (event) => {
     if (ended) return;
     const reply = /** @type {import("../worker/worker.js").Reply} */ (event.data);
-    if (reply.kind === "failed") fail(Object.assign(new Error(reply.message), { name: reply.name }));
-    else if (reply.kind === "frame") takeFrame(reply.frame);
+    if (reply.kind === "failed") {
+      fail(reply.said ? new PageError(reply.message) : Object.assign(new Error(reply.message), { name: reply.name }));
+    } else if (reply.kind === "frame") takeFrame(reply.frame);
     else if (reply.kind === "records") onRecords(reply);
-    else onRefused(reply);
+    else if (reply.kind === "part") keep(`part ${reply.index}`);
+    else keep(`asked ${reply.id}`, reply.records);
   });
   worker.addEventListener("error", (event) => {
     event.preventDefault();
@@ -176,8 +124,16 @@ function createWorkerClient(bundle, { onRecords, onRefused, onFrame, onError }) 
     get idle() {
       return !busy;
     },
-    /** @param {import("../data/bundle.js").Chunk} chunk */
-    add: (chunk) => post({ kind: "chunk", chunk }, [chunk.buffer]),
+    /** Resolves when the part is unpacked. @param {number} index @param {ArrayBuffer} buffer */
+    async addPart(index, buffer) {
+      post({ kind: "part", index, buffer }, [buffer]);
+      await promise(`part ${index}`);
+    },
+    /** The records of a chunk, when all parts are there; undefined: the worker was stopped. @param {number} tile @param {number} level */
+    recordsOf(tile, level) {
+      post({ kind: "ask", id: ++asked, tile, level });
+      return promise(`asked ${asked}`);
+    },
     /** Post all records again: the GPU has lost them. */
     restore: () => post({ kind: "restore" }),
     /** Paint points: I, J and material of each. @param {Int32Array} points */
@@ -202,7 +158,7 @@ function createWorkerClient(bundle, { onRecords, onRefused, onFrame, onError }) 
     /** Stop the worker; whoever waits goes on. */
     end() {
       ended = true;
-      for (const { resolve } of waiting.splice(0)) resolve();
+      for (const { resolve } of [...waiting.splice(0), ...promised.values()]) resolve();
       worker.terminate();
     },
   };

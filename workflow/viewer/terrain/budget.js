@@ -5,7 +5,7 @@
 // the next coarser one everywhere, so ground covers the picture under any budget.
 //
 // In a set that does not fit into the chunk cache, a second factor limits the chunks that a view needs to a part of the
-// cache. Both factors then depend on the camera alone, not on what has arrived: at rest a view asks for each chunk once.
+// cache. Both factors then depend on the camera alone, not on what is at hand: at rest each chunk is composed once.
 
 import { REACH } from "./cells.js";
 import { cellsInFrustum } from "./frustum.js";
@@ -26,6 +26,7 @@ import { findReach } from "./sphere_cells.js";
 
 const REACH_EXPONENT = 1 / 5; // the reach shrinks by the factor to this power, chosen by measurement
 const BISECTIONS = 12; // of the search for the factor
+const ALL = -1; // bits of levels
 const NEVER = -1; // switch distance of a level that is not used
 
 /**
@@ -38,8 +39,7 @@ export function selectCells(terrain, camera, budget) {
   const { sphere, sphereCells, side } = terrain, above = eyeHeight(terrain, camera);
   const least = sphere ? above : 0, reach = sphere ? findReach(terrain, sphere, camera.eye) : REACH * side;
   const cells = sphereCells ? sphereCells(camera, reach) : cellsInFrustum(terrain, camera, reach);
-  const findLevels = terrain.room ? obtainableLevels : arrivedLevels;
-  for (const cell of cells) cell.arrived = findLevels(terrain, cell.tiles);
+  for (const cell of cells) cell.arrived = terrain.room ? ALL : arrivedLevels(terrain, cell.tiles);
   /** @param {Distances} distances */
   const cost = (distances) =>
     cells.reduce((sum, cell) => (chooseLevels(terrain, cell, distances) ? sum + cell.count : sum), 0);
@@ -119,23 +119,16 @@ function arrivedLevels({ tiles }, numbers) {
   return arrived;
 }
 
-/** Bits of the levels that all tiles have or can get. @param {TerrainTables} terrain @param {number[]} numbers */
-function obtainableLevels({ tiles }, numbers) {
-  let lost = 0;
-  for (let k = 0; k < numbers.length; k++) lost |= tiles[numbers[k]].lost;
-  return ~lost;
-}
-
 /**
  * Set the wish of a view: the levels of each tile and object that it shows when all of them have arrived. An object's
  * levels are taken from the distances of its cell, widened by the object's extent.
  *
  * @param {TerrainTables} terrain
- * @param {Cell[]} cells with their obtainable levels
+ * @param {Cell[]} cells with all levels
  * @param {Distances} distances
  */
 function setWish(terrain, cells, { switches, bands, reach }) {
-  const { wish, tiles, objects, heights } = terrain, span = { nearest: 0, farthest: 0, lo: 0, hi: 0, whole: false, missing: 0 };
+  const { wish, objects, heights } = terrain, span = { nearest: 0, farthest: 0, lo: 0, hi: 0, whole: false, missing: 0 };
   wish.fill(0);
   for (const cell of cells) {
     if (cell.nearest >= reach) continue;
@@ -146,18 +139,18 @@ function setWish(terrain, cells, { switches, bands, reach }) {
       const extent = objects[number].extent * size * (1 + heights.steepest);
       span.nearest = cell.nearest - extent;
       span.farthest = cell.farthest + extent;
-      if (pickLevels(terrain, span, ~tiles[tile].lost, switches, bands)) wish[tile] |= (2 << span.hi) - (1 << span.lo);
+      if (pickLevels(terrain, span, ALL, switches, bands)) wish[tile] |= (2 << span.hi) - (1 << span.lo);
     }
   }
 }
 
-/** Do the chunks that a view needs fit into its room? @param {TerrainTables} terrain @param {Cell[]} cells @param {Distances} distances */
+/** Do the chunks that a view needs fit into its room, beside the coarsest level? @param {TerrainTables} terrain @param {Cell[]} cells @param {Distances} distances */
 function fitsRoom(terrain, cells, distances) {
-  const { tiles, wish, room } = terrain;
+  const { tiles, wish, room, levels } = terrain;
   setWish(terrain, cells, distances);
   let bytes = 0, rows = 0;
   for (let tile = 0; tile < tiles.length; tile++) {
-    for (let level = 0; wish[tile] >> level; level++) {
+    for (let level = 0; level < levels - 1; level++) {
       if (!((wish[tile] >> level) & 1)) continue;
       bytes += tiles[tile].bytes[level];
       rows += tiles[tile].rows[level];

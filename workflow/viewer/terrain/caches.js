@@ -79,8 +79,9 @@ export function createRecentCache(most, sizeOf, onForget = () => {}) {
 }
 
 /**
- * An entry: its pages, what its user counts in them, and when it was last used; -1: it was evicted.
- * @typedef {{ pages: Uint32Array, count: number, stamp: number }} PoolEntry
+ * An entry: its pages, what its user counts in them, when it was last used (-1: it was evicted), and whether it is
+ * kept longer than others.
+ * @typedef {{ pages: Uint32Array, count: number, stamp: number, kept: boolean }} PoolEntry
  */
 
 /**
@@ -88,8 +89,9 @@ export function createRecentCache(most, sizeOf, onForget = () => {}) {
  * what was used at the current stamp is never evicted.
  *
  * @param {number} capacity @param {(key: number) => void} [onEvict]
+ * @param {number} [ahead] pages that are made free besides those that are needed: to look for them takes long
  */
-export function createPagePool(capacity, onEvict = () => {}) {
+export function createPagePool(capacity, onEvict = () => {}, ahead = 0) {
   const free = Uint32Array.from({ length: capacity }, (_, k) => capacity - 1 - k);
   /** @type {Map<number, PoolEntry>} */
   const entries = new Map();
@@ -105,9 +107,10 @@ export function createPagePool(capacity, onEvict = () => {}) {
   };
   /** @param {number} count @param {number} stamp */
   const makeRoom = (count, stamp) => {
-    const old = [...entries].filter(([, entry]) => entry.stamp < stamp).sort((a, b) => a[1].stamp - b[1].stamp);
+    const old = [...entries].filter(([, entry]) => entry.stamp < stamp)
+      .sort(([, a], [, b]) => Number(a.kept) - Number(b.kept) || a.stamp - b.stamp);
     for (const [key] of old) {
-      if (left >= count) break;
+      if (left >= count + ahead) break;
       evict(key);
     }
     return left >= count;
@@ -124,14 +127,21 @@ export function createPagePool(capacity, onEvict = () => {}) {
      *
      * @param {number} key
      * @param {number} many pages
-     * @param {number} stamp @param {number} count
+     * @param {number} stamp @param {number} count @param {boolean} [kept]
      */
-    allocate(key, many, stamp, count) {
+    allocate(key, many, stamp, count, kept = false) {
       if (left < many && !makeRoom(many, stamp)) return null;
-      const entry = { pages: free.slice(left - many, left).reverse(), count, stamp };
+      const entry = { pages: free.slice(left - many, left).reverse(), count, stamp, kept };
       left -= many;
       entries.set(key, entry);
       return entry;
+    },
+    /** Free pages. */
+    get left() {
+      return left;
+    },
+    get size() {
+      return entries.size;
     },
     /** Evict all entries with such keys. @param {(key: number) => boolean} matches */
     evictWhere(matches) {

@@ -33,7 +33,7 @@ export function tileUnder({ tile_side: side, salt, tiles, materials }, heights, 
  * A cell where materials meet. serial: distinguishes it from all others; kept: by chunk, the Gaussians that stay in it;
  * last, batch: key of the batch that was drawn last, and the batch; stale: its classes have changed.
  * @typedef {{ i: number, j: number, serial: number, kept: Map<number, Uint32Array>, last: number | null,
- *   batch: { pages: Uint32Array, count: number, stamp: number } | null, stale: boolean }} Border
+ *   batch: import("./caches.js").PoolEntry | null, stale: boolean }} Border
  *
  * A cache of cells by their coordinates modulo RING: the tile (of the first material), height and slope at the centre,
  * bounds of the height; the tiles of all materials that may show, the Gaussians by level that stay of them and of the

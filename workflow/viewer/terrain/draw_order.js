@@ -1,7 +1,10 @@
 // Draw order of cells and tiles: back to front, with little or no sorting; and a sort of Gaussians by depth.
 // The same as dav_gswt/terrain/draw_order.py; tests/golden/draw_order.json holds both to it.
 
+import { run } from "../data/compose.js";
+
 const BITS = 11, DIGITS = 1 << BITS; // of the radix sort
+const STEP = 32768; // Gaussians
 
 /**
  * Call `visit(di, dj)` for the cells of a window of `most` cells to every side of the eye's, back to front.
@@ -54,28 +57,31 @@ export function nearestOrder(directions, orders, to, east, north) {
 
 /**
  * A stable radix sort of float bits, with buffers of its own: `sort(depths, n)` gives the indices of the first n depths
- * from back to front. The next call overwrites the result.
+ * from back to front, `sort.steps` does so in steps. The next call overwrites the result.
  *
- * @typedef {(depths: Float32Array, n: number) => Uint32Array} DepthSorter
- * @returns {DepthSorter}
+ * @typedef {ReturnType<typeof createDepthSorter>} DepthSorter
  */
 export function createDepthSorter() {
   let keys = new Uint32Array(0), indices = [keys, keys];
   const counts = new Uint32Array(3 * DIGITS);
-  return function sort(depths, n) {
+  /** @param {Float32Array} depths @param {number} n */
+  function* steps(depths, n) {
     if (keys.length < n) {
       keys = new Uint32Array(2 * n);
       indices = [new Uint32Array(2 * n), new Uint32Array(2 * n)];
     }
     const bits = new Uint32Array(depths.buffer, depths.byteOffset, n);
     counts.fill(0);
-    for (let k = 0; k < n; k++) {
-      const b = bits[k];
-      const key = b >>> 31 ? b : ~b & 0x7fffffff; // float bits as integers that rise as depths fall
-      keys[k] = key;
-      counts[key & (DIGITS - 1)]++;
-      counts[DIGITS + ((key >>> BITS) & (DIGITS - 1))]++;
-      counts[2 * DIGITS + (key >>> (2 * BITS))]++;
+    for (let k = 0; k < n;) {
+      for (const end = Math.min(n, k + STEP); k < end; k++) {
+        const b = bits[k];
+        const key = b >>> 31 ? b : ~b & 0x7fffffff; // float bits as integers that rise as depths fall
+        keys[k] = key;
+        counts[key & (DIGITS - 1)]++;
+        counts[DIGITS + ((key >>> BITS) & (DIGITS - 1))]++;
+        counts[2 * DIGITS + (key >>> (2 * BITS))]++;
+      }
+      yield;
     }
     for (let pass = 0; pass < 3; pass++) {
       for (let digit = 0, sum = 0; digit < DIGITS; digit++) {
@@ -85,11 +91,19 @@ export function createDepthSorter() {
       }
     }
     let [from, to] = indices;
-    for (let k = 0; k < n; k++) to[counts[keys[k] & (DIGITS - 1)]++] = k;
-    [from, to] = [to, from];
-    for (let k = 0; k < n; k++) to[counts[DIGITS + ((keys[from[k]] >>> BITS) & (DIGITS - 1))]++] = from[k];
-    [from, to] = [to, from];
-    for (let k = 0; k < n; k++) to[counts[2 * DIGITS + (keys[from[k]] >>> (2 * BITS))]++] = from[k];
-    return to.subarray(0, n);
-  };
+    for (let k = 0; k < n; k++) from[k] = k;
+    for (let pass = 0; pass < 3; pass++) {
+      const base = pass * DIGITS, shift = pass * BITS;
+      for (let k = 0; k < n;) {
+        for (const end = Math.min(n, k + STEP); k < end; k++) {
+          const index = from[k];
+          to[counts[base + ((keys[index] >>> shift) & (DIGITS - 1))]++] = index;
+        }
+        yield;
+      }
+      [from, to] = [to, from];
+    }
+    return from.subarray(0, n);
+  }
+  return Object.assign((/** @type {Float32Array} */ depths, /** @type {number} */ n) => run(steps(depths, n)), { steps });
 }

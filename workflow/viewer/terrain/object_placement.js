@@ -94,7 +94,7 @@ function aimThing(thing, { side, heights, objects }, eye, i0, j0) {
  * @param {Thing} thing @param {TerrainTables} terrain
  */
 function orderThing(thing, { tiles, directions }) {
-  const { cos, sin, to: [x, y, z], east, north, tile, lo } = thing, orders = tiles[tile].orders[lo];
+  const { cos, sin, to: [x, y, z], east, north, tile } = thing, { orders } = tiles[tile];
   const back = [cos * x + sin * y, cos * y - sin * x, z];
   thing.order = nearestOrder(directions, orders, back, cos * east + sin * north, cos * north - sin * east);
   thing.direction = orders[thing.order];

@@ -1,7 +1,8 @@
 // The viewer: an open bundle, the walker in it, and what the worker and the GPU make of both.
 
+import { sizeOf } from "../data/bundle.js";
 import { PageError } from "../data/checks.js";
-import { listChunks } from "../data/layout.js";
+import { chunkKey } from "../data/layout.js";
 import { OVERLAYS } from "../draw/overlays.js";
 import { BUDGET, createFramePacing, createFrameStats } from "../draw/pacing.js";
 import { createRenderer } from "../draw/renderer.js";
@@ -29,7 +30,7 @@ import { createWalker, moveTo } from "./walker.js";
  *
  * still: draw only when asked, for tests and screenshots; firstBudget: of the first picture then; onFirstScene: called
  * when the first bundle's manifest is read; onScene: called, and awaited, when any is, `first` or not; onSize: called,
- * and awaited, before the page's own chunks are read, with their bytes; onPaint: something
+ * and awaited, before the page's own parts are read, with their bytes; onPaint: something
  * was painted or set; onPicture: a picture was drawn; onWhole: one of all Gaussians.
  * @typedef {{ still: boolean, firstBudget: number, onFirstScene: (walker: Walker) => void,
  *   onScene: (scene: Scene, first: boolean) => Promise<void>, onSize: (bytes: number) => Promise<void>, onPaint: () => void, onPicture: () => void,
@@ -112,7 +113,7 @@ export class Viewer {
     this.#showLegend();
     this.drawFrame(); // sky and far ground at once
     await this.options.onScene(this.scene, first);
-    if (first) await this.options.onSize(listChunks(manifest).reduce((sum, { entry }) => sum + entry.bytes, 0));
+    if (first) await this.options.onSize(sizeOf(manifest));
     if (this.scene !== scene || !await terrain.readAll((progress) => this.hud.showProgress(progress))) return; // another one was opened
     this.loaded = true;
     if (this.options.still) await this.settle(this.options.firstBudget);
@@ -207,7 +208,10 @@ export class Viewer {
     await this.#restored;
     const renderer = this.scene?.renderer;
     this.stale = false;
-    if (this.scene) await this.scene.askForAll(this.camera(this.scene), budget);
+    if (this.scene) {
+      this.scene.client.ask(this.camera(this.scene), budget, true);
+      await this.scene.client.answered();
+    }
     this.drawFrame();
     // the context may be lost without an event yet, or be back and empty
     if (this.gl.isContextLost() || renderer !== this.scene?.renderer) {
@@ -258,7 +262,7 @@ export class Viewer {
   /** What is on the screen, in plain values. */
   state() {
     const { loaded, opened, error, overlay, pacing: { budget } } = this;
-    const view = this.scene ? describeScene(this.scene) : { drawn: [], count: 0, bytes: 0 };
+    const view = this.scene ? describeScene(this.scene) : { drawn: [], count: 0, work: null, missing: 0 };
     return { ...view, overlay: OVERLAYS[overlay], budget, loaded, opened, error, whole: this.resting.whole, mode: this.scene?.walker.mode };
   }
 
@@ -275,7 +279,8 @@ export class Viewer {
     if (!scene) return;
     scene.renderer?.splats.addRecords(records);
     if (records.level === scene.manifest.levels.length - 1) scene.coarse += 1;
-    this.dirty = this.stale = true;
+    // some are composed because a later view may need them
+    if (!this.loaded || scene.frame?.missing.includes(chunkKey(records.tile, records.level))) this.dirty = this.stale = true;
   }
 
   /** @param {import("../worker/frame_builder.js").FrameAnswer} frame */
@@ -314,8 +319,8 @@ export class Viewer {
 /** Place and picture of a scene, in plain values. @param {Scene} scene */
 function describeScene({ manifest, walker, frame, heights }) {
   const { x, y, eye, yaw, pitch } = walker, drawn = frame ? listDrawnCells(frame) : [];
-  const { count = 0, reach, shrink, bytes = 0 } = frame ?? {};
-  return { x, y, eye, yaw, pitch, under: tileUnder(manifest, heights, x, y), drawn, count, reach, shrink, bytes };
+  const { count = 0, reach, shrink, work = null, missing = [] } = frame ?? {}, under = tileUnder(manifest, heights, x, y);
+  return { x, y, eye, yaw, pitch, under, drawn, count, reach, shrink, work, missing: missing.length };
 }
 
 /** One sentence for the person at the screen. @param {unknown} error */

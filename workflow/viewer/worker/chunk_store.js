@@ -1,48 +1,40 @@
 // Chunks at hand: their bytes in the worker, their rows in the record texture. If a set is larger than the cache, the
-// least recently drawn chunks are evicted, but never those of the coarsest level. No chunk is read more than MOST_READS
-// times: a chunk that is evicted after its last reading is lost, and a coarser level is drawn instead.
+// least recently drawn chunks are evicted, but never those of the coarsest level.
 
-import { CACHE_BYTES, chunkKey, CODE_SHIFT, ROW } from "../data/layout.js";
-import { parseChunk } from "../data/layout.js";
+import { CACHE_BYTES, chunkBytes, chunkKey, CODE_SHIFT, ROW } from "../data/layout.js";
 import { createPagePool } from "../terrain/caches.js";
 import { RIM } from "../terrain/frustum.js";
 
-const MOST_READS = 3;
 export const WISHED = 0.5; // added to the stamp of chunks that a view needs: they outlive what stands in for them
 
 /**
+ * A chunk: see `parseRecords`.
+ * @typedef {{ tile: number, level: number, count: number, records: Uint32Array, centres: Float32Array,
+ *   sizes: Uint8Array }} Chunk
+ *
  * entries: of each Gaussian its index in the record texture and its level; rows: in that texture.
- * @typedef {import("../data/bundle.js").Chunk & ReturnType<typeof parseChunk>
- *   & { entries: Uint32Array, rows: Uint32Array, stamp: number }} StoredChunk
+ * @typedef {Chunk & { entries: Uint32Array, rows: Uint32Array, stamp: number }} StoredChunk
  * @typedef {ReturnType<typeof createChunkStore>} ChunkStore
  */
 
 /**
- * @param {import("./terrain_tables.js").TerrainTables} terrain
- * @param {import("../data/manifest.js").Manifest} manifest @param {number} rows
+ * @param {import("./terrain_tables.js").TerrainTables} terrain @param {number} rows
  * @param {(tile: number) => void} onEvict
  */
-export function createChunkStore(terrain, { encoding }, rows, onEvict) {
+export function createChunkStore(terrain, rows, onEvict) {
   /** @type {Map<number, StoredChunk>} */
   const chunks = new Map();
-  /** @type {Map<number, number>} */
-  const reads = new Map(); // by key
   const coarsest = terrain.levels - 1;
   let bytes = 0;
   /** @param {number} key */
   const stored = (key) => /** @type {StoredChunk} */ (chunks.get(key));
   const pool = createPagePool(rows, (key) => {
-    const { tile, level, buffer } = stored(key);
+    const { tile, level, count } = stored(key);
     chunks.delete(key);
-    bytes -= buffer.byteLength;
+    bytes -= chunkBytes(count);
     terrain.tiles[tile].arrived &= ~(1 << level);
-    noteAbsence(tile, level);
     onEvict(tile);
   });
-  /** @param {number} tile @param {number} level */
-  const noteAbsence = (tile, level) => {
-    if ((reads.get(chunkKey(tile, level)) ?? 0) >= MOST_READS) terrain.tiles[tile].lost |= 1 << level;
-  };
   /** @param {number} stamp */
   const evictOldest = (stamp) => {
     /** @type {number | null} */
@@ -56,41 +48,38 @@ export function createChunkStore(terrain, { encoding }, rows, onEvict) {
   /**
    * Rows for a chunk, or null if everything else was used at this stamp or later.
    *
-   * @param {number} key @param {{ count: number, buffer: ArrayBuffer }} chunk @param {number} stamp
+   * @param {number} key @param {number} count @param {number} stamp
    */
-  const allocate = (key, { count, buffer }, stamp) => {
-    while (bytes + buffer.byteLength > CACHE_BYTES) if (!evictOldest(stamp)) return null;
+  const allocate = (key, count, stamp) => {
+    while (bytes + chunkBytes(count) > CACHE_BYTES) if (!evictOldest(stamp)) return null;
     return pool.allocate(key, Math.ceil(count / ROW), stamp, count);
   };
   return {
     /**
      * Add a chunk. Returns: is there room for it? What is being drawn is evicted only for a chunk that the view needs.
      *
-     * @param {import("../data/bundle.js").Chunk} chunk @param {number} stamp
+     * @param {Chunk} chunk @param {number} stamp
      */
     add(chunk, stamp) {
-      const { tile, level, count, buffer } = chunk, key = chunkKey(tile, level);
-      const needed = (terrain.wish[tile] >> level) & 1;
-      reads.set(key, (reads.get(key) ?? 0) + 1);
-      const entry = allocate(key, chunk, stamp) ?? (needed ? allocate(key, chunk, stamp + WISHED) : null);
-      if (!entry) {
-        noteAbsence(tile, level);
-        return false;
-      }
-      const room = entry.pages;
-      const mark = level << CODE_SHIFT, entries = new Uint32Array(count), parsed = parseChunk(buffer, count, encoding);
+      const { tile, level, count } = chunk, key = chunkKey(tile, level);
+      const needed = level === coarsest || (terrain.wish[tile] >> level) & 1;
+      const entry = allocate(key, count, stamp) ?? (needed ? allocate(key, count, stamp + WISHED) : null);
+      if (!entry) return false;
+      const room = entry.pages, mark = level << CODE_SHIFT, entries = new Uint32Array(count);
       for (let k = 0; k < count; k++) entries[k] = mark | (room[k >> 10] * ROW + (k & (ROW - 1)));
       const object = terrain.objects[tile - (terrain.tiles.length - terrain.objects.length)];
       if (object) {
-        centreOnFoot(parsed.centres, terrain.side);
-        object.extent = Math.max(object.extent, measureExtent(parsed, terrain.deviations));
+        centreOnFoot(chunk.centres, terrain.side);
+        object.extent = Math.max(object.extent, measureExtent(chunk, terrain.deviations));
       }
-      chunks.set(key, { tile, level, count, buffer, ...parsed, entries, rows: room, stamp });
-      bytes += buffer.byteLength;
+      chunks.set(key, { ...chunk, entries, rows: room, stamp });
+      bytes += chunkBytes(count);
       terrain.tiles[tile].arrived |= 1 << level;
       this.touch(tile, level, needed ? stamp + WISHED : stamp);
       return true;
     },
+    /** Is there room for a chunk beside all that is at hand? @param {number} count */
+    hasRoom: (count) => bytes + chunkBytes(count) <= CACHE_BYTES && pool.left >= Math.ceil(count / ROW),
     /** A chunk that is at hand. @param {number} tile @param {number} level */
     get: (tile, level) => stored(chunkKey(tile, level)),
     /** Mark a chunk as used. @param {number} tile @param {number} level @param {number} stamp */
@@ -117,7 +106,7 @@ function centreOnFoot(centres, side) {
 /**
  * Largest distance of a Gaussian's rim from the foot.
  *
- * @param {{ centres: Float32Array, sizes: Uint8Array }} parsed
+ * @param {{ centres: Float32Array, sizes: Uint8Array }} chunk
  * @param {ArrayLike<number>} deviations
  */
 function measureExtent({ centres, sizes }, deviations) {

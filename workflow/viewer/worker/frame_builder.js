@@ -1,6 +1,6 @@
 // From a view to what the GPU draws. Independent of the page and of messages, so worker, tests and benchmarks share it.
 
-import { MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
+import { chunkKey, MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
 import { selectCells } from "../terrain/budget.js";
 import { lookUpCell, REACH } from "../terrain/cells.js";
 import { nearestOrder } from "../terrain/draw_order.js";
@@ -10,6 +10,7 @@ import { createChunkStore, WISHED } from "./chunk_store.js";
 import { createDrawLists } from "./draw_lists.js";
 import { createNearSorter } from "./near_sort.js";
 import { createBorders, createSortedBatches } from "./sorted_batches.js";
+import { createSupply } from "./supply.js";
 import { adjustCover, createTerrainTables, paintPoints } from "./terrain_tables.js";
 
 /**
@@ -18,40 +19,68 @@ import { adjustCover, createTerrainTables, paintPoints } from "./terrain_tables.
  * @typedef {import("../terrain/camera.js").Camera} Camera
  * @typedef {import("./terrain_tables.js").TerrainTables} TerrainTables
  * @typedef {ReturnType<typeof placeObjects>} Groups
+ * @typedef {import("../terrain/budget.js").Selection} Selection
  *
  * What the GPU draws. i0, j0: the eye's cell (0 on a sphere); eye: its place; near: entries of the near block; marks: of its 9 cells; uploads: new
  * pages of orders; blocks: of far cells and objects; places: of objects; incomplete: batches were left out for lack of
- * time.
+ * time; work: so far.
  * @typedef {{ i0: number, j0: number, eye: number[], near: Uint32Array, marks: Uint32Array, blocks: Uint32Array, places: Uint32Array,
- *   uploads: { numbers: Uint32Array, data: Uint32Array }, incomplete: boolean,
+ *   uploads: { numbers: Uint32Array, data: Uint32Array }, incomplete: boolean, work: Work,
  *   milliseconds: { update: number, sort: number } }} FrameArrays
  * @typedef {import("../terrain/budget.js").Selection & FrameArrays} Frame
  *
- * A frame as the worker posts it. drawn: six numbers a cell (di, dj, tile, lo, hi, direction); bytes: of all chunks.
- * @typedef {Omit<Frame, "cells" | "missing"> & { id: number, patient: boolean, missing: number[], bytes: number,
+ * Gaussians so far that were tested for staying in a cell, composed, and sorted for a batch; batches that were late so
+ * far, and that are kept; bytes of the chunks at hand.
+ * @typedef {{ tested: number, composed: number, sorted: number, late: number, batches: number, bytes: number }} Work
+ *
+ * A frame as the worker posts it. drawn: six numbers a cell (di, dj, tile, lo, hi, direction).
+ * @typedef {Omit<Frame, "cells" | "missing"> & { id: number, patient: boolean, missing: number[],
  *   drawn: Int32Array }} FrameAnswer
  */
 
 /** @type {Thing[]} */
 const NONE = [];
 const MIDDLE = { di: 0, dj: 0 }; // an object's place does not count from its block's cell
+const WINDOW = 2 * REACH + 1; // cells along the side of the window about the eye
+const COVER = 16; // cells of it that are covered in one step
 const TIME_LIMIT = 4; // milliseconds of making batches in an update that somebody waits for
 const BORDER_LIMIT = 0.2; // milliseconds of making those of single cells, which all have a substitute
 
 /**
  * @param {import("../data/manifest.js").Manifest} manifest
- * @param {import("../terrain/heights.js").HeightField} heights
+ * @param {import("../terrain/heights.js").HeightField} heights @param {import("./supply.js").Handlers} [handlers]
  */
-export function createFrameBuilder(manifest, heights) {
+export function createFrameBuilder(manifest, heights, handlers = {}) {
   const terrain = createTerrainTables(manifest, heights);
-  const store = createChunkStore(terrain, manifest, recordRows(manifest), (tile) => batches.forget(tile));
+  const store = createChunkStore(terrain, recordRows(manifest), (tile) => batches.forget(tile));
   const borders = createBorders(terrain, store);
   const batches = createSortedBatches(store, terrain, borders, orderPages(manifest));
   const sortNear = createNearSorter(store, terrain, borders);
   const lists = createDrawLists(terrain);
   const levels = new Uint16Array(terrain.tiles.length); // bits
   let stamp = 0;
-  const ahead = { i0: 0, j0: 0, row: REACH + 1 }; // of the window about the eye, the next row to cover
+  const ahead = { i0: 0, j0: 0, next: WINDOW ** 2 }; // of the window about the eye, the next cell to cover
+  const supply = createSupply(manifest, terrain, store, handlers);
+  /** @type {Cell[]} */
+  let drawn = []; // cells of the last view, until it is prepared for the next
+
+  /** Prepare for the next view where tiles are uncertain: finer levels, neighbouring orders. Returns: is there any? */
+  function prepare() {
+    /** @type {Set<number>} */
+    const keys = new Set();
+    for (let k = drawn.length - 1; k >= 0; k--) {
+      const { close, border, tile, tiles, lo, hi, direction } = drawn[k], { all, orders } = terrain.tiles[tile];
+      if (!all) continue;
+      if (lo) keys.add(chunkKey(tile, lo - 1));
+      if (close || border) continue;
+      const source = { tile, tiles, border, lo, hi };
+      for (const next of terrain.nearest[direction]) batches.prepare(source, orders.indexOf(next));
+    }
+    supply.prepare([...keys]);
+    const many = drawn.length;
+    drawn = [];
+    return many > 0;
+  }
 
   /** Mark the chunks that are drawn, and those that the view needs. @param {Cell[]} cells @param {Groups} groups */
   function touch(cells, groups) {
@@ -61,16 +90,20 @@ export function createFrameBuilder(manifest, heights) {
       for (let n = 0; n < tiles.length; n++) levels[tiles[n]] |= bits;
       for (let n = 0; group && n < group.length; n++) levels[group[n].tile] |= (2 << group[n].hi) - (1 << group[n].lo);
     }
-    for (let tile = 0; tile < levels.length; tile++) {
-      for (let level = 0; levels[tile] >> level; level++) {
-        if ((levels[tile] >> level) & 1) store.touch(tile, level, stamp);
-      }
-      if (!terrain.room) continue;
-      const there = terrain.wish[tile] & terrain.tiles[tile].arrived;
-      for (let level = 0; there >> level; level++) {
-        if ((there >> level) & 1) store.touch(tile, level, stamp + WISHED);
-      }
+    for (let tile = 0; tile < levels.length; tile++) mark(tile, levels[tile], stamp);
+    touchWish();
+  }
+
+  /** Mark the chunks that the view needs, where not all fit. */
+  function touchWish() {
+    for (let tile = 0; terrain.room && tile < levels.length; tile++) {
+      mark(tile, terrain.wish[tile] & terrain.tiles[tile].arrived, stamp + WISHED);
     }
+  }
+
+  /** Mark chunks of a tile as used. @param {number} tile @param {number} bits of levels @param {number} at a stamp */
+  function mark(tile, bits, at) {
+    for (let level = 0; bits >> level; level++) if ((bits >> level) & 1) store.touch(tile, level, at);
   }
 
   /**
@@ -120,7 +153,7 @@ export function createFrameBuilder(manifest, heights) {
       const cell = cells[k];
       if (cell.close) continue;
       const order = orderOf(cell, terrain, eye, i0, j0);
-      cell.direction = terrain.tiles[cell.tile].orders[cell.lo][order];
+      cell.direction = terrain.tiles[cell.tile].orders[order];
       made[k] = batches.get(cell, order, stamp, isLate);
     }
     return made;
@@ -136,38 +169,54 @@ export function createFrameBuilder(manifest, heights) {
     }
   }
 
-  /** Cover the next row of the window about the eye. Returns: was there one? */
+  /**
+   * What a view shows of the chunks at hand; a patient one composes what it lacks.
+   *
+   * @param {Camera} camera @param {number} budget @param {boolean} patient
+   */
+  function select(camera, budget, patient) {
+    if (patient) supply.finish();
+    supply.begin(stamp);
+    for (;;) {
+      const selection = selectCells(terrain, camera, budget), groups = placeObjects(terrain, camera, selection);
+      supply.want(selection);
+      drawn = selection.cells;
+      if (patient) touchWish(); // what is composed must not evict it
+      if (!patient || !supply.bringWanted()) return { selection, groups };
+    }
+  }
+
+  /** Cover the next cells of the window about the eye. Returns: were there any? */
   function coverAhead() {
-    const { i0, j0, row } = ahead;
-    if (row > REACH || terrain.sphere) return false;
-    for (let di = -REACH; di <= REACH; di++) lookUpCell(terrain, i0 + di, j0 + row);
-    ahead.row += 1;
+    const { i0, j0, next } = ahead, end = Math.min(next + COVER, WINDOW ** 2);
+    if (next >= end || terrain.sphere) return false;
+    for (let k = next; k < end; k++) lookUpCell(terrain, i0 + (k % WINDOW) - REACH, j0 + Math.floor(k / WINDOW) - REACH);
+    ahead.next = end;
     return true;
   }
 
   return {
     store,
     batches,
-    /** Gaussians so far that were tested for staying in a cell, and that were sorted for a batch. */
+    supply,
     get work() {
-      return { tested: borders.tested, sorted: batches.sorted };
+      const { tested } = borders, { composed } = supply, { sorted, late, size } = batches;
+      return { tested, composed, sorted, late, batches: size, bytes: store.bytes };
     },
     /** @param {Int32Array} points see `paintPoints` */
     paint: (points) => paintPoints(terrain, points),
     /** @param {import("./worker.js").Changes} changes */
     adjust: (changes) => adjustCover(terrain, changes),
-    /** @param {import("../data/bundle.js").Chunk} chunk */
-    add: (chunk) => store.add(chunk, stamp),
     /**
-     * Work ahead between two views: batches that were late for the last one, then the cells about its eye that have not
-     * been in view yet. Returns: is there more to do?
+     * Work ahead between two views: parts that came, batches that were late for the last view, chunks that it lacks, the
+     * cells about its eye that have not been in view yet, then what may be needed next. Returns: is there more to do?
      *
      * @param {number} milliseconds about as long
      */
     workAhead(milliseconds) {
       const end = performance.now() + milliseconds;
       while (performance.now() < end) {
-        if (!batches.makeLate(stamp) && !coverAhead()) return false;
+        if (!batches.makeDue(stamp) && !supply.advance() && !coverAhead() && !prepare()) return false;
       }
       return true;
     },
@@ -175,7 +224,7 @@ export function createFrameBuilder(manifest, heights) {
      * The frame of a view.
      *
      * @param {Camera} camera @param {number} budget
-     * @param {boolean} patient make every batch, however long that takes
+     * @param {boolean} patient compose every chunk whose parts are there and make every batch, however long that takes
      * @returns {Frame}
      */
     build(camera, budget, patient) {
@@ -183,9 +232,8 @@ export function createFrameBuilder(manifest, heights) {
       stamp += 1;
       batches.begin();
       const { eye } = camera, i0 = Math.floor(eye[0] / terrain.side), j0 = Math.floor(eye[1] / terrain.side);
-      if (i0 !== ahead.i0 || j0 !== ahead.j0 || stamp === 1) Object.assign(ahead, { i0, j0, row: -REACH });
-      const selection = selectCells(terrain, camera, budget), { cells } = selection;
-      const groups = placeObjects(terrain, camera, selection);
+      if (i0 !== ahead.i0 || j0 !== ahead.j0 || stamp === 1) Object.assign(ahead, { i0, j0, next: 0 });
+      const { selection, groups } = select(camera, budget, patient), { cells } = selection;
       let incomplete = false;
       /** @type {import("./sorted_batches.js").IsLate} */
       const isLate = (border, spent) => {
@@ -210,7 +258,7 @@ export function createFrameBuilder(manifest, heights) {
       const near = sortNear(close, camera, selection, things);
       return {
         ...selection, ...lists.copy(), i0: terrain.sphere ? 0 : i0, j0: terrain.sphere ? 0 : j0, eye, near, marks,
-        uploads, incomplete,
+        uploads, incomplete, work: this.work,
         milliseconds: { update: updated - start, sort: performance.now() - updated },
       };
     },
@@ -218,7 +266,7 @@ export function createFrameBuilder(manifest, heights) {
 }
 
 /**
- * The order of a cell's batch: position among those that its finest drawn level keeps, which all its levels do.
+ * The order of a cell's batch: position among those of its tile.
  *
  * @param {Cell} cell @param {TerrainTables} terrain @param {number[]} eye @param {number} i0
  * @param {number} j0
@@ -226,13 +274,13 @@ export function createFrameBuilder(manifest, heights) {
 function orderOf(cell, { side, cache, z, directions, tiles, sphere }, eye, i0, j0) {
   const { at } = cell;
   if (sphere && cell.spot) {
-    return nearestOrder(directions, tiles[cell.tile].orders[cell.lo], lookAlong(sphere, side, cell.spot, z), 0, 0);
+    return nearestOrder(directions, tiles[cell.tile].orders, lookAlong(sphere, side, cell.spot, z), 0, 0);
   }
   const to = [
     (i0 + cell.di + 0.5) * side - eye[0], (j0 + cell.dj + 0.5) * side - eye[1],
     cache.h[at] + 0.5 * (z[0] + z[1]) - eye[2],
   ];
-  return nearestOrder(directions, tiles[cell.tile].orders[cell.lo], to, cache.east[at], cache.north[at]);
+  return nearestOrder(directions, tiles[cell.tile].orders, to, cache.east[at], cache.north[at]);
 }
 
 /**

@@ -137,7 +137,10 @@ function createRecall(most) {
 function gather(chunk, kept) {
   if (!kept) return chunk;
   const count = kept.length, centres = new Float32Array(3 * count);
-  for (let m = 0; m < 3 * count; m++) centres[m] = chunk.centres[3 * kept[Math.floor(m / 3)] + (m % 3)];
+  for (let m = 0, at = 0; m < count; m++) {
+    const from = 3 * kept[m];
+    for (let n = 0; n < 3; n++) centres[at++] = chunk.centres[from + n];
+  }
   return {
     centres, sizes: Uint8Array.from(kept, (k) => chunk.sizes[k]),
     entries: Uint32Array.from(kept, (k) => chunk.entries[k]), count,

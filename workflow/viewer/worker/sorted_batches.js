@@ -1,7 +1,8 @@
 // Sorted batches: the Gaussians of one tile or object, or of all tiles in a cell where materials meet, of one level or
-// of several together, in one direction's order, as pages for the GPU. They are made when first needed and evicted when
-// long unused.
+// of several together, sorted by depth along one direction, as pages for the GPU. They are made when first needed and
+// evicted when long unused, those of uncertain tiles last.
 
+import { run } from "../data/compose.js";
 import { chunkKey, MAX_LEVELS, MAX_ORDERS, PAGE } from "../data/layout.js";
 import { createPagePool, createRecentCache } from "../terrain/caches.js";
 import { createDepthSorter } from "../terrain/draw_order.js";
@@ -22,6 +23,8 @@ import { materialAt } from "../terrain/scatter.js";
  * @typedef {import("../terrain/caches.js").PoolEntry} Batch
  */
 
+const STEP = 16384; // Gaussians of a batch that are gathered in one step
+const AHEAD = 1 / 32; // of all pages
 const MOST_BYTES = 64e6; // of indices of Gaussians that stay, of all cells
 
 /**
@@ -67,50 +70,44 @@ export function createBorders({ keeper, each }, store, most = MOST_BYTES) {
  * @param {number} capacity pages
  */
 export function createSortedBatches(store, terrain, borders, capacity) {
-  const pool = createPagePool(capacity), sort = createDepthSorter();
+  const pool = createPagePool(capacity, undefined, AHEAD * capacity), sort = createDepthSorter();
   const owners = terrain.tiles.length, orderKeys = MAX_LEVELS * MAX_LEVELS * MAX_ORDERS;
   /** @type {{ pages: Uint32Array, entries: Uint32Array }[]} */
   let filled = [];
-  /** @type {{ source: Source, order: number }[]} */
-  let late = []; // substitutes stand in for these, of the last view
-  let spent = 0, sorted = 0, depths = new Float32Array(0), unsorted = new Uint32Array(0);
+  /** @type {{ source: Source, order: number, spare: boolean }[]} */
+  let due = []; // batches to make between views: substitutes stand in for them, or they may be needed next (spare)
+  /** @type {{ source: Source, order: number, steps: ReturnType<typeof sortEntries> } | null} */
+  let making = null;
+  let spent = 0, sorted = 0, late = 0, depths = new Float32Array(0), unsorted = new Uint32Array(0);
   /** @param {Source} source @param {number} order */
   const keyOf = ({ tile, border, lo, hi }, order) =>
     ((((border?.serial ?? 0) * owners + tile) * MAX_LEVELS + lo) * MAX_LEVELS + hi) * MAX_ORDERS + order;
 
   /**
-   * Entries of one level in a stored order.
-   *
-   * @param {number} tile @param {number} level @param {number} order
-   */
-  function levelEntries(tile, level, order) {
-    const { entries, orders, count } = store.get(tile, level), from = order * count;
-    const out = new Uint32Array(padded(count));
-    for (let k = 0; k < count; k++) out[k] = entries[orders[from + k]];
-    return { entries: out, count };
-  }
-
-  /**
-   * Entries of several levels or tiles, sorted by depth so that none covers another.
+   * Entries of levels and tiles, sorted by depth so that none covers another.
    *
    * @param {Source} source @param {number} order
    */
-  function sortedEntries({ tile: first, tiles, border, lo, hi }, order) {
-    const [x, y, z] = terrain.directions[terrain.tiles[first].orders[lo][order]];
+  function* sortEntries({ tile: first, tiles, border, lo, hi }, order) {
+    const [x, y, z] = terrain.directions[terrain.tiles[first].orders[order]];
     let n = 0;
     for (let level = lo; level <= hi; level++) {
       for (const tile of tiles) {
         const { centres, entries, count } = store.get(tile, level), kept = border && borders.keep(border, tile, level);
         const many = kept ? kept.length : count;
         makeRoom(n, n + many);
-        for (let m = 0; m < many; m++, n++) {
-          const k = kept ? kept[m] : m;
-          depths[n] = centres[3 * k] * x + centres[3 * k + 1] * y + centres[3 * k + 2] * z;
-          unsorted[n] = entries[k];
+        if (kept) yield; // finding them takes long
+        for (let m = 0; m < many;) {
+          for (const end = Math.min(many, m + STEP); m < end; m++, n++) {
+            const k = kept ? kept[m] : m;
+            depths[n] = centres[3 * k] * x + centres[3 * k + 1] * y + centres[3 * k + 2] * z;
+            unsorted[n] = entries[k];
+          }
+          yield;
         }
       }
     }
-    const sequence = sort(depths, n), entries = new Uint32Array(padded(n));
+    const sequence = yield* sort.steps(depths, n), entries = new Uint32Array(padded(n));
     for (let k = 0; k < n; k++) entries[k] = unsorted[sequence[k]];
     sorted += n;
     return { entries, count: n };
@@ -134,7 +131,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
    * @returns {Batch | null}
    */
   function substitute(source, order, stamp) {
-    const { tile, border, lo, hi } = source, { length } = terrain.tiles[tile].orders[lo];
+    const { tile, border, lo, hi } = source, { length } = terrain.tiles[tile].orders;
     for (let step = 1; step < length; step++) {
       const other = pool.use(keyOf(source, (order + step) % length), stamp);
       if (other) return other;
@@ -144,7 +141,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
     if (last) return last;
     const main = tile % terrain.each + terrain.each * materialAt(terrain.classes, border.i, border.j, 0.5, 0.5);
     const { alone, orders } = terrain.tiles[main];
-    return get({ tile: main, tiles: alone, border: null, lo, hi }, Math.min(order, orders[lo].length - 1), stamp);
+    return get({ tile: main, tiles: alone, border: null, lo, hi }, Math.min(order, orders.length - 1), stamp);
   }
 
   /**
@@ -155,7 +152,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
    * @returns {Batch | null}
    */
   function get(source, order, stamp, isLate = never) {
-    const { tile, border, lo, hi } = source, key = keyOf(source, order), shown = border ? border.batch : null;
+    const { border } = source, key = keyOf(source, order), shown = border ? border.batch : null;
     if (shown && border && border.last === key && shown.stamp >= 0) { // most cells show what they showed last
       shown.stamp = stamp;
       return shown;
@@ -165,12 +162,23 @@ export function createSortedBatches(store, terrain, borders, capacity) {
     if (there) return there;
     const other = isLate(border !== null, spent) ? substitute(source, order, stamp) : null;
     if (other) {
-      late.push({ source, order });
+      late += 1;
+      due.push({ source, order, spare: false });
       return other;
     }
-    const begin = border ? performance.now() : 0;
-    const { entries, count } = lo === hi && !border ? levelEntries(tile, lo, order) : sortedEntries(source, order);
-    const batch = pool.allocate(key, entries.length / PAGE, stamp, count);
+    const begin = performance.now();
+    return place(source, order, stamp, run(sortEntries(source, order)), begin);
+  }
+
+  /**
+   * Give a batch that was made its pages; null: there is no room.
+   *
+   * @param {Source} source @param {number} order @param {number} stamp
+   * @param {{ entries: Uint32Array, count: number }} made @param {number} begin of making it
+   */
+  function place(source, order, stamp, { entries, count }, begin) {
+    const { tile, border } = source, key = keyOf(source, order);
+    const batch = pool.allocate(key, entries.length / PAGE, stamp, count, terrain.tiles[tile].all);
     if (!batch) return null;
     filled.push({ pages: batch.pages, entries });
     if (border) {
@@ -180,19 +188,43 @@ export function createSortedBatches(store, terrain, borders, capacity) {
     return batch;
   }
 
+  /** Is it worth making a batch now? @param {typeof due[0]} batch @param {number} stamp */
+  function isDue({ source, order, spare }, stamp) {
+    const { tiles, lo, hi } = source, levels = (2 << hi) - (1 << lo);
+    if (!tiles.every((tile) => (terrain.tiles[tile].arrived & levels) === levels)) return false;
+    return !spare || (pool.left > AHEAD * capacity && !pool.use(keyOf(source, order), stamp));
+  }
+
   return {
     get,
     /** A view begins: what was late for the last one does not matter any more. */
     begin() {
-      late = [];
+      due = [];
+      making = null;
     },
-    /** Make a batch that was late. Returns: was there one? @param {number} stamp */
-    makeLate(stamp) {
-      const next = late.shift();
-      if (!next) return false;
-      const { source: { tiles, lo, hi }, source, order } = next, levels = (2 << hi) - (1 << lo);
-      if (tiles.every((tile) => (terrain.tiles[tile].arrived & levels) === levels)) get(source, order, stamp);
+    /** Make a batch between views if there is room: it may be needed next. @param {Source} source @param {number} order */
+    prepare: (source, order) => due.push({ source, order, spare: true }),
+    /** A step of making a batch that is due. Returns: was there one? @param {number} stamp */
+    makeDue(stamp) {
+      if (!making) {
+        const next = due.shift();
+        if (!next) return false;
+        if (isDue(next, stamp)) making = { ...next, steps: sortEntries(next.source, next.order) };
+        return true;
+      }
+      const { source, order, steps } = making, begin = performance.now(), { done, value } = steps.next();
+      if (!done) return true;
+      making = null;
+      place(source, order, stamp, value, begin);
       return true;
+    },
+    /** Batches that are kept. */
+    get size() {
+      return pool.size;
+    },
+    /** Batches for which others stood in so far. */
+    get late() {
+      return late;
     },
     /** Gaussians that were sorted so far. */
     get sorted() {
@@ -223,6 +255,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
         return tile === undefined || owner === tile
           || (source >= owners && owner % terrain.each === tile % terrain.each);
       });
+      making = null;
       if (tile === undefined) filled = [];
     },
   };

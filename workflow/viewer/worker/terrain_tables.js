@@ -1,9 +1,7 @@
 // Tables of a terrain for the worker: sizes and orders of its tiles and objects, level distances, classes, scatter; and
 // what painting changes of them.
 
-import { NEAR, ROW, viewRoom } from "../data/layout.js";
-import { deviationOf } from "../data/layout.js";
-import { shareOfRange, uncertaintyRange } from "../data/layout.js";
+import { chunkBytes, deviationOf, NEAR, ROW, shareOfRange, uncertaintyRange, viewRoom } from "../data/layout.js";
 import { RING } from "../terrain/caches.js";
 import { createCellCache, forgetCells } from "../terrain/cells.js";
 import { createClasses } from "../terrain/classes.js";
@@ -13,10 +11,10 @@ import { createSphereCells } from "../terrain/sphere_cells.js";
 import { createFraying } from "../terrain/sphere_edges.js";
 
 /**
- * A tile, or an object: these are numbered after the tiles. uncertainty: in 255ths of the set's range; counts, orders:
- * by level, as are bytes and rows of the record texture; arrived: bits of the levels at hand; lost: bits of the levels
- * that were evicted and are not read again; alone: a list of its own number.
- * @typedef {{ uncertainty: number, arrived: number, lost: number, counts: number[], orders: number[][],
+ * A tile, or an object: these are numbered after the tiles. uncertainty: in 255ths of the set's range; counts: by
+ * level, as are bytes and rows of the record texture; orders: the directions that it is sorted for; all: are these all
+ * that there are, as of uncertain tiles? arrived: bits of the levels at hand; alone: a list of its own number.
+ * @typedef {{ uncertainty: number, arrived: number, counts: number[], orders: number[], all: boolean,
  *   bytes: number[], rows: number[], alone: number[] }} TileTable
  *
  * An object. ground: z of the foot; extent: largest distance of a Gaussian's rim from the foot, as far as is known.
@@ -28,9 +26,9 @@ import { createFraying } from "../terrain/sphere_edges.js";
  *
  * sphere, sphereCells: null on a plane. variants: centres of a material's tiles; each: tiles of a material; z: range of heights of tiles, rims included;
  * most: largest size of an object; cells, window: arrays that each view uses again; deviations: standard deviation by
- * byte. room: what a view may use of the cache, or null if all chunks fit; wish: bits of the levels of each tile and
+ * byte. nearest: of each direction the two next to it; room: what a view may use of the cache, or null if all chunks fit; wish: bits of the levels of each tile and
  * object that the last view needs, where room limits it.
- * @typedef {{ side: number, salt: number, directions: number[][], variants: number, each: number, levels: number,
+ * @typedef {{ side: number, salt: number, directions: number[][], nearest: number[][], variants: number, each: number, levels: number,
  *   tiles: TileTable[], objects: ObjectTable[], classes: import("../terrain/classes.js").Classes | null,
  *   scatter: import("../terrain/scatter.js").Scatter | null, most: number,
  *   heights: import("../terrain/heights.js").HeightField, largest: number, deviations: ArrayLike<number>,
@@ -48,13 +46,13 @@ import { createFraying } from "../terrain/sphere_edges.js";
 export function createTerrainTables(manifest, heights) {
   const { tile_side: side, salt, levels, directions, encoding, materials, objects = [], scatter } = manifest;
   const range = uncertaintyRange(manifest.tiles);
-  const owners = [...manifest.tiles, ...objects.map(({ chunks }) => ({ chunks, uncertainty: range[0] }))];
-  const tiles = owners.map(({ chunks, uncertainty }, number) => {
+  const owners = [...manifest.tiles, ...objects.map(({ chunks, orders }) => ({ chunks, orders, uncertainty: range[0] }))];
+  const tiles = owners.map(({ chunks, orders, uncertainty }, number) => {
     const byLevel = [...chunks].sort((a, b) => a.level - b.level);
     return {
-      uncertainty: Math.round(255 * shareOfRange(uncertainty ?? range[0], range)), arrived: 0, lost: 0, alone: [number],
-      counts: byLevel.map((chunk) => chunk.count), orders: byLevel.map((chunk) => chunk.orders),
-      bytes: byLevel.map((chunk) => chunk.bytes), rows: byLevel.map((chunk) => Math.ceil(chunk.count / ROW)),
+      uncertainty: Math.round(255 * shareOfRange(uncertainty ?? range[0], range)), arrived: 0, alone: [number],
+      counts: byLevel.map((chunk) => chunk.count), orders, all: orders.length === directions.length,
+      bytes: byLevel.map((chunk) => chunkBytes(chunk.count)), rows: byLevel.map((chunk) => Math.ceil(chunk.count / ROW)),
     };
   });
   const each = manifest.tiles.length / materials.length, largest = deviationOf(encoding, 255);
@@ -65,7 +63,7 @@ export function createTerrainTables(manifest, heights) {
   /** @type {TerrainTables} */
   const tables = {
     sphere, sphereCells: null, keeper: sphere ? createFraying(sphere, side, salt) : classes,
-    side, salt, directions, heights, tiles, variants: each / 16, each, levels: levels.length, largest, classes,
+    side, salt, directions, nearest: directions.map((_, k) => nearestTwo(directions, k)), heights, tiles, variants: each / 16, each, levels: levels.length, largest, classes,
     objects: objects.map(({ ground }) => ({ ground, extent: 0 })), most: 1 + (scatter?.size ?? 0),
     scatter: scatter ? createScatter(scatter, objects, side, classes) : null,
     deviations: Float64Array.from({ length: 256 }, (_, byte) => deviationOf(encoding, byte)),
@@ -79,6 +77,13 @@ export function createTerrainTables(manifest, heights) {
   };
   if (sphere) tables.sphereCells = createSphereCells(tables, sphere);
   return tables;
+}
+
+/** The two directions that are nearest to one of them. @param {number[][]} directions @param {number} k */
+function nearestTwo(directions, k) {
+  /** @param {number} other */
+  const along = (other) => directions[k].reduce((sum, v, n) => sum + v * directions[other][n], 0);
+  return directions.map((_, other) => other).filter((other) => other !== k).sort((a, b) => along(b) - along(a)).slice(0, 2);
 }
 
 /**

@@ -1,32 +1,33 @@
-// The worker: keeps the chunks and turns views into frames, so the page's own thread never waits.
+// The worker: composes chunks and turns views into frames, so the page's own thread never waits.
 
+import { PageError } from "../data/checks.js";
 import { createHeights } from "../terrain/heights.js";
 import { createFrameBuilder } from "./frame_builder.js";
 
 /**
- * @typedef {import("../data/bundle.js").Chunk} Chunk
- *
  * What the page posts.
  * @typedef {{ kind: "begin", manifest: import("../data/manifest.js").Manifest, pixels: Float32Array | null }} Begin
  * @typedef {{ kind: "view", id: number, camera: import("../terrain/camera.js").Camera, budget: number,
  *   patient: boolean }} View
  * @typedef {{ offsets: number[] | null, probabilities: number[] | null }} Changes see `adjustCover`
- * @typedef {Begin | View | { kind: "chunk", chunk: Chunk } | { kind: "restore" }
+ * @typedef {Begin | View | { kind: "part", index: number, buffer: ArrayBuffer } | { kind: "restore" }
+ *   | { kind: "ask", id: number, tile: number, level: number }
  *   | { kind: "paint", points: Int32Array } | { kind: "adjust", changes: Changes }} Request
  *
- * What the worker posts. records: of a chunk that was added, for the GPU.
+ * What the worker posts. records: of a chunk that was composed, for the GPU; part: was unpacked; told: records that were
+ * asked for.
  * @typedef {{ kind: "records", tile: number, level: number, rows: Uint32Array, records: Uint32Array }} Records
- * @typedef {{ kind: "refused", tile: number, level: number }} Refused
- * @typedef {{ kind: "failed", name: string, message: string }} Failed
- * @typedef {Records | Refused | Failed
+ * @typedef {{ kind: "failed", said: boolean, name: string, message: string }} Failed said: as a PageError
+ * @typedef {Records | Failed | { kind: "part", index: number } | { kind: "told", id: number, records: Uint32Array }
  *   | { kind: "frame", frame: import("./frame_builder.js").FrameAnswer }} Reply
  */
 
-const SLICE = 2; // milliseconds of work between two looks for messages
+const SLICE = 1; // milliseconds of work between two looks for messages
 
 /** @type {ReturnType<typeof createFrameBuilder>} */
 let builder;
 let busy = false; // a turn of working ahead is due
+const turns = new MessageChannel(); // without the pauses that timers make
 
 /** @param {Reply} reply @param {Transferable[]} [moved] */
 const post = (reply, moved = []) => postMessage(reply, { transfer: moved });
@@ -35,13 +36,6 @@ const post = (reply, moved = []) => postMessage(reply, { transfer: moved });
 function postRecords({ tile, level, rows, records }) {
   const copy = records.slice();
   post({ kind: "records", tile, level, rows, records: copy }, [copy.buffer]);
-}
-
-/** @param {Chunk} chunk */
-function addChunk(chunk) {
-  const { tile, level } = chunk;
-  if (builder.add(chunk)) postRecords(builder.store.get(tile, level));
-  else post({ kind: "refused", tile, level });
 }
 
 /** @param {View} view */
@@ -54,26 +48,39 @@ function answerView({ id, camera, budget, patient }) {
   const { near, marks, blocks, places, uploads } = frame;
   const moved = [near, marks, blocks, places, drawn, uploads.numbers, uploads.data].map((array) => array.buffer);
   post({
-    kind: "frame", frame: { ...frame, drawn, id, patient, missing: [...missing], bytes: builder.store.bytes },
+    kind: "frame", frame: { ...frame, drawn, id, patient, missing: [...missing] },
   }, moved);
 }
 
 /** Between views: work ahead, in slices, so that the next one waits for little. */
-function workAhead() {
-  busy = builder.workAhead(SLICE);
-  if (busy) setTimeout(() => attempt(workAhead));
+turns.port1.onmessage = () => {
+  busy = false;
+  let more = true; // also where a step fails
+  attempt(() => (more = builder.workAhead(SLICE)));
+  if (more) beBusy();
+};
+
+function beBusy() {
+  if (!busy) turns.port2.postMessage(null);
+  busy = true;
 }
 
 /** @param {Request} request */
 function answer(request) {
   if (request.kind === "begin") {
     const { manifest, pixels } = request;
-    builder = createFrameBuilder(manifest, createHeights(manifest.heights, pixels));
-  } else if (request.kind === "chunk") addChunk(request.chunk);
-  else if (request.kind === "view") {
+    builder = createFrameBuilder(manifest, createHeights(manifest.heights, pixels), {
+      onChunk: postRecords, onPart: (index) => post({ kind: "part", index }),
+    });
+  } else if (request.kind === "part") {
+    builder.supply.addPart(request.index, request.buffer);
+    beBusy();
+  } else if (request.kind === "view") {
     answerView(request);
-    if (!busy) setTimeout(() => attempt(workAhead));
-    busy = true;
+    beBusy();
+  } else if (request.kind === "ask") {
+    const records = builder.supply.recordsOf(request.tile, request.level).slice();
+    post({ kind: "told", id: request.id, records }, [records.buffer]);
   }
   else if (request.kind === "paint") builder.paint(request.points);
   else if (request.kind === "adjust") builder.adjust(request.changes);
@@ -89,7 +96,7 @@ function attempt(act) {
     act();
   } catch (error) {
     const { name, message } = /** @type {Error} */ (error);
-    post({ kind: "failed", name, message });
+    post({ kind: "failed", said: error instanceof PageError, name, message });
   }
 }
 

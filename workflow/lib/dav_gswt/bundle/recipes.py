@@ -125,7 +125,10 @@ def unpack_level(data: bytes, composition: Composition, level: int, name: str) -
             at += 2 * many
             if at + PLANES * start[-1] > len(data):
                 raise InputError(f"{name}: ends too early; make the bundle again")
-            layers.append(Layer(start, unpack_block(data[at : at + PLANES * int(start[-1])])))
+            block = unpack_block(data[at : at + PLANES * int(start[-1])])
+            if len(block) and block.position[:, :2].max() > composition.cell << level:
+                raise InputError(f"{name}: a splat lies outside of its cell; make the bundle again")
+            layers.append(Layer(start, block))
             at += PLANES * int(start[-1])
         found.append(layers)
     if at != len(data):
