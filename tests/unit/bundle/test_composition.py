@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixtures import compositions
-from fixtures.compositions import COMPOSED, NAME, RECIPE, TILES, compose_slowly, write_composition
+from fixtures.compositions import CELL, EXEMPLARS, LEVELS, SIDE, Composed
 
 from dav_gswt.bundle import manifest, store
 from dav_gswt.bundle.blocks import unpack_block
@@ -22,64 +21,66 @@ from dav_gswt.tiles.compose import coarsen_labels
 GOLDEN = Path(__file__).parents[2] / "golden" / "composition.json"
 
 
-@pytest.fixture(scope="module")
-def parts():
-    return compositions.make_parts()
+TILES, RECIPE, LABELS = 16 * len(EXEMPLARS), 36 + 9 * SIDE**2, 36  # bytes of a recipe, and before its labels
 
 
-@pytest.fixture(scope="module")
-def made(parts, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("composition") / "b"
-    write_composition(folder, parts)
+def write_files(files: dict[str, bytes], folder: Path):
+    """A bundle of these files."""
+    (folder / "parts").mkdir(parents=True)
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
     return store.read_bundle(folder)
 
 
-def test_tiles_are_composed_as_by_hand(made, parts):
+@pytest.fixture(scope="module")
+def composed():
+    return Composed()
+
+
+@pytest.fixture(scope="module")
+def made(composed, tmp_path_factory):
+    return write_files(composed.files(), tmp_path_factory.mktemp("composition") / "b")
+
+
+def read_records(bundle, tile: int, level: int):
+    """The records of a chunk, composed or stored."""
+    chunk = bundle.manifest.tiles[tile].chunks[level]
+    if chunk.part is None:
+        return bundle.compose_tile(tile, level)[0]
+    block = unpack_block(read_part(bundle.folder, bundle.manifest.parts[chunk.part]))
+    return block[chunk.first : chunk.first + chunk.count].to_records()
+
+
+def test_chunks_have_the_bytes_of_a_slow_reader(made, composed):
     for tile in range(TILES):
-        for level in range(COMPOSED):
-            rows, _ = made.compose_tile(tile, level)
-            assert rows.tobytes() == compose_slowly(parts, tile, level), (tile, level)
+        for level in range(LEVELS + 1):
+            assert read_records(made, tile, level).tobytes() == composed.records(tile, level), (tile, level)
 
 
-def test_the_made_up_bundle_has_the_extremes_it_is_meant_to_have(made):
+def test_heights_and_colours_are_clipped_at_both_ends(made):
     rows = np.concatenate([made.compose_tile(tile, 0)[0] for tile in range(TILES)])
-    for values, most in ((rows["position"][:, 2], 65535), (rows["rgba"], 255)):
+    for values, most in ((rows["position"][:, 2], 65535), (rows["rgba"][:, :3], 255)):
         assert all(0.01 < (values == end).mean() < 0.5 for end in (0, most))
 
 
-def digest_chunks(bundle) -> dict[str, list[list[str]]]:
-    """[number][level] of tiles and of objects: SHA-256 of the records of each chunk."""
+def test_chunks_have_the_bytes_shared_with_the_page(made, composed, tmp_path):
+    """Of the bundle in the golden file: its files as base64, SHA-256 of the records of [tile][level].
 
-    def digest(tile: int | None, chunk) -> str:
-        if chunk.part is None:
-            rows = bundle.compose_tile(tile, chunk.level)[0]
-        else:
-            block = unpack_block(read_part(bundle.folder, bundle.manifest.parts[chunk.part]))
-            rows = block[chunk.first : chunk.first + chunk.count].to_records()
-        return hashlib.sha256(rows.tobytes()).hexdigest()
+    With WRITE_GOLDEN=1 in the environment the file is written instead.
+    """
 
-    entries = {"tiles": bundle.manifest.tiles, "objects": bundle.manifest.objects}
-    return {
-        name: [[digest(number, chunk) for chunk in entry.chunks] for number, entry in enumerate(own)]
-        for name, own in entries.items()
-    }
+    def digest(bundle) -> list[list[str]]:
+        rows = [[read_records(bundle, tile, level) for level in range(LEVELS + 1)] for tile in range(TILES)]
+        return [[hashlib.sha256(each.tobytes()).hexdigest() for each in levels] for levels in rows]
 
-
-def test_chunks_have_the_bytes_shared_with_the_page(made, tmp_path):
-    """Of the bundle in the golden file, whose files are base64. With WRITE_GOLDEN=1 the file is written instead."""
     if os.environ.get("WRITE_GOLDEN"):
-        value = {"manifest": json.loads((made.folder / NAME).read_text())}
-        files = [part.file for part in made.manifest.parts]
-        value |= {"files": {file: base64.b64encode((made.folder / file).read_bytes()).decode() for file in files}}
-        rows = ",\n".join(f" {json.dumps(key)}: {json.dumps(own)}" for key, own in (value | digest_chunks(made)).items())
-        GOLDEN.write_text(f"{{\n{rows}\n}}\n", encoding="utf-8")
+        files = {name: base64.b64encode(data).decode() for name, data in composed.files().items()}
+        rows = ",\n".join(f" {json.dumps(key)}: {json.dumps(value)}" for key, value in files.items())
+        chunks = ",\n".join(f" {json.dumps(levels)}" for levels in digest(made))
+        GOLDEN.write_text(f'{{"files": {{\n{rows}}},\n"chunks": [\n{chunks}]}}\n', encoding="utf-8")
     golden = json.loads(GOLDEN.read_text(encoding="utf-8"))
-    (tmp_path / "parts").mkdir()
-    for file, data in golden["files"].items():
-        (tmp_path / file).write_bytes(base64.b64decode(data))
-    (tmp_path / NAME).write_text(json.dumps(golden["manifest"]))
-    found = digest_chunks(store.read_bundle(tmp_path))
-    assert found == {key: golden[key] for key in ("tiles", "objects")} == digest_chunks(made)
+    read = write_files({name: base64.b64decode(data) for name, data in golden["files"].items()}, tmp_path / "b")
+    assert digest(read) == golden["chunks"]
 
 
 def test_a_correction_on_coarser_cells_is_the_mean_under_their_label_halves_up():
@@ -102,27 +103,33 @@ def changed(data: bytes, at: int, by: bytes) -> bytes:
 
 
 @pytest.fixture
-def opened(parts, made, tmp_path):
-    """Writes the bundle with changed parts, and all else in agreement; it is opened."""
+def opened(composed, tmp_path):
+    """Writes the bundle with changed parts or another manifest, and all else in agreement; it is opened."""
 
     def write(change=None, **changes):
-        found = {name: changes[name](data) if name in changes else data for name, data in parts.items()}
-        counts = [[chunk.count for chunk in tile.chunks[:COMPOSED]] for tile in made.manifest.tiles]
-        write_composition(tmp_path / "b", found, change, counts)
-        return store.read_bundle(tmp_path / "b")
+        parts = {name: of(composed.parts[name]) for name, of in changes.items()}
+        return write_files(composed.files(change, **parts), tmp_path / "b")
 
     return write
-
-
-LABELS = 36  # bytes of a recipe before its labels
 
 
 def one_label(tile: int, label: int, shift: tuple[int, int] = (0, 0)):
     """A tile that shows one patch alone, whose shift is given."""
 
     def change(data: bytes) -> bytes:
-        data = changed(data, tile * RECIPE + LABELS, bytes([label]) * compositions.SIDE**2)
+        data = changed(data, tile * RECIPE + LABELS, bytes([label]) * SIDE**2)
         return changed(data, tile * RECIPE + 4 * min(label, 8), np.array(shift, "<i2").tobytes())
+
+    return change
+
+
+def first_x(x: int):
+    """The first splat of the finest level at another x."""
+    at = 2 * EXEMPLARS[0] ** 2
+
+    def change(data: bytes) -> bytes:
+        count = sum(data[: at // 2])
+        return changed(changed(data, at, bytes([x & 255])), at + count, bytes([x >> 8]))
 
     return change
 
@@ -139,9 +146,10 @@ def one_label(tile: int, label: int, shift: tuple[int, int] = (0, 0)):
         pytest.param({"recipes": one_label(0, 3, (1, 0))}, "recipes.bin: tile 0 ", id="between coarse cells"),
         pytest.param({"level0": lambda d: d[:-1]}, "level0.bin: ends too early", id="short by a byte"),
         pytest.param({"level0": lambda d: d[:1]}, "level0.bin: ends too early", id="of one byte"),
-        pytest.param({"level0": lambda d: d[:128]}, "level0.bin: ends too early", id="of counts alone"),
+        pytest.param({"level0": lambda d: d[:98]}, "level0.bin: ends too early", id="of counts alone"),
         pytest.param({"level0": lambda d: d + b"\0"}, "level0.bin: goes on after its end", id="longer by a byte"),
-        pytest.param({"level0": lambda d: changed(d, 64, b"\xff")}, "level0.bin: ends too early", id="many in a cell"),
+        pytest.param({"level0": lambda d: changed(d, 49, b"\xff")}, "level0.bin: ends too early", id="many in a cell"),
+        pytest.param({"level0": first_x(CELL + 1)}, "level0.bin: a splat lies outside of its cell", id="out of a cell"),
     ],
 )
 def test_what_parts_say_is_checked(opened, changes, message):
@@ -176,14 +184,10 @@ def test_levels_in_each_others_place_are_refused(opened):
 
 def test_parts_of_kinds_to_come_are_left_alone(opened):
     def add(value):
-        value["parts"].insert(0, value["parts"][0] | {"kind": "later", "file": "parts/later.bin"})
-        for entry in (*value["tiles"], *value["objects"]):
-            for chunk in entry["chunks"]:
-                if "part" in chunk:
-                    chunk["part"] += 1
+        value["parts"].append(value["parts"][0] | {"kind": "later", "file": "parts/later.bin"})
 
     read = opened(change=add)
-    assert len(read.chunk(31, 2)) == 32 and len(read.chunk(31, 0)) and len(read.object_chunk(0, 2)) == 1
+    assert len(read.chunk(31, 2)) == 5 and len(read.chunk(31, 0))
 
 
 def of_kind(value, kind):
@@ -196,11 +200,10 @@ def of_kind(value, kind):
         ("level 0 is neither composed nor stored", lambda m: m.pop("composition")),
         ("level 0 is neither composed nor stored", lambda m: m["tiles"][3]["chunks"][0].update(part=0, first=0)),
         ("level 2 is neither composed nor stored", lambda m: m["tiles"][3]["chunks"][2].pop("part")),
-        ("the records of level 2 are not there", lambda m: m["tiles"][31]["chunks"][2].update(count=33)),
+        ("the records of level 2 are not there", lambda m: m["tiles"][31]["chunks"][2].update(count=6)),
         ("the records of level 2 are not there", lambda m: m["tiles"][31]["chunks"][2].update(part=1)),
         ("the records of level 2 are not there", lambda m: m["tiles"][31]["chunks"][2].update(part=99)),
-        ("object 0: the records of level 2 are not there", lambda m: m["objects"][0]["chunks"][2].update(first=3)),
-        ("levels do not fit the tiles", lambda m: m["composition"].update(side=5)),
+        ("levels do not fit the tiles", lambda m: m["composition"].update(side=SIDE + 1)),
         ("levels do not fit the tiles", lambda m: m["composition"].update(levels=4)),
         ("one of each composed level is needed", lambda m: m["composition"].update(levels=1)),
         ("one of each composed level is needed", lambda m: of_kind(m, "level").update(level=0)),
@@ -209,9 +212,9 @@ def of_kind(value, kind):
         ("recipes or exemplars are missing", lambda m: m["composition"].update(exemplars=[8])),
         ("size does not fit the tiles", lambda m: of_kind(m, "recipes").update(size=1)),
         ("size does not fit the tiles", lambda m: swap(m, "recipes", "level0")),
-        ("a cell is not a whole number of steps", lambda m: m["composition"].update(cell=255)),
+        ("a cell is not a whole number of steps", lambda m: m["composition"].update(cell=CELL - 1)),
         ("a tile does not fit the grid", lambda m: m["encoding"].update(origin=[1.0, 0, 0])),
-        ("a tile does not fit the grid", lambda m: m["encoding"].update(origin=[0, -63.5, 0])),
+        ("a tile does not fit the grid", lambda m: m["encoding"].update(origin=[0, -23, 0])),
         ("exemplars", lambda m: m["composition"].update(exemplars=[8, 1 << 20])),
     ],
 )
