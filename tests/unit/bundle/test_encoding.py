@@ -114,6 +114,17 @@ def test_gaussians_that_meet_across_a_border_are_moved_alike():
     assert (moved < 1e-6).mean() > 0.98 and moved.max() <= coding.step[0] + 1e-6
 
 
+@pytest.mark.parametrize("cells, steps", [(8, 1024), (24, 24 * 43), (32, 1024), (48, 48 * 32), (400, 400 * 32)])
+def test_a_cell_of_a_composed_tile_is_a_whole_number_of_steps_of_which_a_tile_has_enough(cells, steps):
+    field = field_of([[-0.7, 0, 0], [SIDE, SIDE, 0.5]], np.full((2, 3), 0.1))
+    coding = Encoding.fit([field], SIDE, PIXEL, cells)
+    assert coding.step[:2] == [pytest.approx(SIDE / steps)] * 2 and coding.step[2] == pytest.approx(SIDE / steps / 2)
+    west = -coding.origin[0] / coding.step[0]
+    assert west == pytest.approx(round(west), abs=1e-9) and coding.origin[0] <= -0.7
+    with pytest.raises(InputError, match="100 tile sides"):
+        Encoding.fit([field_of([[1, 1, 0], [201, 1, 0]], np.full((2, 3), 0.1))], SIDE, PIXEL, cells)
+
+
 def test_a_side_s_both_ends_are_places_of_the_grid_and_a_splat_miles_from_its_tile_is_refused():
     field = field_of([[0, 0, 0], [SIDE, SIDE, 0], [-0.3, 1, 0]], np.full((3, 3), 0.1))
     coding = Encoding.fit([field], SIDE, PIXEL)

@@ -77,8 +77,8 @@ class Encoding(Entry):
         """The finest grid that holds all these Gaussians.
 
         Args: side: of a tile. pixel: width of a pixel on the nearest visible ground. cells: along a tile's side, if the
-        grid must have whole steps in a cell; STEPS_A_CELL are enough then, and twice as many of height, by which
-        views from above sort.
+        grid must have whole steps in a cell; STEPS_A_CELL are enough then (more where a tile has few cells), and twice
+        as many of height, by which views from above sort.
         Raises: InputError: the Gaussians spread so far that a tile's side has fewer than MIN_STEPS_PER_TILE steps.
         """
         places = [f.means.astype(float) for f in parts if len(f)]
@@ -87,7 +87,8 @@ class Encoding(Entry):
         # one step less where the western rim is rounded outwards
         steps = np.floor((POSITION_STEPS - (west < 0)) * side / (east - west))
         if cells:
-            steps = cells * min(STEPS_A_CELL, steps // cells)
+            enough = max(STEPS_A_CELL, -(-MIN_STEPS_PER_TILE // cells))
+            steps = cells * min(enough, steps // cells)
         if steps < MIN_STEPS_PER_TILE:
             raise InputError(f"tiles: a splat lies {(east - west) / side:.0f} tile sides from another; cut them again")
         step = float(side / steps)
