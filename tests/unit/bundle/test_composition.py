@@ -1,10 +1,9 @@
-"""Bundles of exemplars and recipes: the bytes that every reader composes, the tiles that they were made of, refusals."""
+"""Bundles of exemplars and recipes: the bytes that every reader composes, and refusals."""
 
 import base64
 import hashlib
 import json
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -137,9 +136,13 @@ def first_x(x: int):
 @pytest.mark.parametrize(
     "changes, message",
     [
-        pytest.param({"recipes": lambda d: changed(d, LABELS, b"\x09")}, "recipes.bin: tile 0 has an unknown", id="label"),
+        pytest.param(
+            {"recipes": lambda d: changed(d, LABELS, b"\x09")}, "recipes.bin: tile 0 has an unknown", id="label"
+        ),
         pytest.param({"recipes": one_label(17, 255)}, "recipes.bin: tile 17 has an unknown", id="labels"),
-        pytest.param({"recipes": one_label(0, 3, (6, 0))}, "tile 0 shows ground beyond its exemplar", id="too far east"),
+        pytest.param(
+            {"recipes": one_label(0, 3, (6, 0))}, "tile 0 shows ground beyond its exemplar", id="too far east"
+        ),
         pytest.param({"recipes": one_label(0, 3, (0, -2))}, "tile 0 shows ground beyond its exemplar", id="south"),
         pytest.param({"recipes": one_label(0, 8, (-32768, 32766))}, "tile 0 shows ground beyond", id="farthest"),
         pytest.param({"recipes": one_label(16, 3, (4, 0))}, "tile 16 shows ground beyond", id="of another material"),
@@ -165,6 +168,14 @@ def test_a_tile_must_have_as_many_splats_as_the_manifest_says(opened):
     assert len(read.chunk(5, 0)) == read.manifest.tiles[5].chunks[0].count
     with pytest.raises(InputError, match=r"level1.bin: tile 5 has \d+ splats, not 1; make the bundle again"):
         read.chunk(5, 1)
+
+
+def test_a_tile_of_more_splats_than_it_says_is_not_composed(opened, monkeypatch):
+    """A cell of 65535 splats that every cell of a large tile shows takes a few bytes of a file, and all memory."""
+    read = opened(change=lambda m: m["tiles"][0]["chunks"][0].update(count=1))
+    monkeypatch.setattr(store.recipes, "compose_records", None)
+    with pytest.raises(InputError, match="tile 0 has"):
+        read.chunk(0, 0)
 
 
 def swap(value, first, second):
@@ -215,6 +226,7 @@ def of_kind(value, kind):
         ("a cell is not a whole number of steps", lambda m: m["composition"].update(cell=CELL - 1)),
         ("a tile does not fit the grid", lambda m: m["encoding"].update(origin=[1.0, 0, 0])),
         ("a tile does not fit the grid", lambda m: m["encoding"].update(origin=[0, -23, 0])),
+        ("count", lambda m: m["tiles"][0]["chunks"][0].update(count=(1 << 24) + 1)),
         ("exemplars", lambda m: m["composition"].update(exemplars=[8, 1 << 20])),
     ],
 )

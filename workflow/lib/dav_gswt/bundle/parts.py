@@ -18,6 +18,7 @@ from dav_gswt.errors import InputError
 FOLDER = "parts"
 LEVEL, RECIPES, RECORDS, PLAIN = "level", "recipes", "records", "plain"  # kinds
 MAX_SIZE = 1 << 30  # bytes that a part may inflate to
+MAX_COUNT = 1 << 24  # Gaussians of a tile at a level
 EFFORT = 9  # of zlib; its strategy for noise saves 4 %
 
 
@@ -42,7 +43,7 @@ class ChunkEntry(Entry):
     """
 
     level: Natural
-    count: Annotated[int, Field(ge=1)]
+    count: Annotated[int, Field(ge=1, le=MAX_COUNT)]
     part: Natural | None = None
     first: Natural | None = None
 

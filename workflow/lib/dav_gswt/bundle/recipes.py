@@ -198,6 +198,11 @@ def locate_corner(encoding: Encoding) -> tuple[int, int]:
     return x, y
 
 
+def count_records(layers: Sequence[Layer], recipe: TileRecipe) -> int:
+    """How many records a tile has at a level: more than memory holds can be written in a few bytes."""
+    return sum(int(np.diff(layer.start)[recipe.cells].sum()) for layer in layers)
+
+
 def compose_records(
     layers: Sequence[Layer], recipe: TileRecipe, corner: tuple[int, int], width: int
 ) -> tuple[Array, Bool[Array, "n"]]:

@@ -52,12 +52,11 @@ class Bundle:
         each = len(manifest.tiles) // len(manifest.materials)
         layers = self._read(self._find_part(LEVEL, level))[tile // each]
         recipe = self._read(self._find_part(RECIPES))[tile][level]
-        corner = recipes.locate_corner(manifest.encoding)
-        rows, ground = recipes.compose_records(layers, recipe, corner, composed.cell << level)
-        if len(rows) != (count := manifest.tiles[tile].chunks[level].count):
+        found, count = recipes.count_records(layers, recipe), manifest.tiles[tile].chunks[level].count
+        if found != count:
             name = self.folder / manifest.parts[self._find_part(LEVEL, level)].file
-            raise InputError(f"{name}: tile {tile} has {len(rows)} splats, not {count}; make the bundle again")
-        return rows, ground
+            raise InputError(f"{name}: tile {tile} has {found} splats, not {count}; make the bundle again")
+        return recipes.compose_records(layers, recipe, recipes.locate_corner(manifest.encoding), composed.cell << level)
 
     def _find_part(self, kind: str, level: int | None = None) -> int:
         parts = self.manifest.parts
