@@ -1,7 +1,6 @@
 """Files from outside and between stages, mutated: splats, bundles, models, photos, weights, the config."""
 
 import gzip
-import hashlib
 import json
 import shutil
 from collections.abc import Callable
@@ -17,9 +16,11 @@ import torch
 import yaml
 from fixtures import bundles, imported_models
 from fixtures.bundles import Ground
+from fixtures.compositions import Composed
 from fixtures.fuzzing import (
     VALUES,
     all_finite,
+    change_part,
     empty_folder,
     fuzz,
     mutate_bytes,
@@ -34,10 +35,8 @@ from hypothesis import given
 from plyfile import PlyData, PlyElement
 from torch import nn
 
-from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle, read_bundle
 from dav_gswt.config.load import add_scene_files, check_config, read_config
-from dav_gswt.errors import InputError
 from dav_gswt.export import splat_files
 from dav_gswt.export.spool import Spool
 from dav_gswt.field import GaussianField, Splats, read_field, write_field
@@ -254,60 +253,54 @@ def test_a_changed_file_is_read_or_refused(valid, tmp_path, reader, random):
 
 @pytest.fixture(scope="module")
 def bundle(tmp_path_factory):
+    """Files of a bundle of stored records, and of one whose tiles are composed."""
     folder = tmp_path_factory.mktemp("bundle") / "bundle"
     bundles.write_bundle(folder, Ground(discs=4))
+    stored = {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*.*")}
+    return stored, Composed().files()
+
+
+def write_files(folder: Path, files: dict[str, bytes]) -> Path:
+    (folder / "parts").mkdir()
+    for name, data in files.items():
+        write_bytes(folder / name, data)
     return folder
 
 
+def check_chunks(opened: Bundle, name: str) -> None:
+    """All chunks that are read are sound."""
+
+    def check(field):
+        assert is_sound(field)
+
+    size = sum(path.stat().st_size for path in opened.folder.rglob("*.*"))
+    for tile in opened.manifest.tiles:
+        for level in range(len(tile.chunks)):
+            read_guarded(name, lambda t=tile.tile, lv=level: opened.chunk(t, lv), check, size, ".bin")
+
+
+@pytest.mark.parametrize("kind", [0, 1], ids=["stored", "composed"])
 @fuzz
 @given(random=randoms)
-def test_chunks_of_bundles(bundle, tmp_path, random):
-    """A chunk is changed, and mostly its entry in the manifest with it."""
-    manifest = json.loads((bundle / "davgswt.json").read_text())
-    folder = empty_folder(tmp_path)
-    (folder / "chunks").mkdir()
-    entry = manifest["tiles"][0]["chunks"][0]
-    data = mutate_bytes(random, (bundle / entry["file"]).read_bytes(), 300)
-    if random.random() < 0.8:
-        entry["sha256"] = hashlib.sha256(data).hexdigest()
-    if random.random() < 0.3:
-        entry["bytes"] = len(data)
-    if random.random() < 0.3:
-        entry["count"] = random.choice((0, 1, 15, 17, 2**40))
-    write_bytes(folder / entry["file"], data)
-    try:
-        read = Bundle(folder, Manifest.from_dict(manifest))
-    except InputError as error:  # a number of bytes or Gaussians that no chunk has
-        assert "davgswt.json" in str(error)
-        return
-
-    def check(chunk):
-        field, order = chunk
-        assert is_sound(field) and (np.sort(order, 1) == np.arange(len(field))).all()
-
-    read_guarded("chunks", lambda: read.chunk(0, 0), check, len(data), "lod0_tile_00.bin")
+def test_parts_of_bundles(bundle, tmp_path, kind, random):
+    folder = write_files(empty_folder(tmp_path), change_part(random, bundle[kind]))
+    check = lambda opened: check_chunks(opened, "parts")  # noqa: E731
+    read_guarded("davgswt.json", lambda: read_bundle(folder), check, 20_000, "davgswt.json")
 
 
+@pytest.mark.parametrize("kind", [0, 1], ids=["stored", "composed"])
 @fuzz
 @given(random=randoms)
-def test_manifests_of_bundles(bundle, tmp_path, random):
+def test_manifests_of_bundles(bundle, tmp_path, kind, random):
     """Whatever a manifest says, a bundle that opens has finite Gaussians in all of its chunks that are read."""
-    folder = empty_folder(tmp_path)
-    shutil.copytree(bundle / "chunks", folder / "chunks")
-    manifest = json.loads((bundle / "davgswt.json").read_text())
-    path = write_bytes(folder / "davgswt.json", mutate_json(random, manifest))
-
-    def check_chunk(found):
-        assert is_sound(found[0])
+    changed = mutate_json(random, json.loads(bundle[kind]["davgswt.json"]))
+    folder = write_files(empty_folder(tmp_path), bundle[kind] | {"davgswt.json": changed})
 
     def check(opened):
         assert all_finite(opened.manifest.tile_side, opened.manifest.eye_floor, opened.manifest.encoding.origin)
-        for tile in opened.manifest.tiles:
-            for level, chunk in enumerate(tile.chunks):
-                read = lambda t=tile.tile, lv=level: opened.chunk(t, lv)  # noqa: E731
-                read_guarded("chunks by a manifest", read, check_chunk, 10_000, Path(chunk.file).name)
+        check_chunks(opened, "chunks by a manifest")
 
-    read_guarded("davgswt.json", lambda: read_bundle(folder), check, path.stat().st_size, "davgswt.json")
+    read_guarded("davgswt.json", lambda: read_bundle(folder), check, len(changed), "davgswt.json")
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """Files that are dropped onto the page, mutated: its own modules read them in Node.js, as the page does."""
 
 import base64
-import hashlib
 import json
 import shutil
 import subprocess
@@ -11,7 +10,8 @@ from pathlib import Path
 import pytest
 from fixtures import bundles, fuzzing
 from fixtures.bundles import Ground
-from fixtures.fuzzing import FACTOR, FLOOR, SECONDS, fuzz, mutate_bytes, mutate_json, mutate_zip, randoms
+from fixtures.compositions import Composed
+from fixtures.fuzzing import FACTOR, FLOOR, SECONDS, change_part, fuzz, mutate_json, mutate_zip, randoms
 from fixtures.land_covers import write_cover_bundle
 from hypothesis import given
 
@@ -71,6 +71,11 @@ def test_the_bundle_itself_is_read(page, files):
     assert found["read"]["count"] > 100
 
 
+@pytest.fixture(scope="module")
+def composed():
+    return Composed().files()
+
+
 @fuzz
 @given(random=randoms)
 def test_manifests(page, files, random):
@@ -102,19 +107,17 @@ def test_materials_and_objects(page, cover, random):
 
 @fuzz
 @given(random=randoms)
-def test_chunks(page, files, random):
+def test_parts(page, files, random):
     data, manifest = files
-    manifest = json.loads(json.dumps(manifest))
-    entry = manifest["tiles"][0]["chunks"][0]
-    content = mutate_bytes(random, data[entry["file"]], 300)
-    if random.random() < 0.8:
-        entry["sha256"] = hashlib.sha256(content).hexdigest()
-    if random.random() < 0.3:
-        entry["bytes"] = len(content)
-    if random.random() < 0.3:
-        entry["count"] = random.choice((0, 1, 15, 17, 2**40))
-    named = data | {entry["file"]: content, "davgswt.json": json.dumps(manifest).encode()}
-    page("page: chunks", 20_000, files={name: encode(content) for name, content in named.items()})
+    named = change_part(random, data | {"davgswt.json": json.dumps(manifest).encode()})
+    page("page: parts", 20_000, files={name: encode(content) for name, content in named.items()})
+
+
+@fuzz
+@given(random=randoms)
+def test_parts_of_composed_tiles(page, composed, random):
+    named = change_part(random, composed)
+    page("page: composed parts", 200_000, files={name: encode(content) for name, content in named.items()})
 
 
 @pytest.mark.parametrize("kind", ["zip of a bundle", "gswt.zip"])

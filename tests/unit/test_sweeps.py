@@ -27,15 +27,22 @@ def manifest(folder):
     return str(path)
 
 
+def orders(folder):
+    measured = {"orders": 10, "order_mb": 2.5, "order_db": None, "compose_s": 0.5, "sort_s": 0.25}
+    (path := folder / "orders.json").write_text(json.dumps(measured | {"provenance": ORIGIN}))
+    return str(path)
+
+
 def test_a_row_has_quality_tiles_and_their_origin(tmp_path):
-    files = {"metrics": metrics(tmp_path), "manifest": manifest(tmp_path)}
+    files = {"metrics": metrics(tmp_path), "manifest": manifest(tmp_path), "orders": orders(tmp_path)}
     row = sweeps.tabulate_cell(CELL | {"files": files, "times": {}})
     assert (row["psnr"], row["worst_psnr"], row["photos"], row["psnr_is"]) == (20, 15, 16, "raw")
     assert (row["uncertainty"], row["deep"], row["levels"], row["splats"]) == (0.5, 0.5, 2, 17)
-    assert (row["orders"], row["bundle_mb"], row["field"], row["renderer"]) == (10, 0.85, 12 * "f", "cpu x")
+    assert (row["bundle_mb"], row["field"], row["renderer"]) == (0.85, 12 * "f", "cpu x")
+    assert [row[key] for key in sweeps.ORDERS] == [10, 2.5, None, 0.5, 0.25]
     row = sweeps.tabulate_cell(CELL | {"corrected": True, "files": {"metrics": files["metrics"]}, "times": {}})
     assert (row["psnr"], row["worst_psnr"], row["psnr_is"]) == (21, 16, "colour-corrected")
-    assert not [row[key] for key in (*sweeps.TILES, *sweeps.TIMES) if row[key] is not None]
+    assert not [row[key] for key in (*sweeps.TILES, *sweeps.ORDERS, *sweeps.TIMES) if row[key] is not None]
 
 
 def test_the_timing_table_has_means_over_seeds_and_none_for_what_was_not_timed(tmp_path):

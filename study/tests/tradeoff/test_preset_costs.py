@@ -19,8 +19,8 @@ def cell(folder, scene, preset, corrected=False):
     mean |= {"worst_decile": {"psnr": 1.0, "psnr_colour_corrected": 1.0}, "photos": 16, "gaussians": 900}
     origin = {"provenance": {"version": "1", "renderer": {"backend": "cpu"}}}
     (place / "metrics.json").write_text(json.dumps(mean | origin))
-    chunks = [{"chunks": [{"bytes": int(megabytes / 2 * 1e6)}]}]
-    (place / "davgswt.json").write_text(json.dumps({"tiles": chunks, "objects": chunks}))
+    parts = [{"bytes": int(megabytes / 2 * 1e6)}] * 2
+    (place / "davgswt.json").write_text(json.dumps({"parts": parts}))
     times = {}
     for number, part in enumerate(preset_costs.PARTS):
         (place / f"{part}.tsv").write_text(f"s\tmax_rss\n{seconds}\t{800.0 + number}\n")
@@ -33,7 +33,7 @@ def tabulate(*cells):
     return preset_costs.tabulate_presets(list(cells), 768)
 
 
-def test_a_row_has_the_sum_of_all_jobs_and_chunks(tmp_path):
+def test_a_row_has_the_sum_of_all_jobs_and_parts(tmp_path):
     (row,) = tabulate(cell(tmp_path, "sand", "standard"))
     assert (row["fits_s"], row["views_s"], row["tiles_s"], row["seconds"]) == (20.0, 20.0, 20.0, 60.0)
     assert (row["bundle_mb"], row["peak_mb"], row["photos"], row["psnr"]) == (20.0, 802.0, 16, 30.0)

@@ -27,8 +27,8 @@ def tabulate_cell(cell: dict) -> dict:
 
     Columns: `psnr_is`, colour-corrected for photos, whose exposure changes, and else raw; `uncertainty`, the mean over
     the tiles; `deep`, the share of tiles that are drawn in all orders; `bundle_mb` of the parts; those of ORDERS are
-    `bundle.order_costs.measure_orders`'s. Seconds are those of whole jobs; `recon_s` sums all jobs that lead to the field, except
-    taking photos.
+    `bundle.order_costs.measure_orders`'s. Seconds are those of whole jobs; `recon_s` sums all jobs that lead to the
+    field, except taking photos.
     cell: the keys of CELL, `corrected`, `files` (metrics, manifest, orders) and `times` (benchmark files by job).
     """
     files, row = cell["files"], {key: cell[key] for key in CELL} | dict.fromkeys(COLUMNS)
