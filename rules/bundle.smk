@@ -1,12 +1,11 @@
-"""Bundle: what a viewer loads. Here tau enters: tiles of higher uncertainty keep more pre-sorted orders.
+"""Bundle: what a viewer loads. Here tau enters: tiles of higher uncertainty are drawn in more orders, which viewers keep.
 
-In: the tiles. Out: davgswt.json (the contract with the viewer, docs/formats.md), its chunks, and gswt.zip for the public
-renderer.
+In: the tiles. Out: davgswt.json (the contract with the viewer, docs/formats.md) and its parts.
 """
 
 
 rule bundle_tiles:
-    """Pack the tiles with their pre-sorted orders."""
+    """Pack the exemplars and the recipes of the tiles."""
     input:
         unpack(photos_of_field),
         unpack(materials_of),
@@ -16,13 +15,12 @@ rule bundle_tiles:
         frame="<results>/<photos>/ground.json",
     output:
         manifest="<results>/<bundle>/davgswt.json",
-        chunks=directory("<results>/<bundle>/chunks"),
-        archive="<results>/<bundle>/gswt.zip",
+        parts=directory("<results>/<bundle>/parts"),
     log:
         "<logs>/<bundle>/bundle_tiles.log",
     benchmark:
         "<benchmarks>/<bundle>/bundle_tiles.tsv"
-    threads: 2
+    threads: 1  # it has little work for a second one
     resources:
         mem_mb=per_attempt(2500),
         runtime=per_attempt("10m"),

@@ -2,7 +2,7 @@
 terrain. Not part of `all`: name the path of the file that you want (docs/exports.md).
 
 In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/terrain,
-exports/ground.
+exports/ground, and the tile set itself: exports/tiles, gswt.zip.
 """
 
 
@@ -36,7 +36,7 @@ rule export_terrain:
         unpack(height_map),
         unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
+        parts="<results>/<bundle>/parts",
         frame="<results>/<photos>/ground.json",
     output:
         terrain=directory("<results>/<bundle>/exports/terrain"),
@@ -63,9 +63,10 @@ rule export_ground:
         unpack(height_map),
         unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
+        parts="<results>/<bundle>/parts",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
+        levels="<results>/<levels>",
     output:
         ground=directory("<results>/<bundle>/exports/ground"),
     log:
@@ -82,3 +83,24 @@ rule export_ground:
         source=code_of("export_ground"),
     script:
         "../scripts/export_ground.py"
+
+
+rule export_tiles:
+    """The tile set: gswt.zip for the public GSWT renderer, and a PLY a tile and level."""
+    input:
+        manifest="<results>/<bundle>/davgswt.json",
+        parts="<results>/<bundle>/parts",
+    output:
+        archive="<results>/<bundle>/gswt.zip",
+        tiles=directory("<results>/<bundle>/exports/tiles"),
+    log:
+        "<logs>/<bundle>/export_tiles.log",
+    benchmark:
+        "<benchmarks>/<bundle>/export_tiles.tsv"
+    resources:
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("20m"),
+    params:
+        source=code_of("export_tiles"),
+    script:
+        "../scripts/export_tiles.py"

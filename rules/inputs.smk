@@ -394,7 +394,8 @@ def describe_run(values, measured):
     windowed = is_windowed(values)
     tested = rules.evaluate_round if rounds or windowed else rules.evaluate_coarse
     files = {"metrics": tested.output.metrics} if "views" in measured else {}
-    files |= {"manifest": rules.bundle_tiles.output.manifest} if "tiles" in measured else {}
+    bundled = {"manifest": rules.bundle_tiles.output.manifest, "orders": rules.measure_orders.output.measured}
+    files |= bundled if "tiles" in measured else {}
     files |= {"still": rules.render_terrain.output.stills[0]} if "stills" in measured else {}
     times = {"coarse": of(rules.fit_coarse.benchmark, [rounds], chosen)}
     times["update"] = of(rules.update_field.benchmark, range(1, rounds + 1), chosen)

@@ -5,6 +5,27 @@ have in common is made once. Out: results/sweeps/{sweep}.csv, results/tables/tim
 """
 
 
+rule measure_orders:
+    """What tau buys: the error of the orders that a bundle's tiles have, their memory, and the time to compose and sort."""
+    input:
+        manifest="<results>/<bundle>/davgswt.json",
+        parts="<results>/<bundle>/parts",
+    output:
+        measured="<results>/<bundle>/orders.json",
+    log:
+        "<logs>/<bundle>/measure_orders.log",
+    benchmark:
+        "<benchmarks>/<bundle>/measure_orders.tsv"
+    threads: 1  # its seconds are those of one core
+    resources:
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("20m"),
+    params:
+        source=code_of("measure_orders"),
+    script:
+        "../scripts/measure_orders.py"
+
+
 rule gather_sweep:
     """Collect what each value of a setting changes, and what it costs."""
     input:

@@ -5,14 +5,14 @@ In: the bundle. Out: page/ (`make view` serves it), walker.png, oblique.png, abo
 
 
 rule make_page:
-    """A page that needs nothing else: viewer, manifest, surface, chunks, a first still and how it was made in one folder."""
+    """A page that needs nothing else: viewer, manifest, surface, parts, a first still and how it was made in one folder."""
     input:
         unpack(height_map),
         unpack(painted_files),
         unpack(story_of_field),
         still="<results>/<terrain>/walker.png",
         manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
+        parts="<results>/<bundle>/parts",
         viewer=VIEWER,
     output:
         page=directory("<results>/<terrain>/page"),
@@ -38,7 +38,7 @@ rule render_terrain:
         unpack(height_map),
         unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
+        parts="<results>/<bundle>/parts",
     output:
         stills=expand("<results>/<terrain>/{shot}.png", shot=["walker", "oblique", "above"], allow_missing=True),
     log:

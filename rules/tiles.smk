@@ -1,7 +1,7 @@
 """Wang tiles: a centre, two strips per direction and one corner, joined along cuts.
 
-In: the levels. Out: tiles/ (labels.npz, lod{l}_tile_{TT}.ply) and seams.json. The cut is made on the finest level; coarser levels
-follow it.
+In: the levels. Out: tiles/labels.npz (which patch each cell shows, and its correction) and seams.json. The cut is made on the finest
+level; coarser levels follow it. exports/tiles of a bundle has the tiles themselves.
 """
 
 

@@ -1,4 +1,4 @@
-"""Rule bundle_tiles: the tiles as a viewer loads them, and as the public GSWT renderer does."""
+"""Rule bundle_tiles: the tiles as a viewer loads them."""
 
 from pathlib import Path
 
@@ -16,10 +16,10 @@ with logging_to(snakemake.log[0]):
     inputs |= {"materials": paths.materials} if paths.get("materials") else {}
     reports = {"tiles": read_json(paths.seams), "levels": read_json(Path(paths.levels, "levels.json"))}
     source = record_provenance(inputs, {"tau": params.tau, "seed": params.seed})
-    tiles = store.read_material_tiles(paths.tiles, paths.seams)
+    tiles = store.read_material_tiles(paths.tiles, paths.seams, paths.levels)
     build.write_bundle(
         gather_content(tiles, paths.get("materials"), params.seed),
         Path(snakemake.output.manifest).parent,
-        build.BundleOptions(tau=params.tau, salt=params.seed, unit=frame.unit, threads=snakemake.threads),
+        build.BundleOptions(tau=params.tau, salt=params.seed, unit=frame.unit),
         source | {name: report["provenance"] for name, report in reports.items()},
     )

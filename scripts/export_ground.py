@@ -12,5 +12,5 @@ with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
     bundle = read_bundle(Path(paths.manifest).parent)
     terrain = endless.terrain_from_bundle(bundle, params.heights, params.classes)
-    sets = store.read_material_tiles(paths.tiles, paths.seams)
+    sets = store.read_material_tiles(paths.tiles, paths.seams, paths.levels)
     ground_files.export_ground(terrain, bundle.manifest, sets, params.export, snakemake.output.ground)

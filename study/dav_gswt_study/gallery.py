@@ -60,10 +60,12 @@ def tabulate_scene(cell: dict) -> dict:
     metrics, manifest = read_json(cell["metrics"]), read_json(cell["manifest"])
     real = cell["kind"] == "photos"
     found = select_metrics(metrics, "psnr_colour_corrected" if real else "psnr")
-    chunks = [chunk for piece in manifest["tiles"] + (manifest.get("objects") or []) for chunk in piece["chunks"]]
     row = {"scene": cell["scene"], "real": real, "photos": metrics["photos"], "gaussians": metrics["gaussians"]}
     row |= {key: found[key] for key in ("psnr", "ssim", "lpips")}
-    row |= {"bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA, "version": metrics["provenance"]["version"]}
+    row |= {
+        "bundle_mb": sum(part["bytes"] for part in manifest["parts"]) / MEGA,
+        "version": metrics["provenance"]["version"],
+    }
     verdict = read_report(cell["materials"]).verdict if cell["materials"] else None
     return row | {"grade": verdict and verdict.grade, "reason": verdict and verdict.reason}
 

@@ -10,7 +10,7 @@ rule time_page:
     """Frames as the page draws them, with software rendering."""
     input:
         manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
+        parts="<results>/<bundle>/parts",
         viewer=VIEWER,
     output:
         table="<results>/<bundle>/frames/page.csv",

@@ -45,7 +45,7 @@ rule draw_walk:
         unpack(height_map),
         unpack(painted_files),
         manifest=lambda wildcards: expand(rules.bundle_tiles.output.manifest, **made_of(GALLERY["walk"])),
-        chunks=lambda wildcards: expand(rules.bundle_tiles.output.chunks, **made_of(GALLERY["walk"])),
+        parts=lambda wildcards: expand(rules.bundle_tiles.output.parts, **made_of(GALLERY["walk"])),
     output:
         picture="docs/figures/walk.webp",
     log:

@@ -11,6 +11,7 @@ rule measure_levels:
     input:
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
+        levels="<results>/<levels>",
     output:
         table="<results>/<tiles>/lod.csv",
     log:
@@ -30,9 +31,10 @@ rule measure_presort:
     input:
         unpack(materials_of),
         manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
+        parts="<results>/<bundle>/parts",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
+        levels="<results>/<levels>",
     output:
         table="<results>/<bundle>/presort.csv",
     log:

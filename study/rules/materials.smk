@@ -30,7 +30,7 @@ rule measure_lattice:
     input:
         unpack(painted_files),
         manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
+        parts="<results>/<bundle>/parts",
     output:
         table="<results>/<bundle>/lattice/lattice.csv",
         picture="<results>/<bundle>/lattice/above.png",

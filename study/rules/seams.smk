@@ -58,6 +58,7 @@ rule plot_cuts:
     input:
         seams=[f"<results>/<round>{{inpainted}}/tiles_{kind}/seams.json" for kind in ("colour", "semantic")],
         tiles=[f"<results>/<round>{{inpainted}}/tiles_{kind}/tiles" for kind in ("colour", "semantic")],
+        levels="<results>/<levels>",
     output:
         plot="<results>/<round>{inpainted}/seam_cuts.png",
     log:

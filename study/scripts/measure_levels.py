@@ -7,5 +7,6 @@ from dav_gswt_study import csv_tables
 from dav_gswt_study.terrain.level_fidelity import measure_levels
 
 with logging_to(snakemake.log[0]):
-    tiles, used = store.read_tiles(snakemake.input.tiles, snakemake.input.seams), build.BundleOptions
+    paths, used = snakemake.input, build.BundleOptions
+    tiles = store.read_tiles(paths.tiles, paths.seams, paths.levels)
     csv_tables.write_table(snakemake.output.table, measure_levels(tiles, used.level_pixels, used.band))

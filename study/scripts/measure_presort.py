@@ -12,6 +12,6 @@ from dav_gswt_study.terrain import presort
 with logging_to(snakemake.log[0]):
     paths = snakemake.input
     bundle = bundles.read_bundle(Path(paths.manifest).parent)
-    tiles = store.read_material_tiles(paths.tiles, paths.seams)
+    tiles = store.read_material_tiles(paths.tiles, paths.seams, paths.levels)
     content = gather_content(tiles, paths.get("materials"), snakemake.params.seed)
     csv_tables.write_table(snakemake.output.table, presort.measure_approximations(content, bundle))

@@ -14,7 +14,7 @@ from dav_gswt_study.seams import measure
 with logging_to(snakemake.log[0]):
     paths, params, tiling = snakemake.input, snakemake.params, dict(snakemake.params.tiling)
     alexnet = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
-    cut = store.read_material_tiles(paths.tiles, paths.seams)
+    cut = store.read_material_tiles(paths.tiles, paths.seams, paths.levels)
     sets = zip(levels.read_material_levels(paths.levels), cut, strict=True)
     rows, dense = measure.measure_materials(sets, tiling, alexnet, params.seed, params.tau)
     csv_tables.write_table(snakemake.output.crops, rows)

@@ -6,5 +6,5 @@ from dav_gswt_study.seams import report
 
 with logging_to(snakemake.log[0]):
     paths = snakemake.input
-    pair = [store.read_tiles(*files) for files in zip(paths.tiles, paths.seams, strict=True)]
+    pair = [store.read_tiles(*files, paths.levels) for files in zip(paths.tiles, paths.seams, strict=True)]
     report.write_cuts(snakemake.output.plot, dict(zip(("colour", "semantic"), pair, strict=True)))

@@ -12,7 +12,7 @@ with logging_to(snakemake.log[0]):
     maps = placed_tiles.ExemplarMaps.from_levels(levels.read_levels(paths.levels))
     sets = {}
     for name, *files in zip(params.tilings, paths.tiles, paths.seams, strict=True):
-        cut = tiles.read_tiles(*files)
+        cut = tiles.read_tiles(*files, paths.levels)
         sets[name] = placed_tiles.place_tiles(cut, maps.detrend(cut, params.tilings[name]), params.salt, params.tau)
     asked = dict(params.study)
     origin = record_provenance({"seams": list(paths.seams)}, asked)

@@ -13,16 +13,16 @@ import numpy as np
 import yaml
 from plyfile import PlyData
 
-from dav_gswt.bundle import chunks
-from dav_gswt.bundle.chunks import ChunkEntry
-from dav_gswt.bundle.encoding import Encoding
+from dav_gswt.bundle.manifest import NAME
+from dav_gswt.bundle.store import read_bundle
 from dav_gswt.cli.run import PROFILE_NOTE, short_log
+from dav_gswt.field import GaussianField
 from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.images import image_files, metrics
 from dav_gswt_study.stability.extremes import EXTREMES, Extreme
 
 DEFAULT_CONFIG, TEST_CONFIG = "config/config.yaml", "config/test/config.yaml"
-NUMERIC_FILES = ("*.ply", "*.csv", "*.json", "lod*.bin")  # files whose numbers must all be finite
+NUMERIC_FILES = ("*.ply", "*.csv", "*.json")  # files whose numbers must all be finite
 TRACEBACK = "Traceback (most recent call last)"
 NEAR_STILLS = ("walker", "oblique")  # stills that show single splats; from far above, sand has one colour
 MIN_PSNR = 40.0  # dB between stills of worlds that differ in size alone: single roundings to 8 bits
@@ -101,18 +101,14 @@ def is_finite(path: Path) -> bool:
     if path.suffix == ".ply":
         rows = PlyData.read(str(path))["vertex"].data
         return all(np.isfinite(rows[name]).all() for name in rows.dtype.names)
-    if path.suffix == ".bin":
-        return _is_chunk_finite(path)
+    if path.name == NAME and not all(_is_field_finite(f) for level in read_bundle(path.parent).fields() for f in level):
+        return False
     words = path.read_text(encoding="utf-8").lower().replace(",", " ").replace(":", " ").split()
     return not {"nan", "inf", "-inf", "infinity", "-infinity"} & set(words)
 
 
-def _is_chunk_finite(path: Path) -> bool:
-    """Whether the splats of a chunk are finite once decoded by its manifest."""
-    manifest = read_json(path.parents[1] / "davgswt.json")
-    entries = [chunk for tile in manifest["tiles"] for chunk in tile["chunks"]]
-    entry = next(entry for entry in entries if entry["file"] == f"chunks/{path.name}")
-    field, _ = chunks.read_chunk(path.parents[1], ChunkEntry(**entry), Encoding(**manifest["encoding"]))
+def _is_field_finite(field: GaussianField) -> bool:
+    """Whether the splats of a tile are finite once decoded."""
     with np.errstate(over="ignore"):
         deviations = np.exp(field.log_scales)
     return all(np.isfinite(part).all() for part in (field.means, deviations, field.quats, field.opacity_logits))

@@ -28,7 +28,7 @@ def read_cells(manifest: dict, west: int, south: int, shape: tuple[int, int]) ->
     tiles = manifest["tiles"]
     numbers = tiles_in(west, south, shape, manifest["salt"], len(tiles) // 16)
     uncertainty = np.array([tile["uncertainty"] for tile in tiles])
-    deep = np.array([len(tile["chunks"][0]["orders"]) == len(manifest["directions"]) for tile in tiles])
+    deep = np.array([len(tile["orders"]) == len(manifest["directions"]) for tile in tiles])
     return uncertainty[numbers], deep[numbers]
 
 

@@ -22,7 +22,7 @@ def tabulate_presets(cells: list[dict], size: int) -> list[dict]:
 
     psnr: of test photos, after their exposure is fitted where they are real. fits_s, views_s, tiles_s: seconds of whole
     jobs, from the start photos to the bundle; seconds: their sum. peak_mb: the largest memory of any of these jobs.
-    bundle_mb: of all chunks, in megabytes. size: of the test photos, at most.
+    bundle_mb: of all parts, in megabytes. size: of the test photos, at most.
     cells: `scene`, `preset`, `corrected`, `files` (metrics, manifest), and `times`, benchmarks by PARTS.
     """
     return [_tabulate_cell(cell, size) for cell in cells]
@@ -36,9 +36,8 @@ def _tabulate_cell(cell: dict, size: int) -> dict:
     runs = {part: [read_benchmark(path) for path in cell["times"][part]] for part in PARTS}
     seconds = {part: sum_or_none(one and one[0] for one in found) for part, found in runs.items()}
     memory = [one[1] for one in chain.from_iterable(runs.values()) if one and one[1] is not None]
-    chunks = [chunk for piece in manifest["tiles"] + manifest.get("objects", []) for chunk in piece["chunks"]]
     row |= {f"{part}_s": value for part, value in seconds.items()} | {"seconds": sum_or_none(seconds.values())}
-    row |= {"peak_mb": max(memory, default=None), "bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA}
+    row |= {"peak_mb": max(memory, default=None), "bundle_mb": sum(part["bytes"] for part in manifest["parts"]) / MEGA}
     return row | {"size": size} | describe_origin(metrics["provenance"]) | describe_machine()
 
 

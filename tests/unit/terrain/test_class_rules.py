@@ -20,7 +20,7 @@ FILE = {"format": "davgswt-paint", "version": 1, "materials": ["grass", "sand"],
 @pytest.fixture
 def manifest():
     materials = [MaterialEntry("sand", 0.6, 0, [0.5] * 3), MaterialEntry("grass", 0.4, 16, [0.5] * 3)]
-    shrub = ObjectEntry("shrub", 0.4, [0.0, 1.0], 0.0, 1, 0.1, 0.3, [])
+    shrub = ObjectEntry("shrub", 0.4, [0.0, 1.0], 0.0, 1, 0.1, 0.3, [], [])
     objects = [shrub, replace(shrub, name="stone", material=0), replace(shrub, name="tuft")]
     cover = {"classes": two_classes(), "objects": objects, "scatter": ScatterEntry(4, 15.0, 0.15, 7)}
     return replace(manifest_of(1.0, [0.5] * 3), materials=materials, **cover)

@@ -85,7 +85,7 @@ def test_every_object_has_its_density_in_another_window():
     things = [shrub(0.4, 0.1), replace(shrub(0.25, 0.06, 0), name="stone")]
     fitted = fit_cover(replace(cover_content(), objects=things), 7)
     entries = [
-        ObjectEntry(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, p, [])
+        ObjectEntry(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, p, [], [])
         for each, p in zip(fitted.objects, fitted.probabilities, strict=True)
     ]
     scatter = Scatter(fitted.scatter, entries, SIDE, Classes(fitted.classes, 2, SIDE))

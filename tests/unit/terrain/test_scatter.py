@@ -19,7 +19,7 @@ WINDOW = 24  # tiles
 
 
 def thing(radius, material=0, probability=0.5):
-    return ObjectEntry("thing", radius, [0.0, 1.0], 0.0, material, 0.1, probability, [])
+    return ObjectEntry("thing", radius, [0.0, 1.0], 0.0, material, 0.1, probability, [], [])
 
 
 def window_of(scatter, west=0, south=0, size=WINDOW):

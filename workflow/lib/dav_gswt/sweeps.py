@@ -12,11 +12,12 @@ from dav_gswt.files import read_json
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k", "rounds", "tiling", "tau")
 QUALITY = ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")  # of the test views
-TILES = ("uncertainty", "deep", "levels", "splats", "orders", "bundle_mb")
+TILES = ("uncertainty", "deep", "levels", "splats", "bundle_mb")
+ORDERS = ("orders", "order_mb", "order_db", "compose_s", "sort_s")  # of `bundle.order_costs`
 ROUND_JOBS = ("score", "select", "update")  # jobs of each round: their seconds are means over the rounds
 JOBS = ("levels", "cut", "bundle", "stills")
 TIMES = ("coarse_s", *(f"{job}_s" for job in ROUND_JOBS), "recon_s", *(f"{job}_s" for job in JOBS), "peak_mb")
-COLUMNS = ("psnr_is", "photos", "gaussians", *QUALITY, *TILES, *TIMES, "version", "renderer", "field")
+COLUMNS = ("psnr_is", "photos", "gaussians", *QUALITY, *TILES, *ORDERS, *TIMES, "version", "renderer", "field")
 ASIDE = ("oblique", "walker")  # groups of test views away from where photos may be taken
 MEGA = 1e6
 
@@ -25,9 +26,10 @@ def tabulate_cell(cell: dict) -> dict:
     """Make the row of a cell; what was not measured is None.
 
     Columns: `psnr_is`, colour-corrected for photos, whose exposure changes, and else raw; `uncertainty`, the mean over
-    the tiles; `deep`, the share of tiles that keep all orders; `orders`, summed over tiles and levels; `bundle_mb` of
-    the chunks. Seconds are those of whole jobs; `recon_s` sums all jobs that lead to the field, except taking photos.
-    cell: the keys of CELL, `corrected`, `files` (metrics, manifest) and `times` (benchmark files by job).
+    the tiles; `deep`, the share of tiles that are drawn in all orders; `bundle_mb` of the parts; those of ORDERS are
+    `bundle.order_costs.measure_orders`'s. Seconds are those of whole jobs; `recon_s` sums all jobs that lead to the field, except
+    taking photos.
+    cell: the keys of CELL, `corrected`, `files` (metrics, manifest, orders) and `times` (benchmark files by job).
     """
     files, row = cell["files"], {key: cell[key] for key in CELL} | dict.fromkeys(COLUMNS)
     row["psnr_is"] = "colour-corrected" if cell["corrected"] else "raw"
@@ -35,6 +37,8 @@ def tabulate_cell(cell: dict) -> dict:
         row |= read_quality(files["metrics"], cell["corrected"])
     if "manifest" in files:
         row |= read_tiles(files["manifest"])
+    if "orders" in files:
+        row |= {key: read_json(files["orders"])[key] for key in ORDERS}
     return row | sum_times(cell["times"])
 
 
@@ -63,14 +67,12 @@ def read_tiles(path: Path | str) -> dict:
     """Read TILES and provenance from a bundle's manifest."""
     manifest = read_json(path)
     tiles, every = manifest["tiles"], len(manifest["directions"])
-    chunks = [chunk for tile in tiles for chunk in tile["chunks"]]
     return {
         "uncertainty": sum(tile["uncertainty"] for tile in tiles) / len(tiles),
-        "deep": sum(len(tile["chunks"][0]["orders"]) == every for tile in tiles) / len(tiles),
+        "deep": sum(len(tile["orders"]) == every for tile in tiles) / len(tiles),
         "levels": len(manifest["levels"]),
-        "splats": sum(chunk["count"] for chunk in chunks),
-        "orders": sum(len(chunk["orders"]) for chunk in chunks),
-        "bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA,
+        "splats": sum(chunk["count"] for tile in tiles for chunk in tile["chunks"]),
+        "bundle_mb": sum(part["bytes"] for part in manifest["parts"]) / MEGA,
     } | describe_origin(manifest["provenance"])
 
 
@@ -114,8 +116,8 @@ def tabulate_timing(cells: list[dict]) -> list[dict]:
     """Make the timing table: for each scene and preset the means over its seeds.
 
     Columns: `splats_m`, millions of Gaussians of all tiles and levels; `recon_min`, minutes from registered photos to
-    the last field, except taking photos; seconds of levels and of cutting tiles; `presort_s`, seconds of the bundle
-    with its orders; `peak_mb`. Source: DAV-GSWT, table of timing.
+    the last field, except taking photos; seconds of levels and of cutting tiles; `presort_s`, CPU seconds of
+    composing all tiles and sorting them for all their directions; `peak_mb`. Source: DAV-GSWT, table of timing.
     """
     rows = [tabulate_cell(cell) for cell in cells]
     found = []
@@ -125,7 +127,8 @@ def tabulate_timing(cells: list[dict]) -> list[dict]:
         row = {"scene": scene, "preset": preset, "seeds": len(mine), "photos": compute_mean(mine, "photos")}
         row |= {"splats_m": splats and splats / MEGA, "recon_min": recon and recon / 60}
         row |= {key: compute_mean(mine, key) for key in ("levels_s", "cut_s")}
-        found.append(row | {"presort_s": compute_mean(mine, "bundle_s"), "peak_mb": compute_mean(mine, "peak_mb")})
+        parts = [compute_mean(mine, key) for key in ("compose_s", "sort_s")]
+        found.append(row | {"presort_s": sum_or_none(parts), "peak_mb": compute_mean(mine, "peak_mb")})
     return found
 
 

@@ -19,7 +19,7 @@ import { RECORD } from "./layout.js";
 export const STEP = 8192; // Gaussians
 export const PLANES = 19; // bytes of a Gaussian in a block
 const WIDE = 5; // words of a Gaussian of an exemplar, whose colours have 16 bits
-const LABELS = 9;
+const LABELS = 9, LAYERS = 3; // ground, its underlay, what else there is
 
 /** All steps at once. @template T @param {Generator<void, T>} steps @returns {T} */
 export function run(steps) {
@@ -138,7 +138,7 @@ export function createComposer(manifest) {
     let at = 0;
     for (const finest of exemplars) {
       const cells = (finest >> level) ** 2, pair = [];
-      for (let layer = 0; layer < 2; layer++) {
+      for (let layer = 0; layer < LAYERS; layer++) {
         if (at + 2 * cells > bytes.length) throw broken(file, "it is cut short");
         const starts = new Uint32Array(cells + 1);
         for (let k = 0; k < cells; k++) starts[k + 1] = starts[k] + (bytes[at + k] | (bytes[at + cells + k] << 8));

@@ -1,6 +1,6 @@
-"""What a viewer loads: chunks with pre-sorted orders under one manifest, and the archive of the public GSWT renderer.
+"""What a viewer loads: exemplar and recipes of tiles under one manifest, and the archive of the public GSWT renderer.
 
 `build.write_bundle` makes a bundle of a `content.BundleContent`: tile sets, materials and objects.
-`store.read_bundle` reads one back, with checks, chunk by chunk.
-`encoding` and `chunks` state the bytes, `manifest` the JSON, `direction_search` how many orders are kept.
+`store.read_bundle` reads one back, with checks, and composes its tiles.
+`encoding`, `blocks` and `recipes` state the bytes, `manifest` the JSON, `direction_search` how many orders are kept.
 """

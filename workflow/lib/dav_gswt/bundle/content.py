@@ -8,7 +8,7 @@ from dav_gswt.bundle.land_cover import ClassesEntry, ScatterEntry
 from dav_gswt.bundle.manifest import ONLY_MATERIAL
 from dav_gswt.field import GaussianField
 from dav_gswt.materials.model import MaterialInfo, ObjectLevels
-from dav_gswt.tiles.build import TileSet
+from dav_gswt.tiles.build import Recipe, TileSet
 
 
 @dataclass(frozen=True)
@@ -48,12 +48,18 @@ class BundleContent:
     def levels(self) -> int:
         return len(self.tiles[0].fields)
 
+    @property
+    def recipes(self) -> list[Recipe]:
+        """Of all materials' tiles; none if any is known by its Gaussians alone."""
+        found = [tiles.recipe for tiles in self.tiles if tiles.recipe is not None]
+        return found if len(found) == len(self.tiles) else []
+
     def tile_fields(self, level: int) -> list[GaussianField]:
         """All tiles of a level by number, those of the first material first."""
         return [each for tiles in self.tiles for each in tiles.fields[level]]
 
     def object_fields(self, level: int) -> list[GaussianField]:
-        """All objects at a level, as chunks store them: in the middle of a tile."""
+        """All objects at a level, as they are stored: in the middle of a tile."""
         middle = np.array([0.5 * self.side, 0.5 * self.side, 0], np.float32)
         return [replace(each.fields[level], means=each.fields[level].means + middle) for each in self.objects]
 

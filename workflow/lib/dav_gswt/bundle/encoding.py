@@ -28,6 +28,7 @@ RECORD = np.dtype([("position", "<u2", 3), ("scale", "u1", 3), ("rotation", "u1"
 assert RECORD.itemsize == 16
 POSITION_STEPS = 65535  # of the grid along an axis
 MIN_STEPS_PER_TILE = 1024  # of the grid along a tile's side
+STEPS_A_CELL = 32  # of the grid along a finest cell of ground, where tiles are composed
 SCALE_STEPS = 255  # of a logarithm of a standard deviation
 MAX_COMPONENT = np.sin(np.pi / 8)  # largest |x|, |y|, |z| of the smallest of an ellipsoid's 24 rotations
 ROTATION_STEPS = 127  # of a component, either way
@@ -72,10 +73,12 @@ class Encoding(Entry):
     sh_degree: Literal[0] = 0
 
     @classmethod
-    def fit(cls, parts: list[GaussianField], side: float, pixel: float) -> "Encoding":
+    def fit(cls, parts: list[GaussianField], side: float, pixel: float, cells: int | None = None) -> "Encoding":
         """The finest grid that holds all these Gaussians.
 
-        Args: side: of a tile. pixel: width of a pixel on the nearest visible ground.
+        Args: side: of a tile. pixel: width of a pixel on the nearest visible ground. cells: along a tile's side, if the
+        grid must have whole steps in a cell; STEPS_A_CELL are enough then, and twice as many of height, by which
+        views from above sort.
         Raises: InputError: the Gaussians spread so far that a tile's side has fewer than MIN_STEPS_PER_TILE steps.
         """
         places = [f.means.astype(float) for f in parts if len(f)]
@@ -83,11 +86,13 @@ class Encoding(Entry):
         west, east = min(0.0, float(low[:2].min())), max(side, float(high[:2].max()))
         # one step less where the western rim is rounded outwards
         steps = np.floor((POSITION_STEPS - (west < 0)) * side / (east - west))
+        if cells:
+            steps = cells * min(STEPS_A_CELL, steps // cells)
         if steps < MIN_STEPS_PER_TILE:
             raise InputError(f"tiles: a splat lies {(east - west) / side:.0f} tile sides from another; cut them again")
         step = float(side / steps)
         west = -float(np.ceil(-west / step)) * step if west < 0 else 0.0
-        rise = float(high[2] - low[2]) / POSITION_STEPS
+        rise = max(float(high[2] - low[2]) / POSITION_STEPS, step / 2 if cells else 0.0)
         sizes = np.concatenate([f.log_scales.ravel() for f in parts]).astype(float)
         sizes = np.clip(sizes, np.log(MIN_PIXELS * pixel), np.log(MAX_TILE_SIDES * side))
         least = float(sizes.min())

@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dav_gswt.bundle.chunks import ChunkEntry
 from dav_gswt.bundle.encoding import Entry, Length, Natural, Pair, Share, Size
+from dav_gswt.bundle.parts import ChunkEntry
 
 MAX_PAINTED = 2**18  # points
 MAX_COORDINATE = 2**23  # of a painted point
@@ -109,7 +109,7 @@ def find_run_fault(runs: Sequence[Sequence[int]], materials: int) -> str | None:
 
 @dataclass(frozen=True)
 class ObjectEntry(Entry):
-    """An object on the terrain."""
+    """An object on the terrain. orders: the directions in whose orders it is drawn."""
 
     name: Name
     radius: Length
@@ -118,6 +118,7 @@ class ObjectEntry(Entry):
     material: Natural
     density: Size
     probability: Share
+    orders: Annotated[list[Natural], Field(min_length=1)]
     chunks: Annotated[Sequence[ChunkEntry], Field(min_length=1)]
 
 

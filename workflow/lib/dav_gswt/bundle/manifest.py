@@ -14,9 +14,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
-from dav_gswt.bundle.chunks import ChunkEntry, chunk_size
+from dav_gswt.bundle.blocks import PLANES
 from dav_gswt.bundle.encoding import (
     POSITION_STEPS,
+    RECORD,
     SCALE_STEPS,
     Colour,
     Encoding,
@@ -28,11 +29,13 @@ from dav_gswt.bundle.encoding import (
     Size,
 )
 from dav_gswt.bundle.land_cover import ClassesEntry, Name, ObjectEntry, Salt, ScatterEntry
+from dav_gswt.bundle.parts import LEVEL, PLAIN, RECIPES, RECORDS, ChunkEntry, PartEntry
+from dav_gswt.bundle.recipes import Composition, locate_corner
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import parse_record, read_json
 
 NAME = "davgswt.json"
-FORMAT, VERSION = "davgswt", 3
+FORMAT, VERSION = "davgswt", 4
 ONLY_MATERIAL = "ground"  # the name of the material of a set that has one
 MAX_BYTES = 1 << 26  # of a manifest
 FARTHEST, MAX_LOG_SCALE = 1e9, 60.0  # of lengths, whose squares single precision keeps; of logarithms of deviations
@@ -62,12 +65,14 @@ class LevelEntry(Entry):
 @dataclass(frozen=True)
 class TileEntry(Entry):
     """One tile: its number 16 c + 8 W + 4 N + 2 E + S of variant c and the colours of its edges, its mean uncertainty
-    in [0, 1], the lowest and highest z of its Gaussians, and its chunks, one a level.
+    in [0, 1], the lowest and highest z of its Gaussians, the directions (indices into `directions`) in whose orders it
+    is drawn, and its chunks, one a level.
     """
 
     tile: Natural
     uncertainty: Share
     z: Pair
+    orders: Annotated[list[Natural], Field(min_length=1)]
     chunks: Annotated[Sequence[ChunkEntry], Field(min_length=1)]
 
 
@@ -100,19 +105,23 @@ class Manifest(Entry):
     objects: Annotated[Sequence[ObjectEntry], Field(min_length=1, max_length=256)] | None = None
     scatter: ScatterEntry | None = None
     format: Literal["davgswt"]
-    version: Literal[3]
+    version: Literal[4]
     unit: Annotated[str, Field(min_length=1)]
     sky: Sky
     encoding: Encoding
+    parts: Annotated[list[PartEntry], Field(min_length=1, max_length=1024)]
     provenance: dict[str, Any]
+    composition: Composition | None = None
     heights: dict[str, Any] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON object."""
         value = asdict(self)
-        for key in ("classes", "objects", "scatter", "heights"):
-            if value[key] is None:
-                del value[key]
+        entries = [chunk for each in (*value["tiles"], *(value["objects"] or [])) for chunk in each["chunks"]]
+        for entry in (value, *value["parts"], *entries):
+            for key in ("classes", "objects", "scatter", "composition", "heights", "level", "part", "first"):
+                if key in entry and entry[key] is None:
+                    del entry[key]
         if "classes" in value and not value["classes"]["painted"]:
             del value["classes"]["painted"]
         return value
@@ -136,7 +145,7 @@ def make_schema() -> str:
 
 def _find_faults(manifest: Manifest) -> Iterator[str]:
     """What contradicts itself: the types of single values cannot express it."""
-    levels, tiles, objects = manifest.levels, manifest.tiles, manifest.objects or []
+    levels, tiles = manifest.levels, manifest.tiles
     yield from _find_wrong_lengths(manifest)
     if [level.level for level in levels] != list(range(len(levels))):
         yield "levels must count up from 0"
@@ -149,17 +158,51 @@ def _find_faults(manifest: Manifest) -> Iterator[str]:
     if [tile.tile for tile in tiles] != list(range(len(tiles))) or len(tiles) % (16 * len(manifest.materials)):
         yield f"{len(tiles)} tiles: they must be 0 to 16 C - 1 for each material, in order"
     yield from _find_wrong_cover(manifest)
-    named = [(f"tile {t.tile}", t.chunks) for t in tiles] + [(f"object {k}", o.chunks) for k, o in enumerate(objects)]
-    for name, chunks in named:
-        if [chunk.level for chunk in chunks] != list(range(len(levels))):
+    yield from _find_wrong_parts(manifest)
+
+
+def _find_wrong_parts(manifest: Manifest) -> Iterator[str]:
+    """What contradicts itself in parts, composition, chunks and orders."""
+    parts, composed, levels = manifest.parts, manifest.composition, len(manifest.levels)
+    if len({part.file for part in parts}) < len(parts):
+        yield "parts: a file is there twice"
+    if composed:
+        yield from _find_wrong_composition(manifest, composed)
+    for name, orders, chunks, own in [
+        *((f"tile {t.tile}", t.orders, t.chunks, composed.levels if composed else 0) for t in manifest.tiles),
+        *((f"object {k}", o.orders, o.chunks, 0) for k, o in enumerate(manifest.objects or [])),
+    ]:
+        if [chunk.level for chunk in chunks] != list(range(levels)):
             yield f"{name}: one chunk a level is needed, in order"
-        for chunk in chunks:
-            if chunk.bytes != chunk_size(chunk.count, len(chunk.orders)):
-                yield f"{chunk.file}: bytes do not fit count and orders"
-            if len(set(chunk.orders)) < len(chunk.orders):
-                yield f"{chunk.file}: an order is there twice"
-            if max(chunk.orders) >= len(manifest.directions):
-                yield f"{chunk.file}: an order of a direction that is not there"
+        if len(set(orders)) < len(orders) or max(orders) >= len(manifest.directions):
+            yield f"{name}: an order is there twice, or of a direction that is not there"
+        for level, chunk in enumerate(chunks):
+            if (chunk.part is None or chunk.first is None) != (level < own):
+                yield f"{name}: level {level} is neither composed nor stored"
+            elif chunk.part is not None and chunk.first is not None:
+                part = parts[chunk.part] if chunk.part < len(parts) else None
+                width = {RECORDS: PLANES, PLAIN: RECORD.itemsize}.get(part.kind) if part else None
+                if part is None or width is None or (chunk.first + chunk.count) * width > part.size:
+                    yield f"{name}: the records of level {level} are not there"
+
+
+def _find_wrong_composition(manifest: Manifest, composed: Composition) -> Iterator[str]:
+    levels, encoding = [part.level for part in manifest.parts if part.kind == LEVEL], manifest.encoding
+    if composed.levels > len(manifest.levels) or composed.side % (1 << composed.levels - 1):
+        yield "composition: levels do not fit the tiles"
+    if sorted(level for level in levels if level is not None) != list(range(composed.levels)):
+        yield "parts: one of each composed level is needed"
+    if [part.kind for part in manifest.parts].count(RECIPES) != 1 or len(composed.exemplars) != len(manifest.materials):
+        yield "composition: recipes or exemplars are missing"
+    for part in manifest.parts:
+        if part.kind == RECIPES and part.size != composed.recipes_size(len(manifest.tiles)):
+            yield f"{part.file}: size does not fit the tiles"
+    steps = composed.side * composed.cell
+    if any(abs(steps * step - manifest.tile_side) > 1e-9 * manifest.tile_side for step in encoding.step[:2]):
+        yield "composition: a cell is not a whole number of steps"
+    corner = locate_corner(encoding)
+    if not all(c >= 0 and c + steps <= POSITION_STEPS for c in corner):
+        yield "composition: a tile does not fit the grid"
 
 
 def _find_wrong_lengths(manifest: Manifest) -> Iterator[str]:

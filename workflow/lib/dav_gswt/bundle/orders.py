@@ -1,18 +1,15 @@
-"""Pre-sorted orders: the splats of a tile from back to front, for a few viewing directions.
+"""Orders: the splats of a tile from back to front, for a few viewing directions.
 
-A viewer takes the order whose direction is nearest to its own and sorts nothing. How many directions that takes is
-measured (`direction_search`). Uncertain tiles keep all azimuths, the others every second one (the
-paper's "uncertainty-guided caching").
+A viewer draws a tile in the order whose direction is nearest to its own. It sorts each order once, when it first needs
+it, and keeps it. How many directions that takes is measured (`direction_search`). Uncertain tiles use all azimuths, the
+others every second one (the paper's "uncertainty-guided caching").
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32, UInt16, UInt32
+from jaxtyping import Float, Float32, UInt32
 from numpy import ndarray as Array
-
-DEPTH_STEPS = 65535  # across a tile: NumPy sorts sixteen-bit keys by radix, in linear time
-WIDE_INDEX = 65536  # from so many splats on an index takes four bytes
 
 
 @dataclass(frozen=True)
@@ -48,23 +45,6 @@ def unit_vectors(azimuth: Float[Array, "n"], down: float) -> Float[Array, "n 3"]
     return np.concatenate([flat, np.full((len(azimuth), 1), -np.sin(down))], 1)
 
 
-def index_type(count: int) -> np.dtype:
-    """How an order's indices are stored: two bytes each where that is enough."""
-    return np.dtype("<u2" if count < WIDE_INDEX else "<u4")
-
-
 def sort_back_to_front(means: Float32[Array, "n 3"], along: Float[Array, "3"]) -> UInt32[Array, "n"]:
     """Indices by falling depth along a viewing direction; of equal depths the smaller index comes first."""
     return np.argsort(-(means.astype(float) @ along), kind="stable").astype(np.uint32)
-
-
-def presort(means: Float32[Array, "n 3"], along: Float[Array, "d 3"]) -> UInt16[Array, "d n"] | UInt32[Array, "d n"]:
-    """The stored order of each direction: `sort_back_to_front` of depths in DEPTH_STEPS steps, ten times as fast."""
-    x, y, z = means.T.copy()
-    sorted_orders = np.empty((len(along), len(means)), index_type(len(means)))
-    for order, (right, ahead, up) in zip(sorted_orders, along.astype(np.float32), strict=True):
-        depth = x * right + y * ahead + z * up
-        top, low = depth.max(initial=-np.inf), depth.min(initial=np.inf)
-        key = (top - depth) / (top - low) * DEPTH_STEPS if top > low else np.zeros_like(depth)
-        order[:] = np.argsort(key.astype(np.uint16), kind="stable")
-    return sorted_orders

@@ -12,7 +12,9 @@ from dav_gswt.config.exports import Export, Format
 from dav_gswt.config.load import check_model
 from dav_gswt.errors import InputError
 
-GROUND = "ground"  # beside the formats of `export.formats`: the files of exports/ground
+GROUND = "ground"  # beside the formats of `export.formats`: the files of exports/ground,
+GSWT, TILES = "gswt", "tiles"  # the tile set for the public renderer, and as a PLY a tile and level
+MORE = (GROUND, GSWT, TILES)
 LISTS = {"centre": {"nargs": 2, "metavar": ("X", "Y")}, "formats": {"nargs": "+", "action": "extend"}}
 
 
@@ -21,11 +23,13 @@ def add_command(commands) -> None:
     about = "a finished terrain for viewers, engines and simulators (docs/exports.md)"
     parser = commands.add_parser("export", help=about, description=__doc__)
     parser.add_argument("path", type=Path, help="a page folder, a bundle, or a folder of results/: its newest page")
-    parser.add_argument("-o", "--out", type=Path, required=True, metavar="FOLDER", help="gets terrain/ and ground/")
+    parser.add_argument(
+        "-o", "--out", type=Path, required=True, metavar="FOLDER", help="gets terrain/, ground/, tiles/, gswt.zip"
+    )
     for name, field in Export.model_fields.items():
         about = (field.description or "").replace("%", "%%")
         if name == "formats":
-            about = f"any of {', '.join(get_args(Format))} and {GROUND}; {about}"
+            about = f"any of {', '.join((*get_args(Format), *MORE))}; {about}"
         how = LISTS.get(name, {}) | {"help": about}
         parser.add_argument(f"--{name}", type=yaml.safe_load, **how)
     parser.add_argument("--threads", type=int, default=2)
@@ -39,23 +43,25 @@ def run_export(options: argparse.Namespace) -> None:
         write is in the way; see also `terrain_files.export_terrain` and `ground_files.export_ground`.
     """
     from dav_gswt.bundle import store  # here, not above: these modules are slow to load
-    from dav_gswt.export import ground_files, terrain_files
+    from dav_gswt.export import ground_files, gswt, terrain_files
     from dav_gswt.geometry.scene_frame import read_scene_frame
     from dav_gswt.terrain.endless import terrain_from_page
     from dav_gswt.tiles.store import read_material_tiles
 
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    settings, ground = read_settings(options)
-    source, sets = find_terrain(options.path), []
+    settings, more = read_settings(options)
+    source, sets, ground = find_terrain(options.path), [], GROUND in more
     wanted = ["terrain"] * bool(settings["formats"]) + ["ground"] * ground
     for name in wanted:
         check_target(options.out / name, f"{name}.json")
+    if TILES in more:
+        check_target(options.out / TILES, "lod0_tile_00.ply")
     parents = source.resolve().parents
     if ground:
         result = next((folder for folder in parents if (folder / "seams.json").is_file()), None)
         if result is None:
             raise InputError(f"--formats {GROUND} needs the tiles of a bundle; name a folder of results/, not {source}")
-        sets = read_material_tiles(result / "tiles", result / "seams.json")
+        sets = read_material_tiles(result / "tiles", result / "seams.json", result.parent / "levels")
     frame = next((file for folder in parents if (file := folder / "photos/ground.json").is_file()), None)
     reference = read_scene_frame(frame).georeference if frame else None
     bundle = store.read_bundle(source)
@@ -66,19 +72,26 @@ def run_export(options: argparse.Namespace) -> None:
         terrain_files.export_terrain(terrain, manifest, settings, options.out / "terrain", options.threads, reference)
     if ground:
         ground_files.export_ground(terrain, manifest, sets, settings, options.out / "ground")
-    for name in wanted:
+    if GSWT in more:
+        options.out.mkdir(parents=True, exist_ok=True)
+        gswt.export_archive(bundle, options.out / gswt.NAME)
+    if TILES in more:
+        gswt.export_tiles(bundle, options.out / TILES)
+    for name in (*wanted, *[gswt.NAME] * (GSWT in more), *[TILES] * (TILES in more)):
         print(options.out / name)
 
 
-def read_settings(options: argparse.Namespace) -> tuple[dict[str, Any], bool]:
-    """The config's `export` that the options stand for, and whether the ground is also written."""
+def read_settings(options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
+    """The config's `export` that the options stand for, and which of MORE are also written."""
     given = {name: getattr(options, name) for name in Export.model_fields if getattr(options, name) is not None}
     if options.threads < 1:
         raise InputError(f"--threads {options.threads}: at least one is needed")
     formats = list(dict.fromkeys(given.pop("formats", ["glb"])))
-    wanted = [name for name in formats if name != GROUND]
+    wanted = [name for name in formats if name not in MORE]
     checked = check_model(Export, given | ({"formats": wanted} if wanted else {}), "export")
-    return checked.model_dump(mode="json", exclude_none=True) | {"formats": wanted}, GROUND in formats
+    return checked.model_dump(mode="json", exclude_none=True) | {"formats": wanted}, [
+        name for name in MORE if name in formats
+    ]
 
 
 def find_terrain(path: Path) -> Path:

@@ -262,7 +262,7 @@ def report_result(given: dict, done: str, overlays: list[Path]) -> None:
     latest.parent.mkdir(parents=True, exist_ok=True)
     latest.unlink(missing_ok=True)
     latest.symlink_to(os.path.relpath(folder, latest.parent), target_is_directory=True)
-    terrain, bundle, tiles = (latest / path.relative_to(folder) for path in list(page.parents)[:3])
+    terrain, field = latest / page.parent.relative_to(folder), latest
     page = terrain / page.name
     usual = given["scene"] == read_config([CONFIG])["scene"] and not set(overlays) - {SMALLER}
     size = sum(path.stat().st_size for path in page.rglob("*") if path.is_file())
@@ -271,9 +271,8 @@ def report_result(given: dict, done: str, overlays: list[Path]) -> None:
 {done}.
   stills   {terrain}/*.png
   page     {page} ({size / 1e6:.0f} MB)
-  tiles    {tiles}/tiles/*.ply (for any splat viewer)
-           {bundle}/gswt.zip (for the public GSWT renderer)
-  field    {tiles.parent}/field.ply
+  field    {field}/field.ply (for any splat viewer)
+  others   .venv/bin/dav-gswt export {field} --formats glb tiles gswt -o FOLDER
 Next:
   make view{"" if usual else f" SCENE={given['scene']}"}
            walk over the terrain in a browser

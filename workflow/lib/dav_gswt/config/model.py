@@ -54,8 +54,8 @@ class Config(ConfigModel):
         "levels of detail; `auto`: as many as are ever drawn, at most six", "auto"
     )
     tau: Share = key(
-        "tiles and objects whose mean uncertainty reaches it keep all pre-sorted orders, the others about half; 0: all "
-        "do, 1: none does. It acts in the bundle only",
+        "tiles and objects whose mean uncertainty reaches it are drawn in all pre-sorted orders, the others in about "
+        "half; 0: all, 1: none. It acts in the bundle only",
         0.6,
     )
     lpips: Lpips = key(

@@ -204,7 +204,7 @@ def add_solids(scene: Scene, field: GaussianField, colours: UInt8[Array, "n 3"])
 def read_tile_set(path: Path, *, most: int, colour: str | None = None, level: int = 0) -> Scene:
     """A set of tiles, with --colour patch in the colours of the patches that they are cut from."""
     seams = path.parents[1] / "seams.json" if path.name == "labels.npz" else path
-    cut = tiles.read_tiles(seams.parent / "tiles", seams)
+    cut = tiles.read_tiles(seams.parent / "tiles", seams, seams.parents[1] / "levels")
     by = choose("colour", colour, (*COLOURS, "patch"), path)
     scene = _show_tiles(seams, cut.fields, cut.side, by, level, most, cut if by == "patch" else None)
     scene.names = dict(zip(LABELS, PATCH_COLOURS, strict=True)) if by == "patch" else {}

@@ -72,7 +72,7 @@ def terrain_from_bundle(
     """The Gaussians of a bundle, as they were quantized, on the surface and with the classes of the config.
 
     Args:   surface: the config's `heights`. rule: the config's `classes`.
-    Raises: InputError: see `bundle.chunks.read_chunk`, `heights.surface_from_config`, `class_rules.apply_rule`.
+    Raises: InputError: see `bundle.store.Bundle.chunk`, `heights.surface_from_config`, `class_rules.apply_rule`.
     """
     manifest = apply_rule(bundle.manifest, rule)
     terrain = terrain_from_fields(bundle.fields(), manifest, surface, _read_objects(bundle))
@@ -84,7 +84,7 @@ def terrain_from_bundle(
 def terrain_from_page(bundle: Bundle) -> EndlessTerrain:
     """The terrain of a page folder; of a bundle: on level ground, with the classes of its own noise.
 
-    Raises: InputError: see `bundle.chunks.read_chunk`; a height map that is missing or damaged.
+    Raises: InputError: see `bundle.store.Bundle.chunk`; a height map that is missing or damaged.
     """
     manifest = bundle.manifest
     surface = heights.read_surface(bundle.folder, manifest.heights or {"kind": "flat"}, manifest.tile_side)
@@ -93,7 +93,7 @@ def terrain_from_page(bundle: Bundle) -> EndlessTerrain:
 
 def _read_objects(bundle: Bundle) -> list[list[GaussianField]]:
     levels, objects = range(len(bundle.manifest.levels)), range(len(bundle.manifest.objects or []))
-    return [[bundle.object_chunk(number, level)[0] for level in levels] for number in objects]
+    return [[bundle.object_chunk(number, level) for level in levels] for number in objects]
 
 
 def terrain_from_fields(
@@ -131,7 +131,7 @@ def terrain_from_fields(
         switches=[np.inf if level.distance is None else level.distance for level in levels],
         bands=[level.band for level in levels],
         directions=np.array(manifest.directions, float),
-        tile_orders=[entry.chunks[0].orders for entry in entries],
+        tile_orders=[entry.orders for entry in entries],
         z=(min(low for low, _ in z), max(high for _, high in z)),
         overhang=max(RIM * largest, widest),
         variants=len(tiles[0]) // (16 * len(manifest.materials)),

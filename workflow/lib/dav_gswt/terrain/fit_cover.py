@@ -211,7 +211,7 @@ def fit_scatter(content: BundleContent, classes: ClassesEntry | None, salt: int)
     probabilities = _cap(densities * (side / cells) ** 2, material)
     for _ in range(SCATTER_PASSES):
         objects = [
-            ObjectEntry(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, float(p), [])
+            ObjectEntry(each.name, each.radius, [0.0, 0.0], 0.0, each.material, each.density, float(p), [], [])
             for each, p in zip(content.objects, probabilities, strict=True)
         ]
         found = Scatter(entry, objects, side, cover).instances_in(i, j)

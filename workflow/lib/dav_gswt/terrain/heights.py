@@ -16,8 +16,8 @@ from jaxtyping import Bool, Float, Float32, Int64
 from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.bundle.chunks import read_exactly
 from dav_gswt.bundle.manifest import NAME
+from dav_gswt.bundle.parts import read_exactly
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.field import GaussianField
 from dav_gswt.files import locate_path, parse_record

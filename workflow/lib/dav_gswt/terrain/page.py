@@ -1,4 +1,4 @@
-"""Page folders, ready for any web server: viewer, manifest, surface and chunks, and the front of the scene.
+"""Page folders, ready for any web server: viewer, manifest, surface and parts, and the front of the scene.
 
 The front is the scene's name, a line about it and a still. They are written into the HTML, so that they show before any
 script runs, and in what other pages say of a link.
@@ -80,21 +80,21 @@ def write_page(
     rule: Sequence[dict[str, Any]] = NOISE,
     front: Front | None = None,
 ) -> None:
-    """Copy viewer, manifest and chunks to `out_dir`, atomically: an older page stays until the new one is complete.
+    """Copy viewer, manifest and parts to `out_dir`, atomically: an older page stays until the new one is complete.
 
-    All files under `viewer_dir` are copied, and the chunks that the manifest names.
+    All files under `viewer_dir` are copied, and the parts that the manifest names.
 
     Args:   surface: of the terrain (default: level ground), stored in the page's manifest as `heights`. rule: the
             config's `classes`, stored as those of the page's manifest. front: name of the scene, line about it, first
             still and story (default: the viewer's own texts, no still, no story).
-    Raises: InputError: a chunk is missing; see also `manifest.read_manifest`,
+    Raises: InputError: a part is missing; see also `manifest.read_manifest`,
             `class_rules.apply_rule`, `heights.require_plain_cover`.
     """
     bundle, viewer, out, surface = Path(bundle_dir), Path(viewer_dir), Path(out_dir), surface or FlatSurface()
     manifest = apply_rule(read_manifest(bundle), rule)
     require_plain_cover(surface, manifest.classes, manifest.objects)
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
-    copies += [(bundle / name, name) for name in _list_chunks(bundle, manifest)]
+    copies += [(bundle / name, name) for name in _list_parts(bundle, manifest)]
     heights, pixels = surface.describe()
     with atomic_folder(out) as part:
         for source, name in copies:
@@ -113,13 +113,12 @@ def write_page(
         write_json(part / MANIFEST, replace(manifest, heights=heights).to_dict())
 
 
-def _list_chunks(bundle: Path, manifest: Manifest) -> list[str]:
-    """The chunk files that a bundle's manifest names. Raises: InputError: one is missing."""
-    holders = [*manifest.tiles, *(manifest.objects or [])]
-    names = list(dict.fromkeys(chunk.file for holder in holders for chunk in holder.chunks))
+def _list_parts(bundle: Path, manifest: Manifest) -> list[str]:
+    """The files of parts that a bundle's manifest names. Raises: InputError: one is missing."""
+    names = [part.file for part in manifest.parts]
     for name in names:
         if not (bundle / name).is_file():
-            raise InputError(f"{bundle / name}: this chunk is missing; make the bundle again")
+            raise InputError(f"{bundle / name}: this part is missing; make the bundle again")
     return names
 
 

@@ -149,7 +149,7 @@ def place_objects(terrain: EndlessTerrain, found: Instances, cell: tuple[int, in
     parts = []
     for k in sequence:
         number = int(found.number[k])
-        kept, levels = terrain.object_entries[number].chunks[0].orders, terrain.objects[number]
+        kept, levels = terrain.object_entries[number].orders, terrain.objects[number]
         order = kept[nearest_order(terrain.directions, kept, back[k], tilt[k])]  # as seen by the object
         shown = {level: levels[level] for level in np.flatnonzero(active[:, k]).tolist()}
         parts.append(order_gaussians(shown or {len(levels) - 1: levels[-1][:0]}, terrain.directions[order]))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Float32, Int, UInt8
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt
 
@@ -75,6 +75,21 @@ def make_generator(seed: int, tiling: Mapping[str, Any], material: int = 0) -> n
 
 
 @dataclass(frozen=True)
+class Recipe:
+    """What the tiles of the levels up to a block's are composed of.
+
+    Attributes:
+        levels: the exemplar without its trend, by cell.
+        trend: what was taken out of it.
+        corrections: [level][tile, y, x], what a tile's cells change of colour (3) and height.
+    """
+
+    levels: list[compose.BinnedLevel]
+    trend: texture.Trend
+    corrections: list[Float32[Array, "tiles _ _ 4"]]
+
+
+@dataclass(frozen=True)
 class TileSet:
     """16 C tiles at every level, in world units from each tile's south-western corner.
 
@@ -85,6 +100,7 @@ class TileSet:
         shifts: per tile and label, what to add to a cell (x, y) of the tile for the exemplar's cell.
         uncertainty: mean over each tile's cells.
         report: what was chosen and what it cost, as JSON.
+        recipe: of composed tiles; None: they are known by their Gaussians alone.
     """
 
     side: float
@@ -94,6 +110,7 @@ class TileSet:
     shifts: Int[Array, "tiles 9 2"]
     uncertainty: Float[Array, "tiles"]
     report: dict[str, Any]
+    recipe: Recipe | None = None
 
     @property
     def variants(self) -> int:
@@ -139,7 +156,8 @@ def cut_materials(
         raise InputError(
             "tiles: a material's exemplar holds no such tiles: choose a smaller `tile` or `materials: one`"
         )
-    return [_raise_to(own, _mean_height(tiles[0])) for own in tiles]
+    goal = _mean_height(tiles[0])
+    return [tiles[0], *(_raise_to(own, goal) for own in tiles[1:])]
 
 
 def _mean_height(tiles: TileSet) -> float:
@@ -148,11 +166,10 @@ def _mean_height(tiles: TileSet) -> float:
 
 def _raise_to(tiles: TileSet, height: float) -> TileSet:
     """The tiles at another mean height."""
-    by = np.array([0, 0, height - _mean_height(tiles)], np.float32)
-    if not by.any():
-        return tiles
-    fields = [[replace(field, means=field.means + by) for field in level] for level in tiles.fields]
-    return replace(tiles, fields=fields)
+    by, recipe = np.array([0, 0, 0, height - _mean_height(tiles)], np.float32), tiles.recipe
+    assert recipe is not None
+    recipe = replace(recipe, corrections=[each + by for each in recipe.corrections])
+    return replace(tiles, recipe=recipe, fields=compose_tiles(recipe, tiles.layout, tiles.labels, tiles.shifts))
 
 
 def cut_tiles(
@@ -192,7 +209,9 @@ def cut_tiles(
     shifts = np.stack([layout.label_shifts(plan, found.places, tile) for tile in range(len(found.labels))])
     soft = poisson_blending.make_soft_maps(colour, height)
     corrections = options.corrected * poisson_blending.solve_corrections(plan, found, shifts, soft)
-    fields = _compose_tiles(binned, plan, found.labels, shifts, corrections)
+    coarser = [_coarsen_corrections(corrections, found.labels, level.cell) for level in binned]
+    recipe = _equalise_heights(Recipe(binned, trend, coarser), found.labels, shifts)
+    fields = compose_tiles(recipe, plan, found.labels, shifts)
     report = {
         "places": {name: places.tolist() for name, places in vars(found.places).items()},
         "strip_energy": [strip.seam.energy for strip in found.strips],
@@ -204,7 +223,7 @@ def cut_tiles(
         "energy": options.kind,
     }
     means = _average_uncertainty(uncertainty, found.labels, shifts)
-    return TileSet(plan.side * exemplar.spacing, exemplar.spacing, fields, found.labels, shifts, means, report)
+    return TileSet(plan.side * exemplar.spacing, exemplar.spacing, fields, found.labels, shifts, means, report, recipe)
 
 
 def _bin_level(field: GaussianField, exemplar: Exemplar, number: int) -> compose.BinnedLevel:
@@ -231,20 +250,54 @@ def _average_uncertainty(uncertainty: Array, labels: Array, shifts: Array) -> Fl
     return means
 
 
-def _compose_tiles(
-    binned: list[compose.BinnedLevel], plan: Layout, labels: Array, shifts: Array, corrections: Array
-) -> list[list[GaussianField]]:
-    """fields[level][tile] of all levels."""
-    spacing = binned[0].exemplar.spacing
-    tiles = [
-        [_compose_level(level, labels[tile], shifts[tile], corrections[tile]) for level in binned]
-        for tile in progress(range(len(labels)), "compose tiles")
+def _coarsen_corrections(corrections: Array, labels: Array, cell: int) -> Float32[Array, "tiles k k 4"]:
+    """The corrections of all tiles on a level's cells."""
+    found = [
+        poisson_blending.coarsen_correction(change, own, compose.coarsen_labels(own, cell))
+        for change, own in zip(corrections, labels, strict=True)
     ]
-    tiles = compose.equalise_heights(tiles, plan.side * spacing)
-    for number in range(len(binned), plan.levels):  # cells wider than a block are merged from the tile's own
+    return np.stack(found).astype(np.float32)
+
+
+def _equalise_heights(recipe: Recipe, labels: Array, shifts: Array) -> Recipe:
+    """Corrections that give all tiles the same mean height at the finest level.
+
+    A rigid shift would tear borders apart, so a tile is raised by A_t bump(x, y) in all its levels alike; A_t makes
+    the mean over its finest Gaussians that of all tiles.
+    """
+    finest, changes = recipe.levels[0], recipe.corrections[0]
+    count = np.diff(finest.start)
+    total = np.bincount(finest.numbers, finest.field.means[:, 2].astype(float), len(count))
+    share, means, raises = compose.bump_cells(labels.shape[1]), [], []
+    for own, shift, change in zip(labels, shifts, changes, strict=True):
+        rows, columns = layout.source_cells(own, shift)
+        cells = rows * finest.cells + columns
+        many = count[cells].sum()
+        means.append((total[cells] + count[cells] * change[..., 3]).sum() / many if many else 0.0)
+        raises.append((count[cells] * share).sum() / many if many else 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        amounts = np.where(np.array(raises) > 0, (np.mean(means) - means) / raises, 0.0)
+    raised = []
+    for change in recipe.corrections:
+        by = amounts[:, None, None] * compose.bump_cells(change.shape[1])
+        raised.append(np.concatenate([change[..., :3], (change[..., 3] + by)[..., None]], -1).astype(np.float32))
+    return replace(recipe, corrections=raised)
+
+
+def compose_tiles(recipe: Recipe, plan: Layout, labels: Array, shifts: Array) -> list[list[GaussianField]]:
+    """fields[level][tile] of all levels: those up to a block's of the exemplar, the others of each tile's own cells."""
+    spacing = recipe.levels[0].exemplar.spacing
+    fields = [
+        [
+            compose.compose_tile(level, compose.coarsen_labels(own, level.cell), shift, change)
+            for own, shift, change in zip(labels, shifts, changes, strict=True)
+        ]
+        for level, changes in zip(progress(recipe.levels, "compose tiles"), recipe.corrections, strict=True)
+    ]
+    for number in range(len(fields), plan.levels):
         cell = 2 ** (number - 1)
-        tiles = [[*tile, compose.merge_cells(tile[-1], plan.side // cell, cell * spacing)] for tile in tiles]
-    return [list(level) for level in zip(*tiles, strict=True)]
+        fields.append([compose.merge_cells(tile, plan.side // cell, cell * spacing) for tile in fields[-1]])
+    return fields
 
 
 def _plan_layout(options: TilingOptions, scale: float, exemplar: Exemplar, fitted: int) -> Layout:
@@ -276,11 +329,3 @@ def _fill_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"
         rows, columns = distance_transform_edt(~known, return_distances=False, return_indices=True)
         colour = colour[rows, columns]
     return colour, uncertainty
-
-
-def _compose_level(level: compose.BinnedLevel, labels: Array, shift: Array, correction: Array) -> GaussianField:
-    """One tile at one level, corrected. A coarser level takes the majority of the finest labels."""
-    majority = compose.coarsen_labels(labels, level.cell)
-    splats = compose.compose_tile(level, majority, shift)
-    change = poisson_blending.coarsen_correction(correction, labels, majority)
-    return poisson_blending.apply_correction(splats, change, level.cell * level.exemplar.spacing)

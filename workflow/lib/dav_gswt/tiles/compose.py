@@ -104,25 +104,37 @@ def gather_cells(
     return np.repeat(first, count) + within, count
 
 
-def compose_tile(level: BinnedLevel, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]) -> GaussianField:
-    """A tile's Gaussians at one level, cell by cell from the south-west; x and y from its south-western corner, z kept.
+def compose_tile(
+    level: BinnedLevel, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"], correction: Float[Array, "n n 4"]
+) -> GaussianField:
+    """A tile's Gaussians at one level, cell by cell from the south-west; x and y from its south-western corner.
 
-    labels: of this level's cells (see `coarsen_labels`); shift in finest cells.
+    labels: of this level's cells (see `coarsen_labels`); shift in finest cells; correction: what each cell changes of
+    colour (3) and height.
     """
     index, count = gather_cells(level, *source_cells(labels, shift, level.cell))
     tile = level.field[index]
     move = (shift[labels.ravel()] * level.exemplar.spacing).repeat(count, axis=0)
-    means = tile.means.astype(float)
+    means, change = tile.means.astype(float), correction.reshape(-1, 4).repeat(count, axis=0)
     means[:, :2] -= move + [level.exemplar.west, level.exemplar.south]
     side = len(labels) * level.cell * level.exemplar.spacing
     means[:, :2] = np.clip(means[:, :2], 0, side)  # rounding in float32 may pass the border by a hair
-    return replace(tile, means=means.astype(np.float32))
+    means[:, 2] += change[:, 3]
+    sh = tile.sh.copy()
+    sh[:, 0] += (change[:, :3] / SH0).astype(np.float32)
+    return replace(tile, means=means.astype(np.float32), sh=sh)
 
 
 def bump(points: Float[Array, "n d"], side: float) -> Float[Array, "n"]:
     """sin^2(pi x / side) sin^2(pi y / side): 1 in a tile's middle, 0 on its border in value and slope."""
     s = np.sin(np.pi * points[:, :2].astype(float) / side) ** 2
     return s[:, 0] * s[:, 1]
+
+
+def bump_cells(cells: int) -> Float[Array, "n n"]:
+    """`bump` at the middles of a tile's cells."""
+    s = np.sin(np.pi * (np.arange(cells) + 0.5) / cells) ** 2
+    return s[:, None] * s
 
 
 def equalise_heights(tiles: list[list[GaussianField]], side: float) -> list[list[GaussianField]]:

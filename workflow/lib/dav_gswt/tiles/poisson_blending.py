@@ -8,7 +8,7 @@ strip's correction belongs to its colour and is 0 in the corner patch, and a til
 border: neighbours still match. All levels take the same correction.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -16,7 +16,6 @@ from numpy import ndarray as Array
 from scipy.fft import dct, dst, idct, idst
 from scipy.ndimage import gaussian_filter
 
-from dav_gswt.field import SH0, GaussianField
 from dav_gswt.tiles.layout import Layout, edge_colours, strip_labels
 from dav_gswt.tiles.search import SearchResult
 
@@ -134,16 +133,6 @@ def border_values(
     out[ends, :b], out[ends, n - b :] = vertical[west][ends, b:], vertical[east][ends, :b]
     out[:b, ends], out[n - b :, ends] = horizontal[south][b:, ends], horizontal[north][:b, ends]
     return out
-
-
-def apply_correction(field: GaussianField, correction: Float[Array, "n n 4"], cell: float) -> GaussianField:
-    """A tile's Gaussians with the correction of the cell they are in, `cell` world units wide."""
-    column, row = (np.minimum((field.means[:, i] / cell).astype(int), len(correction) - 1) for i in (0, 1))
-    change = correction[row, column]
-    sh, means = field.sh.copy(), field.means.copy()
-    sh[:, 0] += (change[:, :3] / SH0).astype(np.float32)
-    means[:, 2] += change[:, 3].astype(np.float32)
-    return replace(field, sh=sh, means=means)
 
 
 def coarsen_correction(

@@ -1,4 +1,7 @@
-"""A tile set on disk: lod{l}_tile_{TT}.ply and labels.npz in one folder, seams.json beside it.
+"""A tile set on disk: labels.npz in one folder, seams.json beside it.
+
+labels.npz has labels, shifts and what composed tiles need beside the levels: the trend that is taken out of these and
+each tile's corrections. Tiles that are not composed are lod{l}_tile_{TT}.ply beside it.
 
 seams.json is written last and holds the counts: where it exists, the set is whole. The sets of further materials are
 in the folders material1, material2, ... of the first one's, their tables in its seams.json under `materials`.
@@ -8,14 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.field import read_field, write_field
+from dav_gswt.field import GaussianField, read_field, write_field
 from dav_gswt.files import UNREADABLE, atomic_folder, read_json, write_json
-from dav_gswt.lod.store import material_folder
+from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import material_folder, read_levels
 from dav_gswt.logs import progress
-from dav_gswt.tiles.build import TileSet
-from dav_gswt.tiles.layout import Layout
+from dav_gswt.tiles.build import Recipe, TileSet, compose_tiles
+from dav_gswt.tiles.compose import bin_gaussians
+from dav_gswt.tiles.layout import Exemplar, Layout
+from dav_gswt.tiles.texture import Trend, remove_trend
 
 
 def tile_file_name(level: int, tile: int) -> str:
@@ -30,12 +37,22 @@ def write_tiles(sets: list[TileSet], folder: Path | str, seams: Path | str, prov
         for number, tiles in enumerate(sets):
             own = material_folder(part, number)
             own.mkdir(exist_ok=True)
-            for level, fields in enumerate(tiles.fields):
-                for tile, splats in enumerate(progress(fields, f"write tiles of level {level}")):
-                    write_field(splats, own / tile_file_name(level, tile))
-            np.savez_compressed(own / "labels.npz", labels=tiles.labels, shifts=tiles.shifts)
+            arrays = {"labels": tiles.labels, "shifts": tiles.shifts}
+            if recipe := tiles.recipe:
+                arrays |= {"colour": recipe.trend.colour, "height": recipe.trend.height}
+                arrays |= {f"corrections{level}": values for level, values in enumerate(recipe.corrections)}
+            else:
+                write_tile_fields(tiles.fields, own)
+            np.savez_compressed(own / "labels.npz", **arrays)
     first, *more = [_describe_tiles(tiles) for tiles in sets]
     write_json(seams, first | {"provenance": provenance} | ({"materials": more} if more else {}))
+
+
+def write_tile_fields(fields: list[list[GaussianField]], folder: Path) -> None:
+    """Write lod{l}_tile_{TT}.ply of fields[level][tile]."""
+    for level, tiles in enumerate(fields):
+        for tile, splats in enumerate(progress(tiles, f"write tiles of level {level}")):
+            write_field(splats, folder / tile_file_name(level, tile))
 
 
 def _describe_tiles(tiles: TileSet) -> dict[str, Any]:
@@ -50,36 +67,62 @@ def _describe_tiles(tiles: TileSet) -> dict[str, Any]:
     }
 
 
-def read_tiles(folder: Path | str, seams: Path | str) -> TileSet:
-    """Read the set of the first material. Raises: InputError: a file is missing or not what seams.json says."""
-    return _read_folder(Path(folder), read_json(seams), seams)
+def read_tiles(folder: Path | str, seams: Path | str, levels: Path | str) -> TileSet:
+    """Read the set of the first material. levels: the folder of the levels that the tiles are composed of.
+
+    Raises: InputError: a file is missing, or not what seams.json says; see also `lod.store.read_levels`.
+    """
+    return _read_folder(Path(folder), read_json(seams), seams, Path(levels))
 
 
-def read_material_tiles(folder: Path | str, seams: Path | str) -> list[TileSet]:
+def read_material_tiles(folder: Path | str, seams: Path | str, levels: Path | str) -> list[TileSet]:
     """Read what `write_tiles` wrote. Raises: InputError: as `read_tiles`."""
     table = read_json(seams)
     more = table.get("materials", []) if isinstance(table, dict) else []
     if not isinstance(more, list):
         raise InputError(f"{seams}: not the table of a tile set (materials is no list); cut the tiles again")
-    return [_read_folder(material_folder(folder, k), own, seams) for k, own in enumerate([table, *more])]
+    return [
+        _read_folder(material_folder(folder, k), own, seams, material_folder(levels, k))
+        for k, own in enumerate([table, *more])
+    ]
 
 
-def _read_folder(folder: Path, table: Any, seams: Path | str) -> TileSet:
+def _read_folder(folder: Path, table: Any, seams: Path | str, levels: Path) -> TileSet:
     try:
-        levels, count = table["levels"], table["tiles"]
+        number, count = table["levels"], table["tiles"]
         side, spacing, counts, report = table["side"], table["spacing"], table["counts"], table["seams"]
-        uncertainty, _ = np.array(table["uncertainty"]), Layout.from_dict(report["layout"])
-        if not all(type(n) is int and n > 0 for n in (levels, count)) or not 0 < side < np.inf:
+        uncertainty, plan = np.array(table["uncertainty"]), Layout.from_dict(report["layout"])
+        if not all(type(n) is int and n > 0 for n in (number, count)) or not 0 < side < np.inf:
             raise ValueError("a size is out of range")
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         why = f"{error} is missing" if isinstance(error, KeyError) else summarize_error(error)
         raise InputError(f"{seams}: not the table of a tile set ({why}); cut the tiles again") from error
-    fields = [[read_field(folder / tile_file_name(level, tile)) for tile in range(count)] for level in range(levels)]
-    if [[len(f) for f in level] for level in fields] != counts:
-        raise InputError(f"{folder}: the tiles are not those of {seams}; cut them again")
     try:
-        with np.load(folder / "labels.npz", allow_pickle=False) as arrays:
-            labels, shifts = arrays["labels"], arrays["shifts"]
+        with np.load(folder / "labels.npz", allow_pickle=False) as stored:
+            arrays = dict(stored)
+        labels, shifts = arrays["labels"], arrays["shifts"]
     except UNREADABLE as error:
         raise InputError(f"{folder / 'labels.npz'}: not readable ({error}); cut the tiles again") from error
-    return TileSet(side, spacing, fields, labels, shifts, uncertainty, report)
+    recipe = None
+    if "colour" in arrays:
+        given = read_levels(levels)
+        try:
+            recipe = _make_recipe(arrays, given, plan)
+            fields = compose_tiles(recipe, plan, labels, shifts)
+        except UNREADABLE as error:
+            raise InputError(f"{folder / 'labels.npz'}: not of {levels} ({error}); cut the tiles again") from error
+    else:
+        names = [[tile_file_name(level, tile) for tile in range(count)] for level in range(number)]
+        fields = [[read_field(folder / name) for name in level] for level in names]
+    if [[len(f) for f in level] for level in fields] != counts:
+        raise InputError(f"{folder}: the tiles are not those of {seams}; cut them again")
+    return TileSet(side, spacing, fields, labels, shifts, uncertainty, report, recipe)
+
+
+def _make_recipe(arrays: dict[str, Array], levels: Levels, plan: Layout) -> Recipe:
+    """The recipe of a set, with the levels that it was cut from."""
+    exemplar = Exemplar.from_grid(levels.grids[0])
+    trend = Trend(exemplar, arrays["colour"], arrays["height"])
+    flat = [remove_trend(field, trend) for field in levels.fields[: plan.composed_levels]]
+    binned = [bin_gaussians(field, exemplar, 2**level) for level, field in enumerate(flat)]
+    return Recipe(binned, trend, [arrays[f"corrections{level}"] for level in range(len(binned))])

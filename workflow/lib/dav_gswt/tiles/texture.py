@@ -119,7 +119,7 @@ def fit_trend(colour: Float[Array, "m m 3"], height: Float[Array, "m m"], exempl
         filled = np.where(known, values, 0).astype(float)
         trend = fit_low_pass(filled, known, width) if known.any() else filled
         parts.append(trend - trend.mean())
-    return Trend(exemplar, np.stack(parts[:3], -1), parts[3])
+    return Trend(exemplar, np.stack(parts[:3], -1).astype(np.float32), parts[3].astype(np.float32))
 
 
 def remove_trend(field: GaussianField, trend: Trend) -> GaussianField:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fixtures.land_covers import SIDE, TILES, cover_content, shrub
 
-from dav_gswt.bundle import gswt
+from dav_gswt.export import gswt
 
 
 def first(thing):
@@ -21,9 +21,13 @@ def content():
     return replace(cover_content(), objects=[first(shrub(0.4, 0.2))])
 
 
+def bake(content, objects):
+    return gswt.bake_objects(content.tiles[0].fields, objects, content.ground_height(0), SIDE, 7)
+
+
 @pytest.fixture(scope="module")
 def baked(content):
-    return gswt.bake_objects(content, 7)
+    return bake(content, content.objects)
 
 
 def added(content, baked, tile, level=0):
@@ -48,7 +52,7 @@ def test_tiles_keep_the_same_mean_height_and_their_borders(content, baked):
 
 
 def test_the_public_renderers_checker_finds_no_fault_with_objects(content, gswt_checker, tmp_path):
-    fields = gswt.bake_objects(replace(content, objects=[first(shrub(0.4, 0.2)), first(shrub(0.2, 0.5))]), 7)
+    fields = bake(content, [first(shrub(0.4, 0.2)), first(shrub(0.2, 0.5))])
     gswt.write_gswt(fields, SIDE, tmp_path / "objects.zip")
     command = [sys.executable, gswt_checker, tmp_path / "objects.zip"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -56,7 +60,5 @@ def test_the_public_renderers_checker_finds_no_fault_with_objects(content, gswt_
 
 
 def test_an_object_wider_than_a_tile_is_left_out(content):
-    other = replace(content, objects=[shrub(0.4, 0.2)])
-    assert gswt.bake_objects(other, 7) is content.tiles[0].fields  # it stands on the second material
-    fields = gswt.bake_objects(replace(content, objects=[first(shrub(2.5, 0.2))]), 7)
+    fields = bake(content, [first(shrub(2.5, 0.2))])
     assert [len(f) for f in fields[0]] == [len(f) for f in content.tiles[0].fields[0]]

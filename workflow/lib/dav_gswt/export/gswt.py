@@ -1,7 +1,7 @@
-"""gswt.zip: the tile set as the public GSWT web renderer reads it (tiles 4.0 wide, 62 floats a splat).
+"""The tile set for other programs: gswt.zip as the public GSWT web renderer reads it, and a PLY a tile and level.
 
-The renderer's loader never reads property names and crashes on one header line too many, so nothing here
-is optional. It knows tiles only, so objects are baked into them.
+In gswt.zip tiles are 4.0 wide, with 62 floats a splat. The renderer's loader never reads property names and crashes on
+one header line too many, so nothing here is optional. It knows tiles only, so objects are baked into them.
 """
 
 import logging
@@ -13,11 +13,13 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.content import BundleContent
+from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField, concatenate_fields, write_field
+from dav_gswt.files import atomic_file, atomic_folder
 from dav_gswt.logs import progress
 from dav_gswt.materials.model import ObjectLevels, turn_and_scale, turn_rows
 from dav_gswt.tiles.compose import equalise_heights
+from dav_gswt.tiles.store import write_tile_fields
 
 _log = logging.getLogger(__name__)
 
@@ -70,26 +72,48 @@ def write_gswt(fields: list[list[GaussianField]], side: float, path: Path) -> No
             archive.writestr(entry, ply.read_bytes(), compresslevel=1)
 
 
-def bake_objects(content: BundleContent, salt: int) -> list[list[GaussianField]]:
-    """fields[level][tile] of the first material with its objects: another draw for each tile, none over an edge.
+def export_archive(bundle: Bundle, path: Path | str) -> None:
+    """Write gswt.zip of a bundle: the tiles of the first material with its objects baked into them.
+
+    Raises: InputError: see `Bundle.chunk`.
+    """
+    manifest = bundle.manifest
+    each, levels = len(manifest.tiles) // len(manifest.materials), range(len(manifest.levels))
+    fields = [[bundle.chunk(tile, level) for tile in range(each)] for level in levels]
+    mine = [(k, entry) for k, entry in enumerate(manifest.objects or []) if entry.material == 0]
+    objects = [
+        ObjectLevels(entry.name, [bundle.object_chunk(k, level) for level in levels], entry.radius, 0, entry.density)
+        for k, entry in mine
+    ]
+    ground = mine[0][1].ground if mine else 0.0
+    with atomic_file(path) as part:
+        write_gswt(bake_objects(fields, objects, ground, manifest.tile_side, manifest.salt), manifest.tile_side, part)
+
+
+def export_tiles(bundle: Bundle, folder: Path | str) -> None:
+    """Write lod{l}_tile_{TT}.ply of all tiles to a folder. Raises: InputError: see `Bundle.chunk`."""
+    with atomic_folder(folder) as part:
+        write_tile_fields(bundle.fields(), part)
+
+
+def bake_objects(
+    tiles: list[list[GaussianField]], objects: list[ObjectLevels], ground: float, side: float, salt: int
+) -> list[list[GaussianField]]:
+    """tiles[level][tile] with objects: another draw for each tile, none over an edge.
 
     A tile has as many of an object as its area and the density give, rounded by chance. Footprints do not overlap; what
     finds no room is left out. The public renderer shifts each tile by its own mean height, so these are made equal
-    again.
+    again. ground: height of the objects' feet.
     """
-    tiles = content.tiles[0]
-    mine = [each for each in content.objects if each.material == 0]
-    if not mine:
-        return tiles.fields
-    fields, ground = [list(level) for level in tiles.fields], content.ground_height(0)
-    for tile in range(len(tiles.labels)):
+    fields = [list(level) for level in tiles]
+    for tile in range(len(tiles[0])):
         rng = np.random.default_rng([salt, 0, tile])
-        counts = [int(each.density * content.side**2 + rng.random()) for each in mine]
-        drawn = _draw_objects(mine, counts, content.side, ground, rng)
+        counts = [int(each.density * side**2 + rng.random()) for each in objects]
+        drawn = _draw_objects(objects, counts, side, ground, rng)
         for level, own in enumerate(fields):
             own[tile] = concatenate_fields([own[tile], *(each[level] for each in drawn)])
     tiles_first = [list(levels) for levels in zip(*fields, strict=True)]
-    return [list(level) for level in zip(*equalise_heights(tiles_first, content.side), strict=True)]
+    return [list(level) for level in zip(*equalise_heights(tiles_first, side), strict=True)]
 
 
 def _draw_objects(
