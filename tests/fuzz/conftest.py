@@ -8,7 +8,7 @@ import pytest
 from fixtures import fuzzing
 from fixtures.random_field import random_field
 
-from dav_gswt.bundle import gswt
+from dav_gswt.export import gswt
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -11,12 +11,15 @@ from pathlib import Path
 import pytest
 from fixtures import bundles, fuzzing
 from fixtures.bundles import Ground
+from fixtures.compositions import Composed
 from fixtures.fuzzing import FACTOR, FLOOR, SECONDS, fuzz, mutate_bytes, mutate_json, mutate_zip, randoms
 from fixtures.land_covers import write_cover_bundle
 from hypothesis import given
 
 pytestmark = pytest.mark.slow
 VIEWER = Path(__file__).parents[2] / "workflow/viewer"
+
+COMPOSED = Composed()
 
 
 @pytest.fixture(scope="module")
@@ -102,19 +105,20 @@ def test_materials_and_objects(page, cover, random):
 
 @fuzz
 @given(random=randoms)
-def test_chunks(page, files, random):
-    data, manifest = files
-    manifest = json.loads(json.dumps(manifest))
-    entry = manifest["tiles"][0]["chunks"][0]
-    content = mutate_bytes(random, data[entry["file"]], 300)
-    if random.random() < 0.8:
-        entry["sha256"] = hashlib.sha256(content).hexdigest()
+def test_parts(page, random):
+    """A part of a bundle of recipes is changed, unpacked or packed, and mostly its entry in the manifest with it."""
+    name = random.choice(sorted(COMPOSED.parts))
+    content = mutate_bytes(random, COMPOSED.parts[name], 300)
+    files = COMPOSED.files(**({name: content} if content else {}))
+    manifest, file = json.loads(files["davgswt.json"]), f"parts/{name}.bin"
     if random.random() < 0.3:
-        entry["bytes"] = len(content)
-    if random.random() < 0.3:
-        entry["count"] = random.choice((0, 1, 15, 17, 2**40))
-    named = data | {entry["file"]: content, "davgswt.json": json.dumps(manifest).encode()}
-    page("page: chunks", 20_000, files={name: encode(content) for name, content in named.items()})
+        files[file] = mutate_bytes(random, files[file], 300)
+        entry = next(part for part in manifest["parts"] if part["file"] == file)
+        entry |= {"bytes": len(files[file]), "sha256": hashlib.sha256(files[file]).hexdigest()}
+        if random.random() < 0.3:
+            entry["size"] = random.choice((0, 1, 19, 2**20, 2**40))
+    files["davgswt.json"] = json.dumps(manifest).encode()
+    page("page: parts", 2**21, files={name: encode(content) for name, content in files.items()})
 
 
 @pytest.mark.parametrize("kind", ["zip of a bundle", "gswt.zip"])
