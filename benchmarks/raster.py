@@ -85,7 +85,7 @@ def drawing(scene: Scene, isa: str, threads: int) -> tuple[float, float, int]:
     gradient = np.random.default_rng(1).normal(size=(scene.height, scene.width, 3)).astype(np.float32)
     raster = cpu.Rasterizer(threads=threads, instruction_set=isa)
     forward = milliseconds(lambda: raster.forward(**arrays, camera=camera))
-    return forward, milliseconds(lambda: raster.backward(gradient)), raster.count_pairs()
+    return forward, milliseconds(lambda: raster.backward(gradient)), raster._core.pairs(raster._last.state)
 
 
 def share(pairs: int, milliseconds: float, isa: str, threads: int) -> tuple[float, float]:
@@ -149,7 +149,8 @@ def training_step() -> dict[str, float]:
             adam(*given, rate=1e-9, step=1, threads=THREADS, backend="cpu")
 
     name, took = "train_step_256x192_30k_ms", milliseconds(step)
-    report_figures(name, took, "ms", 15, f"{raster.count_pairs() / (256 * 192):.0f} live Gaussians a pixel")
+    pairs = raster._core.pairs(raster._last.state)
+    report_figures(name, took, "ms", 15, f"{pairs / (256 * 192):.0f} live Gaussians a pixel")
     return {name: took}
 
 

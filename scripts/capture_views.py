@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from dav_gswt.capture.capturing import capture_views
-from dav_gswt.capture.site import Site
-from dav_gswt.capture.store import PhotoStore
+from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split

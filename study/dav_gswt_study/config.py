@@ -19,6 +19,19 @@ Names = Annotated[list[Name], Field(min_length=1)]
 FLOOR = "floor"  # in a pair of the forced-choice study: the same place without a seam
 
 
+class Photographed(ConfigModel):
+    """From where synthetic scenes are photographed and tested."""
+
+    scenes: Names = key("synthetic scenes")
+    layout: Literal["ring", "cap", "paper"] = key(
+        "how photos are placed: `ring`, one from above and the others around it at 65 degrees; `cap`, evenly over the "
+        "hemisphere above `min_elevation`; `paper`, 36 on a circle at 45 degrees and the others as `cap`",
+        "ring",
+    )
+    oblique: int = key("further test views around the exemplar at 45 degrees", 0, ge=0, le=200)
+    walkers: int = key("further test views at eye level, 0.8, 1.6 and 3.2 m above the ground in turn", 0, ge=0, le=200)
+
+
 class FixedSettings(ConfigModel):
     """Settings that replace the config's."""
 
@@ -221,6 +234,7 @@ class Tables(ConfigModel):
 class StudyConfig(ConfigModel):
     """What the study compares."""
 
+    photographed: dict[Name, Photographed] = key("by name, how synthetic scenes are photographed and tested", {})
     lod: Levels | None = key("levels, orders, rounding", None)
     materials: Levels | None = key("materials and objects against true labels", None)
     lattice: Levels | None = key("how visibly terrains repeat", None)

@@ -49,7 +49,7 @@ from dav_gswt.photos import importers, photo_files
 from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
 from dav_gswt.photos.importers.colmap import import_colmap
 from dav_gswt.photos.importers.photo_matching import PhotoFolder
-from dav_gswt.photos.importers.splat_files import RECORD, read_splat
+from dav_gswt.photos.importers.splat_files import read_splat
 from dav_gswt.prior import weights
 
 pytestmark = pytest.mark.slow
@@ -109,12 +109,6 @@ def read_packed(path: Path):
     """An SPZ whose packed content the file has."""
     path.write_bytes(gzip.compress(path.read_bytes(), 1))
     return read_splat(path)
-
-
-def write_dot_splats(folder: Path) -> None:
-    rows = np.zeros(9, RECORD)
-    rows["place"], rows["scale"], rows["colour"], rows["turn"] = 1, 0.1, 200, 192
-    rows.tofile(folder / "a.splat")
 
 
 def write_compressed(folder: Path) -> None:
@@ -197,7 +191,6 @@ READERS = [
     Reader("fields (compressed PLY)", write_compressed, read_splat, is_splat, 900),
     Reader("fields (SPZ)", write_spz_files, read_packed, is_splat, 20),
     Reader("fields (SPZ, packed)", lambda folder: write_bytes(folder / "a.spz", PACKED), read_splat, is_splat, 20),
-    Reader("fields (.splat)", write_dot_splats, read_splat, is_splat, 64),
     Reader("EXIF", lambda folder: shutil.copy(PHOTO, folder / "a.jpg"), read_header, is_header, 3000),
     Reader(
         "photos",

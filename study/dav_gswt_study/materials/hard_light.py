@@ -37,9 +37,10 @@ from dav_gswt.reconstruction import coarse, ground
 from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt_study.materials import accuracy
 from dav_gswt_study.materials.true_labels import LabelMap, draw_label_map
+from dav_gswt_study.synthetic_views import place_start_views
 
 PRESET = FitSettings(fit_size=384, spacing=1.25, max_gaussians=140000, steps=360, steps_per_photo=28)  # draft
-PHOTOS = {"photo_count": 12, "layout": "cap", "min_elevation": 50, "size": 384, "seed": 0, "test": 0}
+PHOTOS = {"photo_count": 12, "min_elevation": 50, "size": 384, "seed": 0, "test": 0}
 FRAME = scene.Scene("oasis", 0).frame
 HEAPS = ((-1.3, 0.7, 1.5, 0.9), (1.3, -0.9, 1.2, 0.75))  # x, y, radius and height in metres: sand at rest
 LOAM = np.array([0.24, 0.15, 0.10])  # over sand: other ground, not its shade
@@ -98,7 +99,7 @@ def fit_draft(land: Land, folder: Path) -> tuple[GaussianField, ground.Ground]:
         for part in ("images", "sparse"):
             (folder / part).mkdir(parents=True, exist_ok=True)
         world = mitsuba_scene.build_scene(land)
-        shots = [(f"view_{i:02}.png", camera) for i, camera in enumerate(scene.start_views(PHOTOS))]
+        shots = [(f"view_{i:02}.png", camera) for i, camera in enumerate(place_start_views(PHOTOS, "cap"))]
         for i, (name, camera) in enumerate(shots):
             light = mitsuba_scene.render_light(world, camera, scene.SAMPLES, i)
             image_files.write_png(folder / "images" / name, encode_srgb(light))

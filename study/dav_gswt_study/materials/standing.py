@@ -21,9 +21,10 @@ from dav_gswt.photos.synthetic import desert, land, meshes, mitsuba_scene, photo
 from dav_gswt.photos.training_views import TrainingView, read_training_views
 from dav_gswt.reconstruction import coarse, ground
 from dav_gswt.reconstruction.fitting.plan import FitSettings
+from dav_gswt_study.synthetic_views import place_start_views
 
 PRESET = FitSettings(fit_size=384, spacing=1.25, max_gaussians=140000, steps=360, steps_per_photo=28)  # draft
-PHOTOS = {"photo_count": 12, "layout": "cap", "min_elevation": 50, "size": 384, "seed": 0, "test": 0}
+PHOTOS = {"photo_count": 12, "min_elevation": 50, "size": 384, "seed": 0, "test": 0}
 FRAME = scene.Scene("desert", 0).frame
 # x, y, half width, half depth, height, in metres, and colour of roof and walls
 HOUSES = ((-1.7, 1.6, 0.75, 0.5, 0.7, (0.35, 0.12, 0.08)), (1.4, 1.9, 0.5, 0.5, 0.6, (0.45, 0.44, 0.42)))
@@ -89,7 +90,7 @@ def find_truth(x: Float[Array, "m m"], y: Float[Array, "m m"]) -> dict[str, Bool
 
 def photograph(folder: Path) -> list[TrainingView]:
     """The photos, rendered into a folder and kept there."""
-    shots = [(f"view_{i:02}.png", camera) for i, camera in enumerate(scene.start_views(PHOTOS))]
+    shots = [(f"view_{i:02}.png", camera) for i, camera in enumerate(place_start_views(PHOTOS, "cap"))]
     if not (folder / "sparse").exists():
         (folder / "images").mkdir(parents=True, exist_ok=True)
         world = mitsuba_scene.build_scene(make_land())

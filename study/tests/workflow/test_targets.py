@@ -62,7 +62,9 @@ EXPERIMENTS = {  # target: settings of the study, jobs
                 "sets": [{"title": "pools", "scenes": ["desert_pool"], "k": [4, 6], "photos": 20}],
             }
         },
-        dict(render_photos=1, fit_coarse=2, score_coarse=2, update_field=2 * (2 * (3 + 2) + 1), compare_policies=1),
+        dict(
+            render_study_photos=1, fit_coarse=2, score_coarse=2, update_field=2 * (2 * (3 + 2) + 1), compare_policies=1
+        ),
     ),
 }
 

@@ -12,8 +12,7 @@ from fixtures.photo_store import read_records
 
 from dav_gswt.capture import capturing, drop_folder
 from dav_gswt.capture.agents import AGENTS
-from dav_gswt.capture.site import Site
-from dav_gswt.capture.store import PhotoStore, pose_key
+from dav_gswt.capture.store import PhotoStore, Site, pose_key
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose

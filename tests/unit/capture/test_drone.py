@@ -7,8 +7,7 @@ import pytest
 from fixtures.frames import scene_frame
 
 from dav_gswt.capture import drone, drop_folder, route
-from dav_gswt.capture.site import Site
-from dav_gswt.capture.store import PhotoStore
+from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts, cameras
 from dav_gswt.geometry.georeference import Georeference

@@ -13,8 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dav_gswt.capture import serial_protocol, serial_rig
-from dav_gswt.capture.site import Site
-from dav_gswt.capture.store import PhotoStore
+from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.config.scenes import SerialRig
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts

@@ -6,8 +6,7 @@ import pytest
 from fixtures import ground as made
 
 from dav_gswt.capture import drop_folder, handheld
-from dav_gswt.capture.site import Site
-from dav_gswt.capture.store import PhotoStore
+from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
 from dav_gswt.geometry import camera_layouts, cameras

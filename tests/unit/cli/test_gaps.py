@@ -77,8 +77,8 @@ def test_no_mission_is_written_without_gps_or_over_a_slope(tmp_path):
 
 
 def test_what_cannot_be_used_ends_with_1_and_a_wrong_call_with_2(tmp_path, capsys):
-    splat = tmp_path / "a.splat"
-    splat.write_bytes(bytes(64))
+    splat = tmp_path / "a.spz"
+    splat.write_bytes(b"\x1f\x8b" + bytes(64))
     assert main.main(["gaps", str(splat)]) == 1
     assert "name their folder" in capsys.readouterr().err
     assert main.main(["gaps", str(tmp_path / "none")]) == 1

@@ -111,15 +111,3 @@ def test_a_python_that_snakemake_cannot_start_is_named_before_any_job(monkeypatc
     monkeypatch.setattr(run.sys, "executable", "/home/me/My Projects/.venv/bin/python")
     with pytest.raises(InputError, match="My Projects.*without them"):
         run.run_workflow("desert", 1, [])
-
-
-def test_what_a_job_does_now_is_written_over_on_a_terminal_and_seldom_elsewhere(monkeypatch, capsys):
-    lines = ["[1 of 2] fit the ground ...", "  fit: 1/3, 00:01 gone, about 00:02 left", "  a warning"]
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: False)
-    display = run._Display()
-    for line in [*lines, "[1 of 2] fit the ground: 3 s"]:
-        display.show(line)
-    assert capsys.readouterr().out == "  a warning\n[1 of 2] fit the ground: 3 s\n"
-    monkeypatch.setattr(run, "SELDOM", 0.0)
-    display.show(lines[1])
-    assert capsys.readouterr().out == "[1 of 2] fit the ground: fit: 1/3, 00:01 gone, about 00:02 left\n"

@@ -109,7 +109,7 @@ def test_what_cannot_be_inpainted_is_refused_and_why(root, change, message):
     [
         ({"field": "a b.ksplat"}, "finished.*a .ksplat .*npx @playcanvas/splat-transform 'a b.ksplat' 'a b.ply'"),
         ({"field": "a.sog"}, "finished.*a SOG .*npx @playcanvas/splat-transform a.sog a.ply"),
-        ({"field": "a.obj"}, "finished.*ends in .ply, .spz or .splat"),
+        ({"field": "a.obj"}, "finished.*ends in .ply or .spz"),
         ({"crop": [[0, 0, 0], [1, 0, 1]]}, "finished.*crop: its first corner must be the lower one"),
         ({"up": [0, float("inf"), 0]}, r"scenes.finished.up.1: .*finite"),
     ],

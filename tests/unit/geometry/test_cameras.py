@@ -72,23 +72,3 @@ def test_a_hemisphere_is_uniform_by_area():
     azimuth = np.array([a for _, a, _ in camera_layouts.hemisphere(1000, 30.0, 7.0)])
     # a golden-angle sequence fills arcs with a discrepancy of a few points
     assert np.abs(np.histogram(azimuth, bins=10, range=(0, 360))[0] - 100).max() <= 5
-
-
-@pytest.mark.parametrize("n, circle", [(100, 36), (72, 36), (71, 26), (50, 18), (3, 1)])
-def test_a_paper_rig_has_36_in_100_views_on_a_circle_and_the_others_uniform_above_the_lowest(n, circle):
-    places = camera_layouts.paper(n, 45.0, 30.0, 7.0)
-    assert len(places) == n
-    assert [e for e, _, _ in places[:circle]] == circle * [45.0]
-    assert np.diff([a for _, a, _ in places[:circle]]) == pytest.approx((circle - 1) * [360 / circle])
-    height = np.sin(np.radians([e for e, _, _ in places[circle:]]))
-    # equal steps of height are equal areas of the sphere
-    assert height == pytest.approx(1 - (np.arange(n - circle) + 0.5) / (n - circle) * 0.5)
-
-
-def test_a_walker_stands_away_from_the_target_and_looks_past_it_to_the_horizon():
-    camera = camera_layouts.eye_level_camera(1.6, 90.0, 4.0, (1.0, 2.0, 0.5), 160, 90, 60.0)
-    assert camera.centre == pytest.approx(np.array([1.0, 6.0, 2.1]))
-    horizon = camera.centre + np.array([[0.0, -1.0, 0.0]])
-    [pixel], _ = camera.project(horizon)
-    # 12 degrees above the middle: a focal length of 80 / tan 30 pixels times tan 12
-    assert pixel == pytest.approx([80, 45 - 80 * 3**0.5 * np.tan(np.radians(12))])

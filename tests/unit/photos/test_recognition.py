@@ -117,7 +117,6 @@ def test_names_of_scenes(tmp_path):
     ("name", "content", "kind"),
     [
         ("a.spz", b"\x1f\x8b\x08" + b"0" * 40, ".spz"),
-        ("a.splat", b"0" * 32, ".splat"),
         ("a.compressed.ply", b"ply\nelement vertex 1\nproperty uint packed_position\n", ".ply"),
         ("a.ply", b"ply\nelement vertex 1\nproperty double f_dc_0\n", ".ply"),
     ],

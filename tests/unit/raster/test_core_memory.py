@@ -78,7 +78,12 @@ def a_ground_mostly_outside(isa: str, threads: int) -> list[np.ndarray]:
     seen = raster.forward(**arrays, camera=CAMERA)
     gradients = raster.backward(*image_gradients(CAMERA, 3))
     assert 100 < raster.visible.sum() < n // 2
-    return [*vars(seen).values(), *vars(gradients).values(), raster.visible, np.array(raster.count_pairs())]
+    return [
+        *vars(seen).values(),
+        *vars(gradients).values(),
+        raster.visible,
+        np.array(raster._core.pairs(raster._last.state)),
+    ]
 
 
 def loss_and_adam(isa: str, threads: int) -> list[np.ndarray]:

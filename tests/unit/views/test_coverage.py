@@ -17,7 +17,7 @@ from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import coverage, policy_inputs
+from dav_gswt.views import coverage, selection
 from dav_gswt.views.pose_maps import PoseMaps, write_pose_maps
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import scoring_camera
@@ -130,7 +130,7 @@ def files(tmp_path_factory):
 
 def build(policy, files):
     scores = Scores([pose for pose, _ in pool()][::-1], {}, Scales({}))
-    return policy_inputs.build_information_gain(policy, scores, pool(), [], SPLIT, files)
+    return selection.build_information_gain(policy, scores, pool(), [], SPLIT, files)
 
 
 def test_gains_are_in_the_order_of_the_scores(cells, files):

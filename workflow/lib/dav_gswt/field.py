@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -80,6 +80,11 @@ class GaussianField(Rows):
     def base_colours(self) -> Float32[Array, "n 3"]:
         """Colour without its view-dependent part."""
         return 0.5 + np.float32(SH0) * self.sh[:, 0]
+
+    def with_harmonics(self, count: int) -> "GaussianField":
+        """With so many colour coefficients: higher ones are dropped, new ones are zero."""
+        kept = self.sh[:, :count]
+        return replace(self, sh=np.pad(kept, ((0, 0), (0, count - kept.shape[1]), (0, 0))))
 
 
 @dataclass(frozen=True)

@@ -96,8 +96,8 @@ def describe_os_error(error: OSError) -> str:
     return f"{text}; free some space, then run the same again" if full else text
 
 
-def progress(items: Iterable[Item], what: str, every: float = 5.0) -> "tqdm[Item]":
-    """Iterate over `items`; every few seconds one line with the share done and the time left.
+def progress(items: Iterable[Item], what: str, every: float = 30.0) -> "tqdm[Item]":
+    """Iterate over `items`; every half a minute one line with the share done and the time left.
 
     A loop that ends within a second logs nothing.
     """

@@ -25,12 +25,13 @@ def unpack_vertices(bounds: Array | None, rows: Array) -> dict[str, Float32[Arra
         colours[:, :3] = _stretch(colours[:, :3], bounds, ("r", "g", "b"), group)
     with np.errstate(divide="ignore"):
         logits = np.log(colours[:, 3]) - np.log1p(-colours[:, 3])
+    small = (_split(words[1], (20, 10, 0), (10, 10, 10)) - np.float32(0.5)) * np.float32(np.sqrt(2))  # of quaternions
     return {
         "means": _stretch(_split(words[0], (21, 11, 0), (11, 10, 11)), bounds, ("x", "y", "z"), group),
         "log_scales": _stretch(
             _split(words[2], (21, 11, 0), (11, 10, 11)), bounds, ("scale_x", "scale_y", "scale_z"), group
         ),
-        "quats": _unpack_quats(words[1]),
+        "quats": expand_smallest_three(words[1] >> 30, small),
         "opacity_logits": logits,
         "colours": colours[:, :3],
     }
@@ -55,12 +56,6 @@ def _stretch(
     low, high = (np.stack([_require(bounds, f"{end}_{axis}", "f4") for axis in axes], 1) for end in ("min", "max"))
     with np.errstate(all="ignore"):  # the checks below refuse values that are not finite
         return low[group] * (1 - shares) + high[group] * shares
-
-
-def _unpack_quats(words: UInt32[Array, "n"]) -> Float32[Array, "n 4"]:
-    """w, x, y, z: which is largest (two bits), then the others in order."""
-    small = (_split(words, (20, 10, 0), (10, 10, 10)) - np.float32(0.5)) * np.float32(np.sqrt(2))
-    return expand_smallest_three(words >> 30, small)
 
 
 def expand_smallest_three(which: UInt32[Array, "n"], small: Float[Array, "n 3"]) -> Float32[Array, "n 4"]:

@@ -40,16 +40,17 @@ def dark(monkeypatch):
 
 
 def test_test_views_are_x(dark, tmp_path):
-    entry = ENTRY | {"layout": "cap", "min_elevation": 60, "oblique": 3}
+    entry = ENTRY | {"min_elevation": 60}
+    around = synthetic.orbit_cameras([(45.0, 20.0 + turn, 6.3) for turn in (0, 120, 240)], 64)
+    cameras = {"high": synthetic.test_views(entry), "oblique": around}
     groups = {"high": ["test_00.png", "test_01.png"], "oblique": ["test_02.png", "test_03.png", "test_04.png"]}
-    photo_set.render_set(entry, tmp_path)
+    photo_set.render_set(entry, tmp_path, synthetic.start_views(entry), cameras)
     frame = read_scene_frame(tmp_path / "ground.json")
     assert frame.test_groups == {group: tuple(names) for group, names in groups.items()}
     assert frame.test == tuple(name for group in groups.values() for name in group)
     assert frame.images == frame.registered == 3
     stored = read_colmap_model(tmp_path / "sparse")
-    tests = [camera for cameras in synthetic.test_views(entry).values() for camera in cameras]
-    for name, camera in zip(frame.test, tests, strict=True):
+    for name, camera in zip(frame.test, [*cameras["high"], *around], strict=True):
         assert stored.camera(name).centre == pytest.approx(camera.centre)
     pictures = sorted(p.name for p in (tmp_path / "images").iterdir())
     assert pictures == [*frame.test, "view_00.png", "view_01.png", "view_02.png"]

@@ -14,7 +14,6 @@ from dav_gswt.photos.synthetic.meshes import Mesh
 
 mi = pytest.importorskip("mitsuba")
 ENTRY = {"family": "desert", "seed": 0, "photo_count": 8, "test": 6, "size": 64, "candidates": 20}
-HIGH = ENTRY | {"layout": "cap", "min_elevation": 60, "photo_count": 24, "test": 12, "oblique": 8}
 
 
 @pytest.fixture(autouse=True)
@@ -102,30 +101,6 @@ def test_a_picture_repeats_to_the_byte_whatever_the_threads():
     assert one.dtype == np.float32 and one.shape == (38, 50, 3)
     assert one.tobytes() == three.tobytes()
     assert one.min() >= 0 and one.max() <= 1 and one.std() > 0.02
-
-
-def elevations(cameras):
-    """In degrees, about the origin."""
-    return np.degrees([np.arcsin(c.centre[2] / np.linalg.norm(c.centre)) for c in cameras])
-
-
-def test_a_cap_is_photographed_and_tested_evenly_from_above_its_lowest_elevation():
-    low = np.sin(np.radians(60))
-    tests = synthetic.test_views(HIGH)
-    for cameras, count in ((synthetic.start_views(HIGH), 24), (tests["high"], 12)):
-        height = np.sort(np.sin(np.radians(elevations(cameras))))
-        # equal steps of height are equal areas of the sphere
-        assert height == pytest.approx(low + (np.arange(count) + 0.5) / count * (1 - low), abs=1e-9)
-    assert list(tests) == ["high", "oblique"] and elevations(tests["oblique"]) == pytest.approx(8 * [45])
-
-
-def test_walkers_are_a_group_of_their_own_around_the_exemplar():
-    groups = synthetic.test_views(HIGH | {"walkers": 6})
-    assert list(groups) == ["high", "oblique", "walker"]
-    own = groups["walker"]
-    assert [c.centre[2] for c in own] == pytest.approx([0.8, 1.6, 3.2, 0.8, 1.6, 3.2])
-    around = np.degrees(np.unwrap([np.arctan2(c.centre[1], c.centre[0]) for c in own]))
-    assert np.diff(around) == pytest.approx(5 * [60.0])
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def replay(site: Any, poses: list[Any], remaining: list[Any], folder: Path) -> l
     """The photo of the pool that is nearest to each pose is taken, ties by name; fewer if the pool ends."""
     import shutil
 
-    from dav_gswt.capture.site import view_distance
+    from dav_gswt.capture.store import view_distance
     from dav_gswt.photos.capture_record import CapturedPhoto
 
     pool, photos = {pose.name: camera for pose, camera in remaining}, []

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from dav_gswt.capture import drone, serial_rig
 from dav_gswt.capture.agents import AGENTS
-from dav_gswt.capture.site import RequestedPose, Site, view_distance
+from dav_gswt.capture.store import RequestedPose, Site, view_distance
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose

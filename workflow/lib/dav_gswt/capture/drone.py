@@ -11,7 +11,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.capture import drop_folder, route
-from dav_gswt.capture.site import RequestedPose, Site
+from dav_gswt.capture.store import RequestedPose, Site
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
 from dav_gswt.geometry.cameras import Camera

@@ -8,7 +8,7 @@ import logging
 from datetime import UTC, datetime
 from pathlib import Path
 
-from dav_gswt.capture.site import RequestedPose, Site, view_distance
+from dav_gswt.capture.store import RequestedPose, Site, view_distance
 from dav_gswt.files import digest_files
 from dav_gswt.photos.photo_files import read_capture_time
 from dav_gswt.photos.photo_listing import list_photos

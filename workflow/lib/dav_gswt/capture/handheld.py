@@ -13,7 +13,7 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.capture import drop_folder, route
-from dav_gswt.capture.site import RequestedPose, Site
+from dav_gswt.capture.store import RequestedPose, Site
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, read_field
 from dav_gswt.files import atomic_folder

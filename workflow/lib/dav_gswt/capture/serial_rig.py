@@ -21,7 +21,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.capture import serial_protocol
 from dav_gswt.capture.serial_protocol import SerialLine
-from dav_gswt.capture.site import RequestedPose, Site
+from dav_gswt.capture.store import RequestedPose, Site
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera

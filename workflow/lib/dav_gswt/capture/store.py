@@ -19,6 +19,7 @@ from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import digest_files, read_json, require_file_name, write_json
 from dav_gswt.geometry.cameras import Camera, camera_from_json, camera_to_json
 from dav_gswt.geometry.poses import Pose
+from dav_gswt.geometry.scene_frame import SceneFrame
 
 PLACES = 6  # decimals of a camera's numbers in its key: finer than any device repeats a pose
 
@@ -109,3 +110,32 @@ def _read_record(place: Path) -> dict:
             f"{place / 'shot.json'}: not the record of a photo ({summarize_error(error)}); put it back, or remove "
             f"{place} to take the photo again"
         ) from error
+
+
+RequestedPose = tuple[Pose, Camera]
+
+
+@dataclass(frozen=True)
+class Site:
+    """A scene to photograph.
+
+    name, scene: its name and entry in the config. photos: its photos/ folder. store: photos taken by devices and
+    people. field: the reconstruction so far, a .ply. shot_list_template: of the page that `handheld` writes.
+    requested: the cameras that this round and the earlier ones request; a dropped photo stored for one is in use.
+    """
+
+    name: str
+    scene: dict
+    frame: SceneFrame
+    photos: Path
+    store: PhotoStore
+    field: Path | str | None = None
+    shot_list_template: Path | str = ""
+    requested: tuple[Camera, ...] = ()
+
+
+def view_distance(a: Camera, b: Camera, frame: SceneFrame) -> float:
+    """Distance of two views: between the centres in flying heights, plus the angle between the viewing directions in
+    radians."""
+    angle = np.arccos(np.clip(a.forward @ b.forward, -1, 1))
+    return float(np.linalg.norm(a.centre - b.centre) / frame.flying_height + angle)

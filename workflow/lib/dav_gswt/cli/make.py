@@ -22,7 +22,7 @@ from dav_gswt.cli import run
 from dav_gswt.cli.judgement import judge_terrain
 from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.errors import InputError
-from dav_gswt.files import REPOSITORY, atomic_file
+from dav_gswt.files import REPOSITORY, atomic_file, atomic_folder
 from dav_gswt.paths import encode_branch, stage_folder
 from dav_gswt.photos.recognition import Recognised, name_scene, recognize_input
 
@@ -223,7 +223,7 @@ def add_to_report(page: Path, sentences: list[str], target: Path) -> None:
         part.write_text(f"{body}<h2>What was made of them</h2>\n<ul>\n{said}</ul>\n</body>{end}", encoding="utf-8")
 
 
-def link_file(source: Path, target: Path) -> None:
+def link_file(source: Path | str, target: Path | str) -> None:
     """A second name of a file, or a copy where the disk has no such names. It takes the target's place at once."""
     with atomic_file(target) as part:
         part.unlink(missing_ok=True)
@@ -235,14 +235,8 @@ def link_file(source: Path, target: Path) -> None:
 
 def link_folder(source: Path, target: Path) -> None:
     """A folder whose files are second names of another folder's."""
-    part = target.with_name(f".{target.name}.part")
-    shutil.rmtree(part, ignore_errors=True)
-    for path in sorted(source.rglob("*")):
-        if path.is_file():
-            (part / path.relative_to(source)).parent.mkdir(parents=True, exist_ok=True)
-            link_file(path, part / path.relative_to(source))
-    shutil.rmtree(target, ignore_errors=True)
-    part.rename(target)
+    with atomic_folder(target) as part:
+        shutil.copytree(source, part, copy_function=link_file, dirs_exist_ok=True)
 
 
 def report_made(made: Made) -> None:

@@ -4,7 +4,6 @@ import argparse
 import getpass
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -27,9 +26,7 @@ SMALLER = Path("config/without_compiler.yaml")
 LOGGER = Path("workflow/logger")  # a plugin of Snakemake, found by PYTHONPATH
 PROFILE_NOTE = "Using workflow specific profile"  # printed by Snakemake before its loggers begin
 JOB = re.compile(r"\[\d+ of \d+\] .* \.\.\.$")  # a line of the log at which a job begins
-PROGRESS = re.compile(r"  .* gone, about .* left")  # a line of a job that says how far it is
 ODD_LETTERS = re.compile(r"""[\s'"\\$&;()<>|*?\[\]{}`!]""")  # that a shell does not take as they are
-SELDOM = 30.0  # seconds between such lines where they are not written over each other
 GRACE = 5.0  # seconds that jobs have to end by themselves after a signal, and then Snakemake
 
 
@@ -172,45 +169,12 @@ def follow(command: list[str], root: Path = Path()) -> tuple[int, int]:
     ) as job:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, receive)
-        display = _Display()
         for line in job.stdout or ():
             begun += bool(JOB.match(line))
             if not received and not line.startswith(PROFILE_NOTE):  # a job that a signal ends has nothing to tell
-                display.show(line.rstrip("\n"))
-        display.clear()
+                print(line, end="", flush=True)
         code = job.wait()
     return (130 if received and code else code), begun
-
-
-class _Display:
-    """The short log. On a terminal, what a job does now is written over; elsewhere it is written now and then."""
-
-    def __init__(self):
-        self.lasting, self.last, self.job = not sys.stdout.isatty(), time.monotonic(), ""
-
-    def show(self, line: str) -> None:
-        now = JOB.match(line), PROGRESS.match(line)
-        if not any(now):
-            self.clear()
-            print(line, flush=True)
-        elif now[0]:
-            self.job = line.removesuffix(" ...")
-            self._show_now(self.job)
-        else:
-            self._show_now(f"{self.job}: {line.strip()}")
-
-    def clear(self) -> None:
-        """Remove the line of what a job does now."""
-        if not self.lasting:
-            print("\r\x1b[K", end="", flush=True)
-
-    def _show_now(self, text: str) -> None:
-        if not self.lasting:
-            width = shutil.get_terminal_size().columns - 1
-            print(f"\r\x1b[K{text[:width]}", end="", flush=True)
-        elif time.monotonic() - self.last >= SELDOM:
-            self.last = time.monotonic()
-            print(text, flush=True)
 
 
 def end_run(job: subprocess.Popen, number: int) -> None:

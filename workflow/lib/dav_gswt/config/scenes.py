@@ -7,7 +7,7 @@ from pydantic import Field, FiniteFloat, field_validator, model_validator
 
 from dav_gswt.capture.agents import list_agents
 from dav_gswt.config.base import ConfigModel, Name, PhotoSize, Seed, Text, key
-from dav_gswt.images.file_kinds import advise_conversion
+from dav_gswt.images.file_kinds import BY_SUFFIX, advise_conversion
 
 if TYPE_CHECKING:
     SyntheticAgent = PhotoAgent = str
@@ -86,6 +86,12 @@ class _PhotographedScene(_Scene):
         read_by=POSE_READERS,
         agents=POSED,
     )
+    exemplar: Literal["focus", "whole"] = key(
+        "what the last fit of a preset with `choose_with` spends its Gaussians on: `focus`, the windows of the ground "
+        "that tiles and objects are cut from, at the resolution of the photos; `whole`, all of the exemplar, for the "
+        "reconstruction itself. Ground that is tiled as one (`materials: one`) or inpainted is always fitted whole",
+        "focus",
+    )
 
 
 def _materials(default: str):
@@ -95,18 +101,6 @@ def _materials(default: str):
         "name, as `{lawn: lawn.png, road: road.png, exclude: other.png}`: those materials and no others, and `exclude` "
         "nowhere (docs/photos.md)",
         default,
-    )
-
-
-Exemplar = Literal["focus", "whole"]
-
-
-def _exemplar():
-    return key(
-        "what the last fit of a preset with `choose_with` spends its Gaussians on: `focus`, the windows of the ground "
-        "that tiles and objects are cut from, at the resolution of the photos; `whole`, all of the exemplar, for the "
-        "reconstruction itself. Ground that is tiled as one (`materials: one`) or inpainted is always fitted whole",
-        "focus",
     )
 
 
@@ -126,12 +120,6 @@ class SyntheticScene(_PhotographedScene):
         "photos to start from, with `agent: replay`; all if left out", None, read_by=("split_views",), ge=2, le=200
     )
     test: int = key("views that only test", read_by=(*RENDERED, "split_views"), ge=0, le=200)
-    layout: Literal["ring", "cap", "paper"] = key(
-        "how photos are placed: `ring`, one from above and the others around it at 65 degrees; `cap`, evenly over the "
-        "hemisphere above `min_elevation`; `paper`, 36 on a circle at 45 degrees and the others as `cap`",
-        "ring",
-        read_by=RENDERED,
-    )
     min_elevation: float = key(
         "lowest elevation of candidates and of test views",
         30,
@@ -140,14 +128,6 @@ class SyntheticScene(_PhotographedScene):
         agents=("render",),
         ge=5,
         le=85,
-    )
-    oblique: int = key("further test views around the exemplar at 45 degrees", 0, read_by=RENDERED, ge=0, le=200)
-    walkers: int = key(
-        "further test views at eye level, 0.8, 1.6 and 3.2 m above the ground in turn",
-        0,
-        read_by=RENDERED,
-        ge=0,
-        le=200,
     )
     size: int = key(
         "width and height of the photos",
@@ -158,7 +138,6 @@ class SyntheticScene(_PhotographedScene):
         le=4096,
     )
     materials: Materials = _materials("one")
-    exemplar: Exemplar = _exemplar()
     agent: SyntheticAgent = key(
         "`render`: photos are rendered at the chosen poses; `replay`: chosen from those rendered beforehand",
         read_by=POSE_READERS,
@@ -209,7 +188,6 @@ class PhotoScene(_PhotographedScene):
         "where EXIF has none or is wrong", None, unit="mm (35 mm equivalent)", read_by=REGISTERED, ge=4, le=2000
     )
     materials: Materials = _materials("auto")
-    exemplar: Exemplar = _exemplar()
     masks: Text | None = key(
         "a folder of masks named as the photos: black pixels are not ground. Left out: NAME_mask.* beside a photo, and "
         "a folder `masks` in the photos' folder or beside one called `images`",
@@ -236,7 +214,7 @@ class FieldScene(_Scene):
     """A finished Gaussian splat instead of photos."""
 
     kind: Literal["field"]
-    field: Text = key("a finished splat: `.ply` of any trainer, plain or compressed, `.spz` or `.splat`")
+    field: Text = key("a finished splat: `.ply` of any trainer, plain or compressed, or `.spz`")
     up: Corner | None = key(
         "a direction that points roughly up in the file; the side on which things stand if left out",
         None,
@@ -253,10 +231,10 @@ class FieldScene(_Scene):
     @classmethod
     def _require_splat(cls, path: str) -> str:
         suffix = Path(path).suffix.lower()
-        if suffix in (".ksplat", ".sog"):
-            raise ValueError(advise_conversion(Path(path), "sog" if suffix == ".sog" else "ksplat"))
-        if suffix not in (".ply", ".spz", ".splat"):
-            raise ValueError("a finished splat ends in .ply, .spz or .splat")
+        if suffix == ".sog" or suffix in BY_SUFFIX:
+            raise ValueError(advise_conversion(Path(path), BY_SUFFIX.get(suffix, "sog")))
+        if suffix not in (".ply", ".spz"):
+            raise ValueError("a finished splat ends in .ply or .spz")
         return path
 
     @model_validator(mode="after")

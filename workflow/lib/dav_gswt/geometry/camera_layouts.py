@@ -12,8 +12,6 @@ from dav_gswt.geometry.cameras import Camera, pinhole
 Place = tuple[float, float, float]  # elevation, azimuth, radius
 GOLDEN = np.pi * (3.0 - 5.0**0.5)  # radians between neighbours of a Fibonacci lattice
 PLASTIC = 1.2207440846057596  # x^4 = x + 1: base of the quasirandom sequence in three dimensions
-CIRCLE = 36  # views on the circle of the rig `paper`, of 100 or of any number from 72
-EYE_LEVEL_PITCH = 12.0  # degrees below the horizon
 
 
 def orbit(elevation, azimuth, radius, target, width: int, height: int, fov) -> Camera:
@@ -83,23 +81,3 @@ def spread_along(places: Float[Array, "m 2"], n: int) -> tuple[Float[Array, "n 2
     share = (at - ends[leg]) / np.maximum(lengths[leg], 1e-300)
     azimuth = np.degrees(np.arctan2(steps[leg, 1], steps[leg, 0]))
     return places[leg] + share[:, None] * steps[leg], azimuth
-
-
-def paper(n: int, elevation: float, lowest_elevation: float, radius: float) -> list[Place]:
-    """n places as in the paper: a circle at `elevation`, the others uniform by area above `lowest_elevation`.
-
-    On the circle are 36, or 36 in 100 where n is below 72.
-    """
-    circle = CIRCLE if n >= 2 * CIRCLE else round(n * CIRCLE / 100)
-    return ring(circle, elevation, radius) + hemisphere(n - circle, lowest_elevation, radius, turn=35.0)
-
-
-def eye_level_camera(height: float, azimuth: float, away: float, target, width: int, rows: int, fov: float) -> Camera:
-    """A camera at eye level: `height` above the target, `away` from it, looking past it to the horizon.
-
-    azimuth: of the camera from the target. fov: of the picture's width, degrees.
-    """
-    a, down = np.radians(azimuth), np.radians(EYE_LEVEL_PITCH)
-    out = np.array([np.cos(a), np.sin(a), 0.0])
-    eye = np.asarray(target, float) + away * out + [0.0, 0.0, height]
-    return pinhole(eye, eye - np.cos(down) * out - [0.0, 0.0, np.sin(down)], width, rows, fov)

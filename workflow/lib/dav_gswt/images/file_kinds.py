@@ -17,6 +17,7 @@ RAW_SUFFIXES = {".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", 
 ATOMS = {b"moov", b"mdat", b"wide", b"free", b"skip"}  # a QuickTime file may begin with any of them
 BY_SUFFIX: dict[str, Kind] = {".splat": "splat", ".ksplat": "ksplat"}  # their first bytes tell nothing
 UNREAD: dict[Kind, str] = {
+    "splat": "a .splat (antimatter15)",
     "ksplat": "a .ksplat (GaussianSplats3D)",
     "sog": "a SOG (PlayCanvas)",
     "spz4": "an SPZ of version 4 (versions 1 to 3 are read)",

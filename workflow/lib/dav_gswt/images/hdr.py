@@ -7,6 +7,8 @@ import numpy as np
 from jaxtyping import Float32, UInt8, UInt16
 from numpy import ndarray as Array
 
+from dav_gswt.images.srgb import encode_srgb
+
 Curve = Literal["hlg", "pq"]
 
 WHITE = {"hlg": 0.2650, "pq": 0.0203}  # light of a white sheet (BT.2408), as a share of the brightest
@@ -17,9 +19,8 @@ WIDE_TO_USUAL = np.array(  # light in BT.2020's primaries to light in BT.709's (
 
 def convert_hdr(values: UInt16[Array, "h w 3"], curve: Curve) -> UInt8[Array, "h w 3"]:
     """A picture as sRGB. values: 0 to 65535. A white sheet becomes white; what is brighter is cut off."""
-    light = np.clip(_tabulate_light(curve)[values] @ WIDE_TO_USUAL.T, 0, 1)
-    coded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** np.float32(1 / 2.4) - 0.055)
-    return np.rint(255 * coded).astype(np.uint8)
+    light = _tabulate_light(curve)[values] @ WIDE_TO_USUAL.T
+    return np.rint(255 * encode_srgb(light)).astype(np.uint8)
 
 
 @cache

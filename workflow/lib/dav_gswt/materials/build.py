@@ -213,10 +213,11 @@ def find_materials(
     plan = plan_ground(maps, bool(field.ground.any()), mask_files)
     if plan.whole:
         return _keep_whole(field, grid, plan, focused)
-    parts = _Parts(plan, segmentation.describe_cells(plan.maps.colour)[..., :3], seed)
-    cuttings = _find_cuttings(field, grid, plan, focused)
-    made = {k: _make_material(parts, k, cutting) for k, cutting in progress(cuttings.items(), "fill materials")}
-    kept = {k: each for k, each in made.items() if each is not None}
+    features = segmentation.describe_cells(plan.maps.colour)[..., :3]
+    kept: dict[int, Material] = {}
+    for k, cutting in progress(_find_cuttings(field, grid, plan, focused).items(), "fill materials"):
+        made = _make_material(plan, features, k, cutting, np.random.default_rng([seed, k]))
+        kept |= {} if made is None else {k: made}
     if not kept:
         _warn_of_nothing()
         return _keep_whole(field, grid, _plan_whole(plan.maps), focused)
@@ -225,15 +226,6 @@ def find_materials(
     objects = _extract_objects(plan, field, grid, {k: place for place, k in enumerate(kept)}, focused)
     side = plan.tile_side * plan.maps.exemplar.spacing / materials[0].grid.spacing
     return replace(_report(plan.maps, plan.classes, side, materials, objects), left_out=plan.left_out)
-
-
-@dataclass(frozen=True)
-class _Parts:
-    """What all materials read. features: weighed CIELAB of all cells."""
-
-    plan: GroundPlan
-    features: Float[Array, "m m k"]
-    seed: int
 
 
 def _find_cuttings(
@@ -254,15 +246,10 @@ def _find_cuttings(
             if window is None:
                 _log.warning("%s lies in no window that was fitted: it is left out", plan.classes.names[number])
                 continue
-            found[number] = _sample_window(plan, focused.windows[window], own)
+            maps = measure_ground(*focused.windows[window])
+            source = (resample(own, plan.maps.exemplar, maps.exemplar) >= HALF) & maps.known
+            found[number] = Cutting(*focused.windows[window], maps, source)
     return found
-
-
-def _sample_window(plan: GroundPlan, window: tuple[GaussianField, Ground], own: Bool[Array, "m m"]) -> Cutting:
-    """A window with what belongs to a thing there."""
-    field, grid = window
-    maps = measure_ground(field, grid)
-    return Cutting(field, grid, maps, (resample(own, plan.maps.exemplar, maps.exemplar) >= HALF) & maps.known)
 
 
 def _keep_whole(field: GaussianField, grid: Ground, plan: GroundPlan, focused: FocusedFields | None) -> FoundMaterials:
@@ -317,17 +304,21 @@ def _ignore_scarce(classes: GroundClasses, number: int) -> Bool[Array, "m m"]:
     return np.zeros_like(own)
 
 
-def _make_material(parts: _Parts, number: int, cutting: Cutting) -> Material | None:
-    """The exemplar of one material, made of its own cells; None where it has no room for a patch."""
-    plan, window, source = parts.plan, cutting.maps, cutting.own
+def _make_material(
+    plan: GroundPlan, features: Float[Array, "m m k"], number: int, cutting: Cutting, rng: np.random.Generator
+) -> Material | None:
+    """The exemplar of one material, made of its own cells; None where it has no room for a patch.
+
+    features: weighed CIELAB of all cells.
+    """
+    window, source = cutting.maps, cutting.own
     name, cells = plan.classes.names[number], cutting.grid.cells
     tile_side = plan.tile_side * plan.maps.exemplar.spacing / cutting.grid.spacing
     hidden = energy.make_occluder_layer(window.cover)
     terms = energy.SeamEnergy("colour", 0.0, energy.make_colour_layer(window.colour), None, hidden).terms(1.0)
     areas = layout.plan_layout(cells, 1, min(1.0, tile_side / cells), 0.125)
-    features = patches.make_guidance(window.colour, window.height, np.zeros(source.shape), areas).features
-    rng = np.random.default_rng([parts.seed, number])
-    sources = fill_cells(features, terms, source, _choose_patch(window, source), rng) if source.any() else None
+    guide = patches.make_guidance(window.colour, window.height, np.zeros(source.shape), areas).features
+    sources = fill_cells(guide, terms, source, _choose_patch(window, source), rng) if source.any() else None
     if sources is None:
         _log.warning("%s is too small and narrow to be tiled; it is left out", name)
         return None
@@ -337,7 +328,7 @@ def _make_material(parts: _Parts, number: int, cutting: Cutting) -> Material | N
     counted = plan.maps.known & ~plan.classes.excluded & ~plan.classes.occupied
     whole = plan.classes.materials == number  # with the excluded ground in it: shade of a tree parts no material
     patch_scale = _measure_patches(whole) * spacing
-    fray = measure_fray(parts.features, whole, counted, plan.tile_side)
+    fray = measure_fray(features, whole, counted, plan.tile_side)
     bend = measure_bend(whole, counted, plan.tile_side)
     fray, bend = (None if value is None else value * spacing for value in (fray, bend))
     info = MaterialInfo(name, float(plan.classes.shares[number]), patch_scale, colour, fray, bend)
@@ -355,12 +346,10 @@ def choose_window(own: Bool[Array, "m m"], tile_side: float) -> tuple[int, int, 
     unit = int(np.gcd(m, BLOCK))
     least = min(m, ROOM * tile_side)
     sides = sorted({min(m, -(-int(max(share * m, least)) // unit) * unit) for share in WINDOWS}, reverse=True)
-    for side in sides:
-        counts = patches.box_sums(own, side, side)
-        if counts.max() >= OWN_SHARE * side * side or side == sides[-1]:
-            row, column = np.unravel_index(int(counts.argmax()), counts.shape)
-            return int(row), int(column), side
-    raise AssertionError("the last side is always taken")
+    counts = {side: patches.box_sums(own, side, side) for side in sides}
+    side = next((side for side in sides if counts[side].max() >= OWN_SHARE * side * side), sides[-1])
+    row, column = np.unravel_index(int(counts[side].argmax()), counts[side].shape)
+    return int(row), int(column), side
 
 
 def _choose_patch(maps: GroundMaps, source: Bool[Array, "m m"]) -> int:

@@ -63,15 +63,14 @@ class _Box:
     side: int
 
     @property
-    def corners(self) -> Array:
-        return np.array([[self.row, self.column], [self.row + self.side, self.column + self.side]])
-
-    @property
     def slices(self) -> tuple[slice, slice]:
         return slice(self.row, self.row + self.side), slice(self.column, self.column + self.side)
 
-    def contains(self, other: "_Box") -> bool:
-        return bool((self.corners[0] <= other.corners[0]).all() and (self.corners[1] >= other.corners[1]).all())
+    def enclose(self, other: "_Box") -> "_Box":
+        """The smallest square about both."""
+        row, column = min(self.row, other.row), min(self.column, other.column)
+        end = max(self.row + self.side, other.row + other.side), max(self.column + self.side, other.column + other.side)
+        return _Box(row, column, max(end[0] - row, end[1] - column))
 
 
 def choose_windows(plan: GroundPlan, views: Sequence[TrainingView], settings: FitSettings) -> Focus:
@@ -100,14 +99,11 @@ def choose_windows(plan: GroundPlan, views: Sequence[TrainingView], settings: Fi
         if spacing <= settings.spacing * pixel or grown <= 1:
             break
         grown = max(1.0, SHRUNK * grown)
-    squares = [FitWindow(_to_square(plan, box), k < tiled) for k, box in enumerate(windows)]
-    return Focus(squares, spacing, pixel)
-
-
-def _to_square(plan: GroundPlan, box: _Box) -> Square:
-    place = plan.maps.exemplar
-    west, south = place.west + box.column * place.spacing, place.south + box.row * place.spacing
-    return Square(west, south, box.side * place.spacing)
+    fitted, cell = [], place.spacing
+    for number, box in enumerate(windows):
+        square = Square(place.west + box.column * cell, place.south + box.row * cell, box.side * cell)
+        fitted.append(FitWindow(square, number < tiled))
+    return Focus(fitted, spacing, pixel)
 
 
 def _measure_quality(
@@ -169,7 +165,7 @@ def _join_boxes(materials: list[_Box], things: list[_Box]) -> tuple[list[_Box], 
     none of a material contains it, or shares one with its neighbours.
     """
     windows = _merge_boxes(materials)
-    alone = [thing for thing in things if not any(box.contains(thing) for box in windows)]
+    alone = [thing for thing in things if not any(box.enclose(thing) == box for box in windows)]
     return windows + _merge_boxes(alone), len(windows)
 
 
@@ -177,21 +173,11 @@ def _merge_boxes(boxes: list[_Box]) -> list[_Box]:
     """Boxes of which no two are together as large as the square about both."""
     merged: list[_Box] = []
     for box in boxes:
-        while (near := next((other for other in merged if _are_near(box, other)), None)) is not None:
-            merged.remove(near)
-            box = _enclose(box, near)
+        while near := [each for each in merged if box.enclose(each).side ** 2 <= box.side**2 + each.side**2]:
+            merged.remove(near[0])
+            box = box.enclose(near[0])
         merged.append(box)
     return merged
-
-
-def _are_near(one: _Box, two: _Box) -> bool:
-    return _enclose(one, two).side ** 2 <= one.side**2 + two.side**2
-
-
-def _enclose(one: _Box, two: _Box) -> _Box:
-    """The smallest square about two."""
-    low, high = np.minimum(one.corners[0], two.corners[0]), np.maximum(one.corners[1], two.corners[1])
-    return _Box(int(low[0]), int(low[1]), int((high - low).max()))
 
 
 def take_uncertainty(focused: FocusedFields, draft: GaussianField, grid: Ground) -> FocusedFields:

@@ -1,6 +1,7 @@
 """The ground frame: z up, the ground near z = 0, and the square of ground that is seen well enough."""
 
 import logging
+from bisect import bisect
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -183,27 +184,22 @@ def find_visible_points(camera: Camera, points: Float[Array, "n 3"], reach: floa
 
 
 def find_largest_square(mask: Bool[Array, "rows columns"]) -> tuple[int, int, int]:
-    """First row, first column and side of the largest square of true cells; (0, 0, 0) if none is
-    true.
+    """First row, first column and side of the largest square of true cells; (0, 0, 0) if none is true.
 
-    The largest square that ends in a cell has the side 1 + the least of its three neighbours before
-    it. The recurrence runs along anti-diagonals, all cells of one at once. Of equal squares the one
-    nearest to the middle of all true cells is taken, then the first.
+    Of equal squares the one nearest to the middle of all true cells is taken, then the first.
     """
-    rows, columns = mask.shape
-    ends = np.zeros((rows + 1, columns + 1), int)
-    for k in range(rows + columns - 1):
-        i = np.arange(max(0, k - columns + 1), min(rows, k + 1))
-        j = k - i
-        least = np.minimum(np.minimum(ends[i, j], ends[i, j + 1]), ends[i + 1, j])
-        ends[i + 1, j + 1] = np.where(mask[i, j], least + 1, 0)
-    side = int(ends.max())
-    if side == 0:
+    if not mask.any():
         return 0, 0, 0
-    corners = np.argwhere(ends == side) - side
-    middle = np.argwhere(mask).mean(0) + 0.5
-    apart = np.abs(corners + side / 2 - middle).max(1)
-    row, column = corners[apart.argmin()]
+    total = np.pad(mask.astype(int).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+
+    def find_corners(side: int) -> Int[Array, "n 2"]:
+        sums = total[side:, side:] - total[:-side, side:] - total[side:, :-side] + total[:-side, :-side]
+        return np.argwhere(sums == side * side)
+
+    sides = range(1, min(mask.shape) + 1)
+    side = bisect(sides, False, key=lambda side: not len(find_corners(side)))
+    corners, middle = find_corners(side), np.argwhere(mask).mean(0) + 0.5
+    row, column = corners[np.abs(corners + side / 2 - middle).max(1).argmin()]
     return int(row), int(column), side
 
 

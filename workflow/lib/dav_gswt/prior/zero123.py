@@ -81,20 +81,18 @@ class Zero123Networks:
 class Zero123:
     """A `Prior` from a folder of published weights.
 
-    guidance: of classifier-free guidance; 1 is none and saves a pass. device: of PyTorch.
+    guidance: of classifier-free guidance; 1 is none and saves a pass.
     """
 
     name, size, small = "zero123", SIZE, False
 
-    def __init__(self, networks: Zero123Networks, guidance: float = GUIDANCE, device: str = "cpu"):
-        self.networks, self.guidance, self.device = networks, guidance, device
-        for network in (networks.unet, networks.vae, networks.image_encoder, networks.projection):
-            network.to(device)
+    def __init__(self, networks: Zero123Networks, guidance: float = GUIDANCE):
+        self.networks, self.guidance = networks, guidance
 
     @classmethod
-    def open(cls, folder: Path | str, guidance: float = GUIDANCE, device: str = "cpu") -> "Zero123":
+    def open(cls, folder: Path | str) -> "Zero123":
         """Raises: InputError: see load_networks."""
-        return cls(load_networks(folder), guidance, device)
+        return cls(load_networks(folder))
 
     def sample(
         self, condition: Condition, m: int, p_drop: float, steps: int, seed: int, common: bool = True
@@ -106,7 +104,7 @@ class Zero123:
         def denoise(latents: Tensor, time: Tensor, rows: slice) -> Tensor:
             each = len(latents) // (rows.stop - rows.start)
             inputs = (part[rows].repeat_interleave(each, 0) for part in (photo, tokens))
-            return self._predict_noise(latents.to(self.device), time, *inputs).cpu()
+            return self._predict_noise(latents, time, *inputs)
 
         sampling = Sampling(m, p_drop, steps, seed, DENOISER_BATCH, common)
         layers, schedule = self.networks.layers, self.networks.schedule
@@ -115,16 +113,16 @@ class Zero123:
     def decode(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n s s 4"]:
         """See `Prior`. Opacity follows from the white background."""
         vae = self.networks.vae
-        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT))).to(self.device)
+        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT)))
         with torch.inference_mode():
-            parts = [vae.decode(part / vae.config.scaling_factor).sample.cpu() for part in flat.split(VAE_BATCH)]
+            parts = [vae.decode(part / vae.config.scaling_factor).sample for part in flat.split(VAE_BATCH)]
         pictures = ((torch.cat(parts) + 1) / 2).clamp(0, 1).numpy().transpose(0, 2, 3, 1)
         return remove_white(pictures).reshape(*latents.shape[:-3], SIZE, SIZE, 4)
 
     def _encode_condition(self, condition: Condition) -> tuple[Tensor, Tensor]:
         """The latents of the photos, and one token each."""
-        photo = torch.from_numpy(np.ascontiguousarray(condition.photo.transpose(0, 3, 1, 2))).to(self.device)
-        pose = (torch.from_numpy(condition.relative) * torch.tensor(POSE_FACTORS)).to(self.device)
+        photo = torch.from_numpy(np.ascontiguousarray(condition.photo.transpose(0, 3, 1, 2)))
+        pose = torch.from_numpy(condition.relative) * torch.tensor(POSE_FACTORS)
         vae, clip = self.networks.vae, self.networks.image_encoder
         with torch.inference_mode():
             parts = photo.split(VAE_BATCH)

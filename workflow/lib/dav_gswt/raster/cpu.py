@@ -5,7 +5,6 @@ environment variables DAV_GSWT_ISA and DAV_GSWT_THREADS set the instruction set 
 """
 
 import os
-import weakref
 from typing import Any
 
 import numpy as np
@@ -41,7 +40,7 @@ def default_instruction_set() -> str:
 
 
 class Rasterizer(interface.Rasterizer):
-    """See `interface.Rasterizer`. Memory is reused from call to call, that of gradients once nothing refers to them.
+    """See `interface.Rasterizer`.
 
     A Gaussian that cannot have a pixel is culled by its mean and scales; its other values are not checked.
     threads, instruction_set: see `default_threads`, `default_instruction_set`.
@@ -51,7 +50,6 @@ class Rasterizer(interface.Rasterizer):
         super().__init__(**options)
         self.threads = self.threads or default_threads()
         self._core = _core.Context(instruction_set or default_instruction_set())
-        self._memory = _MemoryPool()
 
     def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, int]:
         arrays, size = vars(gaussians).values(), (camera.height, camera.width)
@@ -64,7 +62,7 @@ class Rasterizer(interface.Rasterizer):
         return rendering, threads
 
     def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
-        out = Gradients(**{name: self._memory.take(name, a.shape) for name, a in vars(last.gaussians).items()})
+        out = Gradients(**{name: np.empty(a.shape, np.float32) for name, a in vars(last.gaussians).items()})
         parts = vars(last.gaussians), vars(last.rendering), given, vars(out)
         arrays = (array for part in parts for array in (*part.values(), None))  # None: features, which nothing uses
         by_camera = np.empty(6, np.float32)  # by the camera's motion, which nothing uses
@@ -82,32 +80,6 @@ class Rasterizer(interface.Rasterizer):
         found = np.empty(len(last.gaussians.means), bool)
         self._core.drawn(found)
         return found
-
-    def count_pairs(self) -> int:
-        """Pairs of a pixel and a splat that is blended into it, of the last forward pass."""
-        return int(self._core.pairs(self._require_forward().state))
-
-
-class _MemoryPool:
-    """Arrays whose memory is reused once nothing refers to them or to a view of them.
-
-    Fresh memory costs a page fault every 4 kB, more than writing to it.
-    """
-
-    def __init__(self):
-        self._kept = {}  # by name: memory, and a weak reference to the array that all views of it hold on to
-
-    def take(self, name: str, shape: tuple[int, ...]) -> Float32[Array, "..."]:
-        """An array of this shape, not initialised."""
-        size = int(np.prod(shape))
-        if not size:
-            return np.empty(shape, np.float32)
-        memory, last = self._kept.get(name, (None, None))
-        if memory is None or len(memory) != size or last() is not None:
-            memory = memoryview(np.empty(size, np.float32))  # pyright: ignore[reportArgumentType]  arrays are buffers
-        root = np.frombuffer(memory, np.float32)  # its base is no array: views of it hold `root` itself
-        self._kept[name] = memory, weakref.ref(root)
-        return root.reshape(shape)
 
 
 def compute_loss(

@@ -8,7 +8,6 @@ nothing that a fit to fewer photos got wrong, but it costs a whole fit in each r
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import log2
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +17,7 @@ from scipy.spatial import cKDTree
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.images import metrics
-from dav_gswt.photos.training_views import TrainingView, one_by_one
-from dav_gswt.raster import render
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import discs, objects, observation
 from dav_gswt.reconstruction.coarse import Reconstruction, finish_field, fit_coarse_field, read_start_views
 from dav_gswt.reconstruction.fitting import trainer
@@ -30,10 +27,6 @@ from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 
 _log = logging.getLogger(__name__)
-
-# dB that the earlier photos lose on average to right ones at most, and how much more for each doubling of the photos
-USUAL_LOSS, LOSS_PER_DOUBLING = 1.5, 0.5
-VISIBLE_PSNR = 40.0  # dB: pixels differ by 2.6 of 255 grey levels. Noise that was fitted may be given up above
 
 
 @dataclass(frozen=True)
@@ -83,9 +76,7 @@ def update_field(given: UpdateInput, settings: FitSettings, rng: np.random.Gener
     """Fit a field on with new photos.
 
     Ground that only the new photos see takes their colours, and objects that they show where nothing stood are added;
-    then all Gaussians are fitted to all photos. Without new photos the field is returned as it is. A photo of a wrong
-    pose or of another place contradicts the earlier ones, and a fit settles between them: a warning is logged where
-    the field shows the earlier ones far worse than before.
+    then all Gaussians are fitted to all photos. Without new photos the field is returned as it is.
     """
     field, grid, new = given.field, given.grid, given.new
     if not new:
@@ -93,41 +84,7 @@ def update_field(given: UpdateInput, settings: FitSettings, rng: np.random.Gener
     begin, grid, views, constraints = _prepare_start(given, settings, rng)
     plan, options = settings.plan_update(len(given.earlier), len(new)), FitOptions(f"fit {len(new)} new photos")
     fit = trainer.fit_field(begin, views, plan, constraints, rng, options)
-    _warn_of_contradiction(given, fit.field)
     return Reconstruction(*finish_field(fit.field, grid, views), fit.report)
-
-
-def _warn_of_contradiction(given: UpdateInput, after: GaussianField) -> None:
-    """Warn where an updated field shows the earlier photos far worse than the field before."""
-    views = observation.mask_to_ground(given.earlier, given.grid)
-    most, loss = usual_loss(len(given.earlier), len(given.new)), measure_loss(given.field, after, views)
-    if loss > most:
-        _log.warning(
-            "the new photos contradict the earlier ones: with %s the field shows those %.2f dB worse (usually %.2g dB "
-            "at most); is a pose wrong, or a photo of another place?",
-            ", ".join(view.name for view in given.new),
-            loss,
-            most,
-        )
-
-
-def usual_loss(earlier: int, new: int) -> float:
-    """dB that so many earlier photos lose to so many new ones at most, if these are right."""
-    return USUAL_LOSS + (LOSS_PER_DOUBLING * log2((earlier + new) / earlier) if earlier else 0.0)
-
-
-def measure_loss(before: GaussianField, after: GaussianField, views: list[TrainingView]) -> float:
-    """Mean loss of the views' PSNR in dB, below VISIBLE_PSNR, over the pixels that count; exposure is fitted."""
-    seeing = [view for view in one_by_one(views) if view.weight.any()]
-    lost = [_measure_psnr(before, view) - _measure_psnr(after, view) for view in one_by_one(seeing)]
-    return float(np.mean(lost)) if lost else 0.0
-
-
-def _measure_psnr(field: GaussianField, view: TrainingView) -> float:
-    picture = np.clip(render(field, view.camera).colour, 0, 1)
-    level = np.clip(metrics.correct_colours(picture, view.image, view.weight), 0, 1).astype(np.float32)
-    found = metrics.psnr(level, view.image, view.weight)
-    return VISIBLE_PSNR if found is None else min(VISIBLE_PSNR, found)
 
 
 def _prepare_start(
@@ -140,9 +97,7 @@ def _prepare_start(
     occluders = field[grid.heights.size + discs.count_underlay(grid) :]
     added = _drop_near(objects.make_shell(relief, views), occluders, relief.grid.spacing)
     added = observation.thin_at_random(added, settings.max_gaussians - len(field), rng)
-    sh = np.zeros((len(added), *field.sh.shape[1:]), np.float32)
-    sh[:, :1] = added.sh[:, :1]
-    added = replace(added, sh=sh)
+    added = added.with_harmonics(field.sh.shape[1])
     _log.info("objects: %d Gaussians where nothing stood", len(added))
     field, occluders = concatenate_fields([field, added]), concatenate_fields([occluders, added])
     colour, known = observation.ground_colours(grid, views, occluders)

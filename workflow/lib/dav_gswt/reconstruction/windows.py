@@ -6,7 +6,6 @@ draft's Gaussians outside it held fixed behind and before it.
 """
 
 import logging
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -56,16 +55,11 @@ class FitWindow:
 
 def widen_exemplar(grid: Ground, square: Square) -> Ground:
     """The grid with the largest exemplar of whole cells in a square: a draft's is a multiple of BLOCK cells."""
-    low = [
-        max(0, math.ceil((at - start) / grid.spacing - 1e-6))
-        for at, start in ((square.south, grid.south), (square.west, grid.west))
-    ]
-    high = [
-        math.floor((at + square.side - start) / grid.spacing + 1e-6)
-        for at, start in ((square.south, grid.south), (square.west, grid.west))
-    ]
-    cells = min(min(end, count) - start for start, end, count in zip(low, high, grid.shape, strict=True))
-    return replace(grid, first_row=low[0], first_column=low[1], cells=cells) if cells > grid.cells else grid
+    start = np.array([square.south - grid.south, square.west - grid.west])
+    row, column = np.maximum(0, np.ceil(start / grid.spacing - 1e-6)).astype(int).tolist()
+    last = np.minimum(np.floor((start + square.side) / grid.spacing + 1e-6), grid.shape).astype(int)
+    cells = int((last - [row, column]).min())
+    return replace(grid, first_row=row, first_column=column, cells=cells) if cells > grid.cells else grid
 
 
 def measure_pixel_widths(
@@ -157,42 +151,31 @@ def _fit_window(
     colour, known = observation.ground_colours(grid, seen, hiding)
     grid = replace(grid, seen=known)
     layer = discs.make_ground_discs(grid, discs.fill_unknown(colour, known))
-    around = _match_harmonics(around, layer)
+    around = around.with_harmonics(layer.sh.shape[1])
     start = concatenate_fields([layer, discs.make_underlay(grid, layer), around, occluders])
     said = "%s: %d x %d cells of %.4g %s, %.1f times as wide as a pixel; %d photos"
     width = measure_pixel_widths(grid.centres[:: max(1, grid.heights.size // 100)], views)[0]
     _log.info(said, name, *grid.shape, grid.spacing, draft.frame.unit, grid.spacing / np.nanmedian(width), len(seen))
-    held = dict(smoothing=SMOOTHING, frozen=len(around))
-    constraints = observation.make_constraints(grid, relief, occluders, draft.frame, **held)
+    constraints = observation.make_constraints(
+        grid, relief, occluders, draft.frame, smoothing=SMOOTHING, frozen=len(around)
+    )
     steps = max(1, round(plan.steps * len(seen) / max(1, len(views))))
     plan = FitPlan(steps, settings.max_gaussians + len(around), settings.sh_degree)
     fit = trainer.fit_field(start, seen, plan, constraints, rng, FitOptions(name))
     field, grid = finish_field(fit.field, grid, seen)
     first = grid.heights.size + discs.count_underlay(grid)
-    own = np.r_[0:first, first + len(around) : len(field)]
-    field = field[own]
+    field = field[np.r_[0:first, first + len(around) : len(field)]]
     return Reconstruction(field, grid, FitReport(fit.report.steps, len(field)))
-
-
-def _match_harmonics(field: GaussianField, like: GaussianField) -> GaussianField:
-    """The field with as many coefficients of colour as another has."""
-    wanted = like.sh.shape[1]
-    sh, kept = np.zeros((len(field), wanted, 3), np.float32), min(wanted, field.sh.shape[1])
-    sh[:, :kept] = field.sh[:, :kept]
-    return replace(field, sh=sh)
 
 
 def crop_views(views: list[TrainingView], grid: Ground) -> list[TrainingView]:
     """The parts of views that show a window: of those that show LEAST_PIXELS of it, or else of any that show some."""
     masked = observation.mask_for_fit(views, grid)
     many = [view for view in masked if (view.weight > 0).sum() >= LEAST_PIXELS]
-    cropped = [crop_view(view, _middle(grid), grid.spacing / FINEST) for view in one_by_one(many or masked)]
-    return [view for view in cropped if view is not None]
-
-
-def _middle(grid: Ground) -> Float[Array, "3"]:
     west, south, side = grid.exemplar
-    return np.array([west + side / 2, south + side / 2, np.median(grid.heights)])
+    middle = np.array([west + side / 2, south + side / 2, np.median(grid.heights)])
+    cropped = [crop_view(view, middle, grid.spacing / FINEST) for view in one_by_one(many or masked)]
+    return [view for view in cropped if view is not None]
 
 
 def crop_view(view: TrainingView, at: Float[Array, "3"], pixel: float) -> TrainingView | None:
@@ -233,8 +216,7 @@ def join_windows(draft: Draft, fitted: Sequence[Reconstruction]) -> GaussianFiel
     outside = np.ones(len(draft.field), bool)
     parts = []
     for each in fitted:
-        own = each.field[find_inside(each.grid, each.field)]
-        parts.append(_match_harmonics(own, draft.field))
+        parts.append(each.field[find_inside(each.grid, each.field)].with_harmonics(draft.field.sh.shape[1]))
         outside &= ~find_inside(each.grid, draft.field)
     return concatenate_fields([draft.field[outside], *parts])
 

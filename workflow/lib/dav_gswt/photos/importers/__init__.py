@@ -30,8 +30,13 @@ from dav_gswt.photos.photo_listing import Source
 from dav_gswt.photos.recognition import find_colmap_folder
 from dav_gswt.photos.sfm.gps import GpsPositions
 from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS
-from dav_gswt.photos.sfm.registration import NEIGHBOURS, Registration, SfmOptions, replace_lenses
-from dav_gswt.photos.sfm.triangulation import triangulate_features
+from dav_gswt.photos.sfm.registration import (
+    NEIGHBOURS,
+    Registration,
+    SfmOptions,
+    replace_lenses,
+    triangulate_features,
+)
 
 __all__ = ["import_model"]
 

@@ -1,7 +1,7 @@
-"""Finished splats as other programs store them: `.ply`, `.spz` (versions 1 to 3) and `.splat`, without harmonics.
+"""Finished splats as other programs store them: `.ply` and `.spz` (versions 1 to 3), without harmonics.
 
-SPZ is gzip of a header and of fixed-point columns (https://github.com/nianticlabs/spz); `.splat` has 32 bytes a
-Gaussian (https://github.com/antimatter15/splat). Sizes are checked before anything is allocated.
+SPZ is gzip of a header and of fixed-point columns (https://github.com/nianticlabs/spz). Sizes are checked before
+anything is allocated.
 """
 
 import gzip
@@ -12,7 +12,7 @@ from jaxtyping import Float32, UInt8
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError, summarize_error
-from dav_gswt.field import Splats, build_field, read_ply, rgb_to_sh
+from dav_gswt.field import Splats, build_field, read_ply
 from dav_gswt.files import UNREADABLE
 from dav_gswt.images.file_kinds import advise_conversion, detect_kind
 from dav_gswt.packed_ply import expand_smallest_three
@@ -20,7 +20,6 @@ from dav_gswt.packed_ply import expand_smallest_three
 SPZ_MAGIC, SPZ_HEADER, SPZ_SMALLEST, SPZ_COLOUR = 0x5053474E, 16, -10.0, 0.15
 MOST_PACKED = 1032  # times that gzip can make a file smaller
 MOST_GAUSSIANS = 100_000_000
-RECORD = np.dtype([("place", "<f4", 3), ("scale", "<f4", 3), ("colour", "u1", 4), ("turn", "u1", 4)])  # of a .splat
 
 
 def read_splat(path: Path | str) -> Splats:
@@ -34,32 +33,12 @@ def read_splat(path: Path | str) -> Splats:
     kind = detect_kind(path)
     if advice := advise_conversion(path, kind):
         raise InputError(f"{path}: {advice}")
-    if kind not in ("spz", "splat"):
+    if kind != "spz":
         return read_ply(path, harmonics=False)
     try:
-        return _read_spz(path) if kind == "spz" else _read_dot_splat(path)
+        return _read_spz(path)
     except UNREADABLE as error:
-        raise InputError(
-            f"{path}: not a readable .{kind} ({summarize_error(error)}); copy or export it again"
-        ) from error
-
-
-def _read_dot_splat(path: Path) -> Splats:
-    size = path.stat().st_size
-    if size % RECORD.itemsize or not size:
-        raise InputError(f"{path}: {size} bytes are no whole Gaussians of {RECORD.itemsize} bytes; copy it again")
-    rows = np.fromfile(path, RECORD)
-    with np.errstate(divide="ignore", invalid="ignore"):  # zero is thickened, what is below it refused
-        log_scales = np.log(rows["scale"])
-    field = build_field(
-        path,
-        means=rows["place"],
-        sh=_unpack_colours(rows["colour"][:, :3], 1 / 255, 0.0),
-        log_scales=log_scales,
-        quats=(rows["turn"].astype(np.float32) - 128) / 128,
-        opacity_logits=_unpack_opacities(rows["colour"][:, 3]),
-    )
-    return Splats(field, np.zeros(3), 0)
+        raise InputError(f"{path}: not a readable .spz ({summarize_error(error)}); copy or export it again") from error
 
 
 def _read_spz(path: Path) -> Splats:
@@ -80,7 +59,7 @@ def _read_spz(path: Path) -> Splats:
     field = build_field(
         path,
         means=places.view("<f2").astype(np.float32) if version == 1 else _unpack_places(places, fraction),
-        sh=_unpack_colours(colours, 1 / 255 / SPZ_COLOUR, -0.5 / SPZ_COLOUR, sh=True),
+        sh=colours[:, None] * np.float32(1 / 255 / SPZ_COLOUR) + np.float32(-0.5 / SPZ_COLOUR),
         log_scales=scales / np.float32(16) + np.float32(SPZ_SMALLEST),
         quats=_unpack_smallest_three(turns.view("<u4")[:, 0]) if version == 3 else _unpack_first_three(turns),
         opacity_logits=_unpack_opacities(opacities[:, 0]),
@@ -93,14 +72,6 @@ def _read_exactly(file: gzip.GzipFile, size: int) -> bytes:
     if len(data) != size:
         raise EOFError("it ends too early")
     return data
-
-
-def _unpack_colours(
-    values: UInt8[Array, "n 3"], scale: float, shift: float, sh: bool = False
-) -> Float32[Array, "n 1 3"]:
-    """Coefficients of degree 0, from bytes of colours or (sh) of coefficients."""
-    colours = values * np.float32(scale) + np.float32(shift)
-    return colours[:, None] if sh else rgb_to_sh(colours)
 
 
 def _unpack_opacities(values: UInt8[Array, "n"]) -> Float32[Array, "n"]:

@@ -242,3 +242,25 @@ def replace_lenses(
             lenses[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
     model = model_from_reconstruction(best, pinholes=pinholes)
     return model, tuple(lenses[numbers[name]] for name in model.names)
+
+
+def triangulate_features(
+    known: pycolmap.Reconstruction, folder: Path, neighbours: int, options: SfmOptions
+) -> pycolmap.Reconstruction:
+    """A model with points where rays through matched SIFT features cross, by one thread. Cameras and poses stay.
+
+    known: cameras and images by numbers from 1 on, without points. folder: of the pictures, by the images' names.
+    neighbours: pictures that each is matched with.
+    """
+    with tempfile.TemporaryDirectory(prefix="points-") as scratch:
+        database = Path(scratch) / "database.db"
+        with closing(pycolmap.Database.open(database)) as store:
+            numbers = {key: enter_camera(store, camera) for key, camera in sorted(known.cameras.items())}
+            for _, image in sorted(known.images.items()):
+                enter_image(store, image.name, *numbers[image.camera_id])
+        extract_features(folder, database, options.size, options.features, options.threads)
+        match_photos(known.num_images(), database, neighbours, options.threads, options.seed)
+        choice = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=options.seed)
+        choice.triangulation.random_seed = choice.mapper.random_seed = options.seed
+        choice.mapper.num_threads = 1
+        return pycolmap.triangulate_points(known, database, folder, scratch, options=choice)

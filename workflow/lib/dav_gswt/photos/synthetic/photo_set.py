@@ -1,5 +1,6 @@
 """The photo set of a synthetic scene: start and test views, and points triangulated with their exact poses."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -16,8 +17,7 @@ from dav_gswt.photos.colmap_model import (
     model_from_reconstruction,
     write_colmap_model,
 )
-from dav_gswt.photos.sfm.registration import SfmOptions
-from dav_gswt.photos.sfm.triangulation import triangulate_features
+from dav_gswt.photos.sfm.registration import SfmOptions, triangulate_features
 from dav_gswt.photos.synthetic import mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 
@@ -25,14 +25,13 @@ FEATURES = 4096
 NEIGHBOURS = 20  # views that each is matched with, if there are many
 
 
-def render_set(entry: dict, folder: Path) -> None:
+def render_set(entry: dict, folder: Path, views: Sequence[Camera], groups: Mapping[str, Sequence[Camera]]) -> None:
     """Fill a photos/ folder: images/, sparse/ (exact cameras, triangulated points), ground.json.
 
-    entry: a synthetic scene of the config. Points come from the start views alone; test views are in the model, but
-    observe nothing.
+    entry: a synthetic scene of the config. views: of the start photos, the only ones that points come from. groups: of
+    the test photos; they are in the model, but observe nothing.
     """
-    scene, groups = synthetic.scene_from_config(entry), synthetic.test_views(entry)
-    shots = _name_views("view", synthetic.start_views(entry))
+    scene, shots = synthetic.scene_from_config(entry), _name_views("view", views)
     tests = _name_views("test", [camera for cameras in groups.values() for camera in cameras])
     for part in ("images", "sparse"):
         (folder / part).mkdir(parents=True, exist_ok=True)
@@ -52,7 +51,7 @@ def render_set(entry: dict, folder: Path) -> None:
     write_scene_frame(folder / "ground.json", frame)
 
 
-def _name_views(kind: str, views: list[Camera]) -> list[tuple[str, Camera]]:
+def _name_views(kind: str, views: Sequence[Camera]) -> list[tuple[str, Camera]]:
     """The views with names that sort by number."""
     digits = max(2, len(str(len(views) - 1)))
     return [(f"{kind}_{i:0{digits}d}.png", camera) for i, camera in enumerate(views)]

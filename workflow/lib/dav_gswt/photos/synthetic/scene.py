@@ -35,9 +35,6 @@ NEARER = 0.9 * RADIUS  # of test views, so that they are distinct from all other
 FIELD_OF_VIEW = 55.0  # degrees across the picture's width: 7.3 m of ground from straight above
 RING_ELEVATION = 65.0  # degrees: neighbours of the start ring overlap by most of the exemplar
 LOWEST_ELEVATION = 30.0  # degrees: the lowest candidate and test view, where a scene does not say
-SIDE_ELEVATION = 45.0  # degrees, of the circle of the layout `paper`, and of oblique test views
-EYE_HEIGHTS = (0.8, 1.6, 3.2)  # metres above the mean ground, of tests at eye level
-EYE_LEVEL_FIELD_OF_VIEW = 60.0  # degrees
 SAMPLES = 20  # rays a pixel
 MIDDLE = (0.0, 0.0, 0.0)
 
@@ -63,41 +60,14 @@ def scene_from_config(entry: dict) -> Scene:
 
 
 def start_views(entry: dict) -> list[Camera]:
-    """The cameras of the start photos, by the entry's `layout`.
-
-    ring: one straight above, the others around it. cap: evenly by area above the entry's lowest elevation. paper: some
-    on a circle, the others as in a cap.
-    """
-    layout = entry.get("layout", "ring")
-    if layout == "cap":
-        places = camera_layouts.hemisphere(entry["photo_count"], _lowest(entry), RADIUS, turn=35.0)
-    elif layout == "paper":
-        places = camera_layouts.paper(entry["photo_count"], SIDE_ELEVATION, _lowest(entry), RADIUS)
-    else:
-        places = camera_layouts.start_ring(entry["photo_count"], RING_ELEVATION, RADIUS)
-    return _orbit_cameras(places, entry["size"])
+    """The cameras of the start photos: one straight above, the others around it."""
+    return orbit_cameras(camera_layouts.start_ring(entry["photo_count"], RING_ELEVATION, RADIUS), entry["size"])
 
 
-def test_views(entry: dict) -> dict[str, list[Camera]]:
-    """The cameras of the test photos in each group.
-
-    The first group covers the cap of possible photos: `hemisphere`, or `high` with the layout `cap`. `oblique`: around
-    at 45 degrees, and `walker`: at eye level, if the entry has any.
-    """
-    size, count = entry["size"], entry.get("walkers", 0)
-    all_over = "high" if entry.get("layout") == "cap" else "hemisphere"
-    places = camera_layouts.hemisphere(entry["test"], _lowest(entry), NEARER, turn=70.0)
-    groups = {all_over: _orbit_cameras(places, size)}
-    if entry.get("oblique"):
-        around = camera_layouts.ring(entry["oblique"], SIDE_ELEVATION, NEARER, turn=20.0)
-        groups["oblique"] = _orbit_cameras(around, size)
-    if count:
-        heights = [EYE_HEIGHTS[i % len(EYE_HEIGHTS)] for i in range(count)]
-        stands = [(h, 10.0 + 360.0 * i / count, 0.5 * EXEMPLAR + h) for i, h in enumerate(heights)]
-        groups["walker"] = [
-            camera_layouts.eye_level_camera(*stand, MIDDLE, size, size, EYE_LEVEL_FIELD_OF_VIEW) for stand in stands
-        ]
-    return groups
+def test_views(entry: dict) -> list[Camera]:
+    """The cameras of the test photos: evenly by area over the cap of possible photos."""
+    lowest = float(entry.get("min_elevation", LOWEST_ELEVATION))
+    return orbit_cameras(camera_layouts.hemisphere(entry["test"], lowest, NEARER, turn=70.0), entry["size"])
 
 
 def lens(size: int) -> Camera:
@@ -105,11 +75,8 @@ def lens(size: int) -> Camera:
     return camera_layouts.orbit(90.0, 0.0, RADIUS, MIDDLE, size, size, FIELD_OF_VIEW)
 
 
-def _lowest(entry: dict) -> float:
-    return float(entry.get("min_elevation", LOWEST_ELEVATION))
-
-
-def _orbit_cameras(places: list[camera_layouts.Place], size: int) -> list[Camera]:
+def orbit_cameras(places: list[camera_layouts.Place], size: int) -> list[Camera]:
+    """Cameras at places about the middle of the ground."""
     return [camera_layouts.orbit(*place, MIDDLE, size, size, FIELD_OF_VIEW) for place in places]
 
 
