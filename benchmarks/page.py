@@ -28,13 +28,15 @@ UPDATE = """async hills => {
   const { cameraAt } = await import("./terrain/camera.js");
   const { createWalker } = await import("./ui/walker.js");
   const { readManifest, readParts } = await import("./data/bundle.js");
+  const { chunkKey, listChunks } = await import("./data/layout.js");
   const { webSource } = await import("./data/source.js");
   const source = webSource(new URL("./", location.href)), manifest = await readManifest(source);
   const side = manifest.tile_side;
   const surface = { kind: "hills", height: 3 * side, wavelength: 20 * side, octaves: 4, salt: 1 };
   const heights = createHeights(hills ? surface : undefined), builder = createFrameBuilder(manifest, heights);
   await readParts(manifest, source, { take: (index, buffer) => builder.supply.addPart(index, buffer) });
-  builder.supply.fill();
+  builder.supply.prepare(listChunks(manifest).map(({ tile, entry }) => chunkKey(tile, entry.level)));
+  while (builder.supply.advance());
   const times = { update: [], sort: [], both: [] };
   let seen;
   for (let k = 0; k < 160; k++) {

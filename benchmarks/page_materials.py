@@ -38,6 +38,7 @@ SETUP = """async () => {
   const { cameraAt } = await import("./terrain/camera.js");
   const { createWalker } = await import("./ui/walker.js");
   const { readManifest, readParts } = await import("./data/bundle.js");
+  const { chunkKey, listChunks } = await import("./data/layout.js");
   const { webSource } = await import("./data/source.js");
   const source = webSource(new URL("./", location.href)), parts = [];
   const manifest = await readManifest(source), side = manifest.tile_side;
@@ -48,7 +49,8 @@ SETUP = """async () => {
   const begin = () => {
     const builder = createFrameBuilder(manifest, heights);
     for (const [index, buffer] of parts) builder.supply.addPart(index, buffer.slice());
-    builder.supply.fill();
+    builder.supply.prepare(listChunks(manifest).map(({ tile, entry }) => chunkKey(tile, entry.level)));
+    while (builder.supply.advance());
     return builder;
   };
   const countDrawn = ({ near, blocks }) => {

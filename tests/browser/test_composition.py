@@ -94,8 +94,8 @@ def bomb(manifest, size: int = 1000):
             MADE.files(recipes=recipes_with(0, np.full(18, 1, "<i2").tobytes())), "tile 3 shows what is", id="between"
         ),
         pytest.param(MADE.files(count_more), "tile 4 has", id="count"),
-        pytest.param(MADE.files(recipes=RECIPES[:-1]), "another length than its recipes", id="short recipes"),
-        pytest.param(MADE.files(recipes=RECIPES + b"\0"), "another length than its recipes", id="long recipes"),
+        pytest.param(MADE.files(recipes=RECIPES[:-1]), "it holds other than a recipe a tile", id="short recipes"),
+        pytest.param(MADE.files(recipes=RECIPES + b"\0"), "it holds other than a recipe a tile", id="long recipes"),
         pytest.param(MADE.files(level0=FINEST[:-1]), "level0.bin makes no sense: it is cut short", id="short level"),
         pytest.param(MADE.files(level0=FINEST + b"\0"), "level0.bin makes no sense: it is too long", id="long level"),
         pytest.param(MADE.files(level0=split([9]) * 10), "level0.bin makes no sense: it is cut short", id="no level"),

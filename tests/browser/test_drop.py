@@ -13,10 +13,10 @@ from fixtures.bundles import Ground
 from fixtures.dropped_files import drop, files_of, with_values, zipped
 from fixtures.land_covers import write_cover_bundle
 
-from dav_gswt.bundle import gswt
 from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
+from dav_gswt.export import gswt
 from dav_gswt.field import GaussianField, rgb_to_sh
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)

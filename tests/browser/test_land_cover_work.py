@@ -13,6 +13,7 @@ OPEN = """
   const { createHeights } = await import("./terrain/heights.js");
   const { cameraAt } = await import("./terrain/camera.js");
   const { readManifest, readParts } = await import("./data/bundle.js");
+  const { chunkKey, listChunks } = await import("./data/layout.js");
   const { webSource } = await import("./data/source.js");
   const source = webSource(new URL("./", location.href)), parts = [];
   const manifest = await readManifest(source), heights = createHeights(manifest.heights);
@@ -21,7 +22,8 @@ OPEN = """
   const fill = () => {
     const filled = createFrameBuilder(manifest, heights);
     for (const [index, buffer] of parts) filled.supply.addPart(index, buffer.slice());
-    filled.supply.fill();
+    filled.supply.prepare(listChunks(manifest).map(({ tile, entry }) => chunkKey(tile, entry.level)));
+    while (filled.supply.advance());
     return filled;
   };
   const builder = fill();

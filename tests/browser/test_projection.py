@@ -29,7 +29,7 @@ def seen_as(lonely_folder):
     """The Gaussian as it was rounded."""
     return store.Bundle(
         lonely_folder, Manifest.from_dict(json.loads((lonely_folder / "davgswt.json").read_text()))
-    ).chunk(0, 0)[0]
+    ).chunk(0, 0)
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 // What they pass in is checked before it reaches the worker: a NaN there would draw nothing and say nothing.
 
 import { parseRecords, run } from "../data/compose.js";
-import { chunkKey, deviationOf, MAX_TURN, TURN_STEPS } from "../data/layout.js";
+import { deviationOf, MAX_TURN, TURN_STEPS } from "../data/layout.js";
 import { OVERLAYS } from "../draw/overlays.js";
 import { createRenderer } from "../draw/renderer.js";
 import { backdropOptions } from "../scene/open_terrain.js";
@@ -104,29 +104,16 @@ export function createGround({ manifest, heights, lift }) {
  */
 export function createChunkReader({ manifest, client }, whole, checkRunning) {
   const { tiles, objects = [], levels, encoding, directions } = manifest, sort = createDepthSorter();
-  /** @type {{ key: number, chunk: ReturnType<typeof compose> } | null} */
-  let last = null;
-
-  /** @param {number} tile @param {number} level */
-  async function compose(tile, level) {
-    await whole;
-    checkRunning();
-    const records = await client.recordsOf(tile, level);
-    checkRunning();
-    return run(parseRecords(records ?? new Uint32Array(0), encoding));
-  }
 
   /** @param {number} tile @param {number} level */
   async function read(tile, level) {
     checkIndex("tile", tile, tiles.length + objects.length);
     checkIndex("level", level, levels.length);
-    const key = chunkKey(tile, level);
-    if (last?.key !== key) {
-      const chunk = compose(tile, level);
-      last = { key, chunk };
-      chunk.catch(() => (last = null));
-    }
-    const { records, centres, sizes } = await last.chunk;
+    await whole;
+    checkRunning();
+    const composed = await client.recordsOf(tile, level);
+    checkRunning();
+    const { records, centres, sizes } = run(parseRecords(composed ?? new Uint32Array(0), encoding));
     return { records, centres, count: sizes.length, kept: (tiles[tile] ?? objects[tile - tiles.length]).orders };
   }
 
@@ -142,7 +129,7 @@ export function createChunkReader({ manifest, client }, whole, checkRunning) {
       const { centres, count, kept } = await read(tile, level), depths = new Float32Array(count);
       return kept.map((number) => {
         const [x, y, z] = directions[number];
-        for (let k = 0; k < count; k++) depths[k] = centres[3 * k] * x + centres[3 * k + 1] * y + centres[3 * k + 2] * z;
+        for (let k = 0, c = 0; k < count; k++) depths[k] = centres[c++] * x + centres[c++] * y + centres[c++] * z;
         return { number, direction: directions[number], indices: sort(depths, count).slice() };
       });
     },

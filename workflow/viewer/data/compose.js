@@ -87,14 +87,6 @@ function* unpackBlock(bytes, at, count, wide) {
 const paintOf = (red, green, blue, opacity) =>
   clamp(red, 255) | (clamp(green, 255) << 8) | (clamp(blue, 255) << 16) | (opacity << 24);
 
-/** Values of 16 bits, of differences to the one before. @param {Uint8Array} bytes @param {Int16Array} out */
-function addUp(bytes, out) {
-  for (let k = 0, sum = 0; k < out.length; k++) {
-    sum += difference(bytes[k], bytes[out.length + k]);
-    out[k] = sum;
-  }
-}
-
 /**
  * What a tile shows at a level: of each cell the label that most of its finest cells have (of equally many the first),
  * and the mean of what is added to these.
@@ -125,7 +117,8 @@ function coarsen({ labels, corrections }, side, level) {
 
 /** Chunks by tile, or object, and level. @param {Manifest} manifest */
 export function createComposer(manifest) {
-  const { parts, tiles, composition, encoding: { origin, step } } = manifest, each = tiles.length / manifest.materials.length;
+  const { parts, tiles, composition, encoding: { origin, step } } = manifest;
+  const each = tiles.length / manifest.materials.length;
   const owners = [...tiles, ...manifest.objects ?? []].map(({ chunks }) => (
     [...chunks].sort((a, b) => a.level - b.level)));
   const [west, south] = [0, 1].map((axis) => Math.round(-origin[axis] / step[axis]));
@@ -171,15 +164,19 @@ export function createComposer(manifest) {
   /** @param {Uint8Array} bytes @param {string} file */
   function* unpackRecipes(bytes, file) {
     const cells = side ** 2, made = [];
-    if (bytes.length !== LABELS * (4 + cells) * tiles.length) throw broken(file, "it has another length than its recipes");
+    if (bytes.length !== LABELS * (4 + cells) * tiles.length) throw broken(file, "it holds other than a recipe a tile");
     for (let at = 0; at < bytes.length;) {
       const shifts = new Int16Array(bytes.slice(at, at + 4 * LABELS).buffer);
       at += 4 * LABELS;
-      const labels = bytes.slice(at, at + cells), corrections = new Int16Array(4 * cells), maps = [{ labels, corrections }];
+      const labels = bytes.slice(at, at + cells), corrections = new Int16Array(4 * cells);
+      const maps = [{ labels, corrections }];
       if (labels.some((label) => label >= LABELS)) throw broken(file, "a label is out of range");
       at += cells;
       for (let c = 0; c < 4; c++, at += 2 * cells) {
-        addUp(bytes.subarray(at, at + 2 * cells), corrections.subarray(c * cells, (c + 1) * cells));
+        for (let k = 0, sum = 0; k < cells; k++) {
+          sum += difference(bytes[at + k], bytes[at + cells + k]);
+          corrections[c * cells + k] = sum;
+        }
       }
       for (let level = 1; level < levels; level++) {
         yield;
@@ -193,8 +190,9 @@ export function createComposer(manifest) {
 
   /** The cells of the exemplar that a tile shows at a level; -1: outside. @param {number} tile @param {number} level */
   function sourcesOf(tile, level) {
-    const { shifts, maps } = /** @type {Recipe[]} */ (recipes)[tile], cells = exemplars[Math.floor(tile / each)] >> level;
-    const { labels } = maps[level], along = side >> level, found = new Int32Array(labels.length);
+    const { shifts, maps: { [level]: { labels } } } = /** @type {Recipe[]} */ (recipes)[tile];
+    const cells = exemplars[Math.floor(tile / each)] >> level, along = side >> level;
+    const found = new Int32Array(labels.length);
     for (let k = 0; k < labels.length; k++) {
       const x = shifts[2 * labels[k]], y = shifts[2 * labels[k] + 1];
       const column = (k % along) + (x >> level), row = Math.floor(k / along) + (y >> level);
@@ -256,7 +254,8 @@ export function createComposer(manifest) {
       const { part, first = 0, count } = owners[tile][level];
       const stored = part === undefined ? undefined : records[part];
       if (stored) return stored.subarray(4 * first, 4 * (first + count));
-      const { corrections } = /** @type {Recipe[]} */ (recipes)[tile].maps[level], along = side >> level, pace = cell << level;
+      const { corrections } = /** @type {Recipe[]} */ (recipes)[tile].maps[level];
+      const along = side >> level, pace = cell << level;
       const out = new Uint32Array(4 * count), sources = sourcesOf(tile, level), many = sources.length;
       let n = 0, due = 4 * STEP;
       for (const { starts, words } of layers[level][Math.floor(tile / each)]) {
@@ -269,7 +268,8 @@ export function createComposer(manifest) {
             out[n] = ((place & 65535) + x) | (((place >>> 16) + y) << 16);
             out[n + 1] = (second & 0xffff0000) | clamp((second & 65535) + dz, 65535);
             out[n + 2] = words[w + 2];
-            out[n + 3] = paintOf(((third << 16) >> 16) + dr, (third >> 16) + dg, ((last << 16) >> 16) + db, last >>> 16);
+            const red = ((third << 16) >> 16) + dr, blue = ((last << 16) >> 16) + db;
+            out[n + 3] = paintOf(red, (third >> 16) + dg, blue, last >>> 16);
           }
           if (n >= due) {
             due = n + 4 * STEP;

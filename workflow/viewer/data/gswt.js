@@ -43,7 +43,7 @@ export async function gswtSource(files) {
   const manifest = makeManifest(sets, levels, tiles);
   sets.forEach((set, k) => {
     const { file, size } = manifest.parts[k];
-    made.set(file, { size, open: async () => makeRecords(set, manifest) });
+    made.set(file, { size, open: async () => writeRecords(new ArrayBuffer(size), set, manifest.encoding) });
   });
   const text = new TextEncoder().encode(JSON.stringify(manifest)).buffer;
   made.set(NAME, { size: text.byteLength, open: async () => text });
@@ -138,13 +138,6 @@ function orderDirections() {
   const around = Array.from({ length: AZIMUTHS }, (_, k) => (2 * Math.PI * k) / AZIMUTHS);
   const ring = around.map((a) => [Math.cos(a) * Math.cos(DOWN), Math.sin(a) * Math.cos(DOWN), -Math.sin(DOWN)]);
   return [...ring, [0, 0, -1]];
-}
-
-/** The records of a set. @param {GaussianSet} set @param {Manifest} manifest */
-function makeRecords(set, { encoding }) {
-  const buffer = new ArrayBuffer(RECORD * set.count);
-  writeRecords(buffer, set, encoding);
-  return buffer;
 }
 
 /**

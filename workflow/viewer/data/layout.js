@@ -1,6 +1,6 @@
 // Layout of what the worker hands to the GPU: record rows, pages of orders, blocks of instances, places of objects. A
 // chunk has one 16-byte record a Gaussian (a texel of four 32-bit words). compose.js makes it, and quantize.js for sets
-// that the page converts; draw/shaders.js decodes it. An object of the terrain is numbered like a tile, after all tiles.
+// that the page converts; draw/shaders.js decodes it. An object of the terrain is numbered like a tile, after all.
 
 /**
  * @typedef {import("./manifest.js").Manifest} Manifest
@@ -67,8 +67,8 @@ const BORDER_PAGES = 65536; // at least with several materials: a cell where the
  * @param {Manifest} manifest @param {number} [level]
  */
 export function listChunks({ tiles, objects = [] }, level) {
-  const all = [...tiles, ...objects].flatMap(({ chunks, orders }, tile) => chunks.map((entry) => ({ tile, entry, orders })));
-  return level === undefined ? all : all.filter(({ entry }) => entry.level === level);
+  return [...tiles, ...objects].flatMap(({ chunks, orders }, tile) => chunks.map((entry) => ({ tile, entry, orders })))
+    .filter(({ entry }) => level === undefined || entry.level === level);
 }
 
 /** Bytes in the worker, and rows of the record texture, of chunks. @param {{ entry: { count: number } }[]} chunks */

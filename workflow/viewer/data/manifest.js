@@ -30,7 +30,8 @@ import { MAX_RATIO } from "./zip.js";
  *   probability: number, orders: number[], chunks: ChunkEntry[] }} ObjectEntry
  * @typedef {{ format: string, version: number, unit: string, tile_side: number, salt: number, eye_floor: number,
  *   ground_colour: number[], sky: Sky, encoding: import("./layout.js").Encoding, directions: number[][],
- *   levels: LevelEntry[], parts: PartEntry[], composition?: Composition, tiles: TileEntry[], materials: MaterialEntry[],
+ *   levels: LevelEntry[], parts: PartEntry[], composition?: Composition, tiles: TileEntry[],
+ *   materials: MaterialEntry[],
  *   classes?: import("../terrain/classes.js").ClassesEntry, objects?: ObjectEntry[],
  *   scatter?: import("../terrain/scatter.js").ScatterEntry,
  *   heights?: import("../terrain/heights.js").HeightsEntry }} Manifest
@@ -44,6 +45,8 @@ const FORMAT = "davgswt", MAX_SIDE = 4096; // pixels along a side of a height ma
 const MAX_FACE = 1 << 24; // cells along the side of a planet's face
 const WIDEST = 8; // of deviations, in tile sides
 const MAX_TERMS = 64, MAX_OBJECTS = 256, MAX_CELLS = 64; // of a rule; of a terrain; of the scatter along a tile's side
+/** @type {Record<string, number>} */
+const UNITS = { records: PLANES, plain: RECORD }; // bytes of a splat
 const MAX_PARTS = 4096, MAX_UNPACKED = 2 ** 30; // bytes of all parts
 const WHOLE = 1e-9; // relative error of a tile's side in steps
 const MAX_WAVES = 4096; // cells of the jitter along a tile's side
@@ -83,8 +86,8 @@ const PARTS = {
   parts: (parts) => isFilled(parts) && parts.length <= MAX_PARTS && parts.every(isPart)
     && parts.reduce((/** @type {number} */ sum, /** @type {any} */ { kind, size }) => (
       KINDS.has(kind) ? sum + size : sum), 0) <= MAX_UNPACKED,
-  composition: (composition, m) => (composition === undefined
-    ? !m.parts.some((/** @type {any} */ { kind }) => kind === "recipes" || kind === "level") : isComposition(composition, m)),
+  composition: (composition, m) => (composition ? isComposition(composition, m)
+    : composition === undefined && m.parts.every((/** @type {any} */ { kind }) => !KINDS.has(kind) || UNITS[kind])),
   classes: (classes, { materials: { length } }) => (length > 1 ? areClasses(classes, length) : classes === undefined),
   objects: (objects, { materials, tile_side: side }) => objects === undefined
     || (isFilled(objects) && objects.length <= MAX_OBJECTS
@@ -150,18 +153,15 @@ function findChunkFault(m, { chunks, orders }, owner, composed) {
       && (chunk.level < composed ? chunk.part === undefined : isStored(chunk, m.parts));
     if (!sound) return `the chunk of level ${brief(chunk?.level)} of ${owner} contradicts itself. ${REMAKE}`;
     if (chunk.count > MAX_COUNT || chunkBytes(chunk.count) > CACHE_BYTES) {
-      return `level ${chunk.level} of ${owner} has ${chunk.count} splats, more than this page holds. Make smaller tiles.`;
+      return `level ${chunk.level} of ${owner} has ${chunk.count} splats, too many for this page. Make smaller tiles.`;
     }
   }
   return null;
 }
 
 /** Does a part hold the records of a chunk? @param {any} chunk @param {any[]} parts */
-function isStored({ part, first, count }, parts) {
-  const { kind, size } = isNatural(part) && parts[part] || {};
-  return isNatural(first) && ((kind === "records" && PLANES * (first + count) <= size)
-    || (kind === "plain" && RECORD * (first + count) <= size));
-}
+const isStored = ({ part, first, count }, parts) => isNatural(part) && isNatural(first)
+  && UNITS[parts[part]?.kind] * (first + count) <= parts[part]?.size;
 
 /** @param {any} part */
 function isPart(part) {
@@ -170,13 +170,13 @@ function isPart(part) {
   const { kind, file, bytes, size, sha256, level } = part;
   return typeof file === "string" && /^parts\/\w{1,100}\.bin$/.test(file) && isDigest(sha256)
     && isWhole(bytes, 1, MAX_UNPACKED) && isWhole(size, 1, MAX_RATIO * bytes)
-    && (kind !== "records" || size % PLANES === 0) && (kind !== "plain" || (size === bytes && size % RECORD === 0))
+    && size % (UNITS[kind] ?? 1) === 0 && (kind !== "plain" || size === bytes)
     && (kind === "level") === (level !== undefined) && (kind !== "level" || isNatural(level));
 }
 
 /** @param {any} composition @param {any} m */
 function isComposition(composition, { tile_side: long, encoding: { origin, step }, levels, materials, parts }) {
-  const { side, cell, levels: many, exemplars } = composition ?? {};
+  const { side, cell, levels: many, exemplars } = composition;
   if (![side, cell].every((n) => isWhole(n, 1, MAX_STEPS)) || !isWhole(many, 1, levels.length)) return false;
   if (side % 2 ** (many - 1) || !isList(exemplars, materials.length, (m) => isWhole(m, 1, MAX_STEPS))) return false;
   const fits = [0, 1].every((axis) => Math.abs(side * cell * step[axis] - long) <= WHOLE * long

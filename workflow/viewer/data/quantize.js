@@ -48,7 +48,7 @@ export function fitEncoding(sets, side, pixel) {
 }
 
 /**
- * Write Gaussians' records to the beginning of a buffer.
+ * Write Gaussians' records to the beginning of a buffer, and return that.
  *
  * @param {ArrayBuffer} buffer @param {Gaussians} gaussians @param {Encoding} encoding
  */
@@ -67,6 +67,7 @@ export function writeRecords(buffer, { count, centres, logScales, turns, paint }
     }
     bytes.set(paint.subarray(4 * k, 4 * k + 4), at + 12);
   }
+  return buffer;
 }
 
 /** Round; halves to the even number. @param {number} v */

@@ -129,7 +129,7 @@ function createWorkerClient(bundle, { onRecords, onFrame, onError }) {
       post({ kind: "part", index, buffer }, [buffer]);
       await promise(`part ${index}`);
     },
-    /** The records of a chunk, when all parts are there; undefined: the worker was stopped. @param {number} tile @param {number} level */
+    /** Records of a chunk, when all parts are there; undefined: stopped. @param {number} tile @param {number} level */
     recordsOf(tile, level) {
       post({ kind: "ask", id: ++asked, tile, level });
       return promise(`asked ${asked}`);

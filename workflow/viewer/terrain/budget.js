@@ -128,7 +128,8 @@ function arrivedLevels({ tiles }, numbers) {
  * @param {Distances} distances
  */
 function setWish(terrain, cells, { switches, bands, reach }) {
-  const { wish, objects, heights } = terrain, span = { nearest: 0, farthest: 0, lo: 0, hi: 0, whole: false, missing: 0 };
+  const { wish, objects, heights } = terrain;
+  const span = { nearest: 0, farthest: 0, lo: 0, hi: 0, whole: false, missing: 0 };
   wish.fill(0);
   for (const cell of cells) {
     if (cell.nearest >= reach) continue;
@@ -144,7 +145,11 @@ function setWish(terrain, cells, { switches, bands, reach }) {
   }
 }
 
-/** Do the chunks that a view needs fit into its room, beside the coarsest level? @param {TerrainTables} terrain @param {Cell[]} cells @param {Distances} distances */
+/**
+ * Do the chunks that a view needs fit into its room, beside the coarsest level?
+ *
+ * @param {TerrainTables} terrain @param {Cell[]} cells @param {Distances} distances
+ */
 function fitsRoom(terrain, cells, distances) {
   const { tiles, wish, room, levels } = terrain;
   setWish(terrain, cells, distances);

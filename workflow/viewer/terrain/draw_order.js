@@ -105,5 +105,7 @@ export function createDepthSorter() {
     }
     return from.subarray(0, n);
   }
-  return Object.assign((/** @type {Float32Array} */ depths, /** @type {number} */ n) => run(steps(depths, n)), { steps });
+  /** @param {Float32Array} depths @param {number} n */
+  const sort = (depths, n) => run(steps(depths, n));
+  return Object.assign(sort, { steps });
 }

@@ -207,11 +207,8 @@ export class Viewer {
   async settle(budget = BUDGET.most) {
     await this.#restored;
     const renderer = this.scene?.renderer;
-    this.stale = false;
-    if (this.scene) {
-      this.scene.client.ask(this.camera(this.scene), budget, true);
-      await this.scene.client.answered();
-    }
+    this.askWorker(budget, true);
+    await this.scene?.client.answered();
     this.drawFrame();
     // the context may be lost without an event yet, or be back and empty
     if (this.gl.isContextLost() || renderer !== this.scene?.renderer) {
@@ -279,8 +276,8 @@ export class Viewer {
     if (!scene) return;
     scene.renderer?.splats.addRecords(records);
     if (records.level === scene.manifest.levels.length - 1) scene.coarse += 1;
-    // some are composed because a later view may need them
-    if (!this.loaded || scene.frame?.missing.includes(chunkKey(records.tile, records.level))) this.dirty = this.stale = true;
+    const isMissing = scene.frame?.missing.includes(chunkKey(records.tile, records.level));
+    if (!this.loaded || isMissing) this.dirty = this.stale = true; // else it may be needed later
   }
 
   /** @param {import("../worker/frame_builder.js").FrameAnswer} frame */
@@ -319,7 +316,8 @@ export class Viewer {
 /** Place and picture of a scene, in plain values. @param {Scene} scene */
 function describeScene({ manifest, walker, frame, heights }) {
   const { x, y, eye, yaw, pitch } = walker, drawn = frame ? listDrawnCells(frame) : [];
-  const { count = 0, reach, shrink, work = null, missing = [] } = frame ?? {}, under = tileUnder(manifest, heights, x, y);
+  const { count = 0, reach, shrink, work = null, missing = [] } = frame ?? {};
+  const under = tileUnder(manifest, heights, x, y);
   return { x, y, eye, yaw, pitch, under, drawn, count, reach, shrink, work, missing: missing.length };
 }
 

@@ -190,7 +190,8 @@ export function createFrameBuilder(manifest, heights, handlers = {}) {
   function coverAhead() {
     const { i0, j0, next } = ahead, end = Math.min(next + COVER, WINDOW ** 2);
     if (next >= end || terrain.sphere) return false;
-    for (let k = next; k < end; k++) lookUpCell(terrain, i0 + (k % WINDOW) - REACH, j0 + Math.floor(k / WINDOW) - REACH);
+    const west = i0 - REACH, south = j0 - REACH;
+    for (let k = next; k < end; k++) lookUpCell(terrain, west + (k % WINDOW), south + Math.floor(k / WINDOW));
     ahead.next = end;
     return true;
   }
@@ -208,8 +209,8 @@ export function createFrameBuilder(manifest, heights, handlers = {}) {
     /** @param {import("./worker.js").Changes} changes */
     adjust: (changes) => adjustCover(terrain, changes),
     /**
-     * Work ahead between two views: parts that came, batches that were late for the last view, chunks that it lacks, the
-     * cells about its eye that have not been in view yet, then what may be needed next. Returns: is there more to do?
+     * Work ahead between two views: batches that were late for the last view, parts that came, chunks that it lacks,
+     * cells about its eye that have not been in view yet, what may be needed next. Returns: is there more to do?
      *
      * @param {number} milliseconds about as long
      */

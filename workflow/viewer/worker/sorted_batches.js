@@ -202,7 +202,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
       due = [];
       making = null;
     },
-    /** Make a batch between views if there is room: it may be needed next. @param {Source} source @param {number} order */
+    /** Make a batch between views if there is room for it. @param {Source} source @param {number} order */
     prepare: (source, order) => due.push({ source, order, spare: true }),
     /** A step of making a batch that is due. Returns: was there one? @param {number} stamp */
     makeDue(stamp) {

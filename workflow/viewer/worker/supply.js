@@ -1,12 +1,12 @@
 // Where chunks come from: parts are unpacked, and chunks composed of them when a view needs them, the nearest first.
 
 import { createComposer, parseRecords, run } from "../data/compose.js";
-import { chunkKey, listChunks } from "../data/layout.js";
+import { chunkKey } from "../data/layout.js";
 
 /**
  * onChunk: a chunk is at hand; onPart: a part was unpacked.
- * @typedef {import("./chunk_store.js").StoredChunk} StoredChunk
- * @typedef {{ onChunk?: (chunk: StoredChunk) => void, onPart?: (index: number) => void }} Handlers
+ * @typedef {{ onChunk?: (chunk: import("./chunk_store.js").StoredChunk) => void,
+ *   onPart?: (index: number) => void }} Handlers
  */
 
 /**
@@ -29,9 +29,9 @@ export function createSupply(manifest, terrain, store, { onChunk = () => {}, onP
   }
 
   /** @param {number} key */
-  const isThere = (key) => ((terrain.tiles[key >> 4].arrived >> (key & 15)) & 1) === 1;
+  const isLacking = (key) => !((terrain.tiles[key >> 4].arrived >> (key & 15)) & 1);
   /** @param {number} key */
-  const isReady = (key) => !isThere(key) && composer.has(key >> 4, key & 15);
+  const isReady = (key) => isLacking(key) && composer.has(key >> 4, key & 15);
   /** @param {number} key */
   const fits = (key) => isReady(key) && store.hasRoom(terrain.tiles[key >> 4].counts[key & 15]);
 
@@ -42,7 +42,7 @@ export function createSupply(manifest, terrain, store, { onChunk = () => {}, onP
     const parsed = yield* parseRecords(yield* composer.compose(tile, level), manifest.encoding);
     const count = parsed.sizes.length;
     composed += count;
-    if (isThere(key) || !store.add({ tile, level, count, ...parsed }, stamp)) return false;
+    if (!isLacking(key) || !store.add({ tile, level, count, ...parsed }, stamp)) return false;
     onChunk(store.get(tile, level));
     return true;
   }
@@ -96,11 +96,6 @@ export function createSupply(manifest, terrain, store, { onChunk = () => {}, onP
         if (over) jobs.shift();
       }
       return true;
-    },
-    /** Have all chunks at hand whose parts came, for measuring what views cost. */
-    fill() {
-      finish();
-      bringAll(listChunks(manifest).map(({ tile, entry }) => chunkKey(tile, entry.level)));
     },
     /** Records of a chunk, kept or not, whose parts were unpacked. @param {number} tile @param {number} level */
     recordsOf: (tile, level) => run(composer.compose(tile, level)),

@@ -7,6 +7,7 @@ import { createCellCache, forgetCells } from "../terrain/cells.js";
 import { createClasses } from "../terrain/classes.js";
 import { RIM } from "../terrain/frustum.js";
 import { createScatter } from "../terrain/scatter.js";
+import { dot } from "../terrain/sphere.js";
 import { createSphereCells } from "../terrain/sphere_cells.js";
 import { createFraying } from "../terrain/sphere_edges.js";
 
@@ -46,13 +47,13 @@ import { createFraying } from "../terrain/sphere_edges.js";
 export function createTerrainTables(manifest, heights) {
   const { tile_side: side, salt, levels, directions, encoding, materials, objects = [], scatter } = manifest;
   const range = uncertaintyRange(manifest.tiles);
-  const owners = [...manifest.tiles, ...objects.map(({ chunks, orders }) => ({ chunks, orders, uncertainty: range[0] }))];
+  const owners = [...manifest.tiles, ...objects.map((object) => ({ ...object, uncertainty: range[0] }))];
   const tiles = owners.map(({ chunks, orders, uncertainty }, number) => {
     const byLevel = [...chunks].sort((a, b) => a.level - b.level);
     return {
       uncertainty: Math.round(255 * shareOfRange(uncertainty ?? range[0], range)), arrived: 0, alone: [number],
       counts: byLevel.map((chunk) => chunk.count), orders, all: orders.length === directions.length,
-      bytes: byLevel.map((chunk) => chunkBytes(chunk.count)), rows: byLevel.map((chunk) => Math.ceil(chunk.count / ROW)),
+      bytes: byLevel.map(({ count }) => chunkBytes(count)), rows: byLevel.map(({ count }) => Math.ceil(count / ROW)),
     };
   });
   const each = manifest.tiles.length / materials.length, largest = deviationOf(encoding, 255);
@@ -63,7 +64,8 @@ export function createTerrainTables(manifest, heights) {
   /** @type {TerrainTables} */
   const tables = {
     sphere, sphereCells: null, keeper: sphere ? createFraying(sphere, side, salt) : classes,
-    side, salt, directions, nearest: directions.map((_, k) => nearestTwo(directions, k)), heights, tiles, variants: each / 16, each, levels: levels.length, largest, classes,
+    nearest: directions.map((_, k) => nearestTwo(directions, k)),
+    side, salt, directions, heights, tiles, variants: each / 16, each, levels: levels.length, largest, classes,
     objects: objects.map(({ ground }) => ({ ground, extent: 0 })), most: 1 + (scatter?.size ?? 0),
     scatter: scatter ? createScatter(scatter, objects, side, classes) : null,
     deviations: Float64Array.from({ length: 256 }, (_, byte) => deviationOf(encoding, byte)),
@@ -80,11 +82,8 @@ export function createTerrainTables(manifest, heights) {
 }
 
 /** The two directions that are nearest to one of them. @param {number[][]} directions @param {number} k */
-function nearestTwo(directions, k) {
-  /** @param {number} other */
-  const along = (other) => directions[k].reduce((sum, v, n) => sum + v * directions[other][n], 0);
-  return directions.map((_, other) => other).filter((other) => other !== k).sort((a, b) => along(b) - along(a)).slice(0, 2);
-}
+const nearestTwo = (directions, k) => [...directions.keys()].filter((other) => other !== k)
+  .sort((a, b) => dot(directions[k], directions[b]) - dot(directions[k], directions[a])).slice(0, 2);
 
 /**
  * Paint points of the lattice of scores, and forget the cells about them.

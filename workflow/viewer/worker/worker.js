@@ -14,8 +14,7 @@ import { createFrameBuilder } from "./frame_builder.js";
  *   | { kind: "ask", id: number, tile: number, level: number }
  *   | { kind: "paint", points: Int32Array } | { kind: "adjust", changes: Changes }} Request
  *
- * What the worker posts. records: of a chunk that was composed, for the GPU; part: was unpacked; told: records that were
- * asked for.
+ * What the worker posts. records: of a chunk that was composed, for the GPU; part: it was unpacked; told: what was asked.
  * @typedef {{ kind: "records", tile: number, level: number, rows: Uint32Array, records: Uint32Array }} Records
  * @typedef {{ kind: "failed", said: boolean, name: string, message: string }} Failed said: as a PageError
  * @typedef {Records | Failed | { kind: "part", index: number } | { kind: "told", id: number, records: Uint32Array }
