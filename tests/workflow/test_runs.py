@@ -12,6 +12,8 @@ from fixtures.page_visit import Visit
 from fixtures.runs import TINY, USUAL
 from jsonschema import Draft202012Validator
 
+from dav_gswt.bundle.store import read_bundle
+from dav_gswt.export import gswt
 from dav_gswt.field import read_field
 from dav_gswt.files import digest_files, read_json
 from dav_gswt.images import image_files
@@ -115,13 +117,14 @@ def test_uncertainty_lies_between_0_and_1(tiny):
 def test_a_bundle_keeps_its_contract(tiny, root):
     bundle = read_json(tiny.bundle / "davgswt.json")
     Draft202012Validator(read_json(root / "workflow/schemas/davgswt.schema.json")).validate(bundle)
-    chunks = [chunk for tile in bundle["tiles"] for chunk in tile["chunks"]]
-    there = {f"chunks/{p.name}" for p in (tiny.bundle / "chunks").glob("[!.]*")}
-    assert len(chunks) == 16 * len(bundle["levels"]) and {chunk["file"] for chunk in chunks} == there
-    for chunk in chunks:
-        path = tiny.bundle / chunk["file"]
-        assert path.stat().st_size == chunk["bytes"] == chunk["count"] * (16 + 2 * len(chunk["orders"]))
-        assert digest_files(path) == chunk["sha256"]
+    assert all(len(tile["chunks"]) == len(bundle["levels"]) for tile in bundle["tiles"]) and len(bundle["tiles"]) == 16
+    there = {f"parts/{p.name}" for p in (tiny.bundle / "parts").glob("[!.]*")}
+    assert {part["file"] for part in bundle["parts"]} == there
+    assert {part["kind"] for part in bundle["parts"]} >= {"recipes", "level"}
+    for part in bundle["parts"]:
+        path = tiny.bundle / part["file"]
+        assert path.stat().st_size == part["bytes"] and digest_files(path) == part["sha256"]
+    assert {p.name for p in tiny.bundle.iterdir()} == {"davgswt.json", "parts", "terrain"}, "all else is on request"
     source = bundle["provenance"]
     assert {"frame", "levels", "photos", "seams", "tiles"} == set(source["inputs"]) and "level0" in source["tiles"][
         "inputs"
@@ -156,8 +159,8 @@ def test_stills_show_ground_without_holes(made, tiny_config):
 
 def test_a_page_holds_all_that_it_needs(made):
     page = made.terrain / "page"
-    for chunk in (made.bundle / "chunks").glob("[!.]*"):
-        assert digest_files(page / "chunks" / chunk.name) == digest_files(chunk)
+    for part in (made.bundle / "parts").glob("[!.]*"):
+        assert digest_files(page / "parts" / part.name) == digest_files(part)
     assert {"index.html", "main.js", "davgswt.json"} <= {p.name for p in page.iterdir()}
 
 
@@ -174,8 +177,9 @@ def test_a_page_shows_its_ground(made, chromium):
     assert (below.max(2) < 8).mean() < 0.01
 
 
-def test_the_public_renderers_checker_finds_no_fault(made, gswt_checker):
-    command = [sys.executable, gswt_checker, made.bundle / "gswt.zip"]
+def test_the_public_renderers_checker_finds_no_fault(made, gswt_checker, tmp_path):
+    gswt.export_archive(read_bundle(made.bundle), tmp_path / "gswt.zip")
+    command = [sys.executable, gswt_checker, tmp_path / "gswt.zip"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0 and " 0 faults" in done.stdout, done.stdout + done.stderr
 
