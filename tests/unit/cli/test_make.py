@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from pathlib import Path
 
 import pytest
 import yaml
@@ -176,3 +177,12 @@ def test_the_judgement_says_from_how_high_the_ground_looks_sharp():
     (said,) = judgement.describe_sharpness("flying height", None, manifest)
     assert said == "The ground looks sharp from 2 camera heights above it."
     assert not judgement.describe_sharpness("metre", windows, None)
+
+
+def test_help_says_where_the_pages_lie_that_messages_name(capsys):
+    with pytest.raises(SystemExit):
+        main.main(["--help"])
+    said = capsys.readouterr().out.strip()
+    assert "dav-gswt make PHOTOS" in said
+    place = said.rpartition(" lie in ")[2].removesuffix(".")
+    assert (Path(place) / "docs/reference/config.md").is_file() and (Path(place) / "docs/photos.md").is_file()

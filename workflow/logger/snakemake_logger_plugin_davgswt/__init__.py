@@ -47,6 +47,7 @@ STAGES = {  # rules in words
     "select_poses": "choose photos",
     "capture_views": "take photos",
     "update_field": "fit the ground with more photos",
+    "fit_windows": "fit the ground that tiles are cut from",
     "fit_chosen_photos": "fit the ground to the chosen photos",
     "evaluate_round": "judge by test photos",
     "score_round": "score poses",
@@ -57,6 +58,11 @@ STAGES = {  # rules in words
     "make_page": "write the page",
     "render_terrain": "render stills",
     "make_contact_sheet": "lay stills side by side",
+    "export_model": "write the photos' cameras for other programs",
+    "export_terrain": "export a finite terrain",
+    "export_ground": "export the ground",
+    "gather_sweep": "gather the runs of a sweep",
+    "tabulate_timing": "tabulate times",
 }
 ENDINGS = ("Exiting because a job execution failed", "At least one job did not complete")  # said by the caller
 
@@ -95,7 +101,7 @@ class LogHandler(LogHandlerBase):
 
     def _describe_plan(self, jobs: dict[str, int]) -> str:
         self.jobs = jobs["total"] - 1
-        return f"{self.jobs} jobs to do"
+        return f"{self.jobs} job{'s' * (self.jobs != 1)} to do"
 
     def _describe_job(self, job: dict) -> str | None:
         if not job["log"]:  # a rule that only names targets

@@ -31,7 +31,8 @@ AGENTS = {"drone": "plan", "handheld": "handheld", "rig": "serial"}  # --capture
 START, USUAL_ROUND = 8, 4  # photos of the first fit and of a round where a budget is given
 HEAD = """\
 # A terrain of {about}.
-# Change what you like and run `dav-gswt make {folder}` again. Every key: docs/reference/config.md.
+# Change what you like and run `dav-gswt make {folder}` again.
+# Every key: docs/reference/config.md (`dav-gswt --help` says where docs is).
 """
 
 

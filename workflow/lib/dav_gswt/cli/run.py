@@ -108,7 +108,7 @@ def run_workflow(
         print("\nNot finished. What stands above says why; the same command goes on from here.", file=sys.stderr)
         return code, ""
     seconds = time.monotonic() - start
-    return 0, f"{jobs} jobs done in {seconds:.0f} s" if jobs else "Up to date, nothing to do"
+    return 0, f"{jobs} job{'s' * (jobs != 1)} done in {seconds:.0f} s" if jobs else "Up to date, nothing to do"
 
 
 def find_running_processes(folder: Path = Path()) -> list[int]:
