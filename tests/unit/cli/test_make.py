@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from fixtures.frames import scene_frame
 import dav_gswt
 from dav_gswt.cli import judgement, main, make
 from dav_gswt.errors import InputError
-from dav_gswt.geometry.scene_frame import LeftOutPhoto, SfmSign, SfmVerdict, write_scene_frame
+from dav_gswt.geometry.scene_frame import LeftOutPhoto, SfmSign, SfmVerdict, SourceFrame, write_scene_frame
 
 JPEG = b"\xff\xd8\xff\xe0" + b"0" * 40
 
@@ -170,13 +171,21 @@ def test_python_makes_a_terrain_as_the_command_does(folder, monkeypatch):
 
 def test_the_judgement_says_from_how_high_the_ground_looks_sharp():
     manifest, windows = {"eye_floor": 1.96}, {"cell": 0.021, "pixel": 0.014}
-    (said,) = judgement.describe_sharpness("metre", windows, manifest)
+    frame = scene_frame(unit="metre")
+    (said,) = judgement.describe_sharpness(frame, windows, manifest)
     assert said == (
         "The ground looks sharp from 2 m above it: its cells (2.1 cm) are 1.5 times as wide as pixels of the photos."
     )
-    (said,) = judgement.describe_sharpness("flying height", None, manifest)
+    (said,) = judgement.describe_sharpness(replace(frame, unit="flying height"), None, manifest)
     assert said == "The ground looks sharp from 2 camera heights above it."
-    assert not judgement.describe_sharpness("metre", windows, None)
+    splat = replace(
+        frame,
+        unit="flying height",
+        source=SourceFrame((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), 6.5),
+    )
+    (said,) = judgement.describe_sharpness(splat, None, manifest)
+    assert said == "The ground looks sharp from 13 units of the splat above it."
+    assert not judgement.describe_sharpness(frame, windows, None)
 
 
 def test_help_says_where_the_pages_lie_that_messages_name(capsys):

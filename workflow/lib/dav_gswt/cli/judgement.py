@@ -29,15 +29,19 @@ def judge_terrain(
     ground = read_scene_frame(frame)
     found, fitted, bundle = (read_json(path) if path else None for path in (materials, windows, manifest))
     said = [*describe_ground(found), *describe_photos(ground), *describe_quality(ground, metrics)]
-    return said + describe_sharpness(ground.unit, fitted, bundle) + list_scarce(found)
+    return said + describe_sharpness(ground, fitted, bundle) + list_scarce(found)
 
 
-def describe_sharpness(unit: str, fitted: Mapping[str, Any] | None, bundle: Mapping[str, Any] | None) -> list[str]:
+def describe_sharpness(
+    frame: SceneFrame, fitted: Mapping[str, Any] | None, bundle: Mapping[str, Any] | None
+) -> list[str]:
     """From how high the ground looks sharp, and how its cells compare with the pixels of the photos."""
     if bundle is None:
         return []
-    metres = unit == "metre"
+    metres, source = frame.unit == "metre", frame.source
     height = f"{bundle['eye_floor']:.2g} {'m' if metres else 'camera heights'}"
+    if source:
+        height = f"{bundle['eye_floor'] * source.unit:.2g} units of the splat"
     said = f"The ground looks sharp from {height} above it"
     if fitted:
         wide = f" ({100 * fitted['cell']:.2g} cm)" if metres else ""
