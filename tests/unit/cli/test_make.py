@@ -80,6 +80,26 @@ def test_folders_in_the_way_and_other_inputs_are_refused(folder):
     assert (folder / "full/letter.txt").read_text() == "dear"
 
 
+@pytest.mark.parametrize("option", [("--budget", "1"), ("--test", "-1"), ("--cores", "0"), ("--cores", "two")])
+def test_a_number_that_cannot_be_is_a_wrong_call(folder, option, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main.main(["make", "pit", *option])
+    assert stopped.value.code == 2 and f"{option[1]}" in capsys.readouterr().err
+
+
+def test_a_wrong_option_is_not_kept(folder):
+    wrong = {"--preset": ("fast", "no 'fast'; presets has draft"), "--focal": ("-3", "focal")}
+    wrong |= {key: ("nowhere", f"{key} nowhere: there is no such") for key in ("--model", "--masks")}
+    for option, (value, said) in wrong.items():
+        with pytest.raises(InputError, match=said):
+            prepare("pit", option, value)
+        assert not (folder / "pit-terrain").exists()
+    prepare("pit")
+    with pytest.raises(InputError, match="no 'fast'"):
+        prepare("pit", "--preset", "fast")
+    assert "preset" not in scene_of(folder)["scenes"]["pit"]
+
+
 @pytest.mark.parametrize(
     "photos, split", [(16, (8, 2, 4)), (20, (8, 3, 4)), (19, (10, 3, 3)), (8, (8, 0, 1)), (5, (5, 0, 1))]
 )

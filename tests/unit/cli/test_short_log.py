@@ -39,6 +39,14 @@ def test_the_plan_and_the_begin_and_the_end_of_each_job_are_a_line(handler):
     assert handler.describe(failed) == "fit_coarse is not finished; its log: results/logs/a.log"
 
 
+def test_a_log_is_named_from_where_the_run_was_called(handler, tmp_path, monkeypatch):
+    handler.start = tmp_path
+    (tmp_path / "pit-terrain").mkdir()
+    monkeypatch.chdir(tmp_path / "pit-terrain")
+    failed = record(LogEvent.JOB_ERROR, rule_name="fit_coarse", log=["results/logs/a.log"])
+    assert handler.describe(failed) == "fit_coarse is not finished; its log: pit-terrain/results/logs/a.log"
+
+
 def test_every_rule_that_makes_something_has_words(handler, root):
     text = "\n".join(path.read_text(encoding="utf-8") for path in (root / "rules").glob("*.smk"))
     rules = {

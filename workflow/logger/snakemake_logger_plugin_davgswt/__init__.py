@@ -5,6 +5,7 @@
 
 import errno
 import logging
+import os
 import re
 import resource
 import signal
@@ -71,6 +72,7 @@ class LogHandler(LogHandlerBase):
     """Prints a line for the plan, each job's begin and end, each failed job and each error."""
 
     def __post_init__(self) -> None:
+        self.start = Path.cwd()  # of whoever called; Snakemake goes on to the folder of the results
         self.running: dict[int, tuple[str, float]] = {}  # stages of jobs and when they began, by Snakemake's number
         self.jobs = 0  # to do, without the rule that only names the targets
         self.ended = 0  # jobs end in another order than they begin in, so lines are numbered at the end
@@ -117,7 +119,8 @@ class LogHandler(LogHandlerBase):
 
     def _describe_failed_job(self, job: dict) -> str:
         logs = [Path(path) for path in job.get("log") or []]
-        text = f"{job['rule_name']} is not finished; its log: {', '.join(map(str, logs))}"
+        shown = ", ".join(os.path.relpath(path.absolute(), self.start) for path in logs)
+        text = f"{job['rule_name']} is not finished; its log: {shown}"
         return "\n".join([*explain_signal(self.signals.popleft(), logs), text]) if self.signals else text
 
     def _describe_error(self, record: logging.LogRecord) -> str | None:
