@@ -2,8 +2,8 @@
 
 `import_model` takes a folder of COLMAP, a transforms.json (nerfstudio, instant-ngp) or a
 reconstruction.json (OpenSfM, OpenDroneMap), and returns a `Registration`. Positions stay in the
-world of the model, unless GPS says where that is. A further format needs a reader that returns an `ImportedModel`, and a line in
-`_read_model`.
+world of the model, unless GPS says where that is. A further format needs a reader that returns an
+`ImportedModel`, and a line in `_read_model`.
 """
 
 import logging

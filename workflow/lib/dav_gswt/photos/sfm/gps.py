@@ -102,9 +102,9 @@ def align_to_gps(
 ) -> bool:
     """Bring a reconstruction into the frame of the positions, in place, and adjust it with them as priors.
 
-    adjust: False: the cameras are given, and only move as one. at: the positions by the images' names; where they have no altitude the model's own is taken. Returns whether the
-    positions agree with the photos; if not, or if they lie on one line or within the error of receivers, nothing is
-    changed.
+    at: the positions by the images' names; where they have no altitude the model's own is taken. adjust: False: the
+    cameras are given and move as one. Returns whether the positions agree with the photos; if not, or if they lie on
+    one line or within the error of receivers, nothing is changed.
     """
     model = model_from_reconstruction(best)
     filled = fill_altitudes(model, np.stack([at[name] for name in model.names]), np.random.default_rng(seed))
