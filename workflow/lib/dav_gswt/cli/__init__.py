@@ -13,9 +13,9 @@ def at_least(least: int) -> Callable[[str], int]:
     """The type of an option: a whole number, no less than `least`."""
 
     def number(text: str) -> int:
-        if int(text) < least:
-            raise argparse.ArgumentTypeError(f"{text}: must be at least {least}")
-        return int(text)
+        if (value := int(text)) >= least:
+            return value
+        raise argparse.ArgumentTypeError(f"{text}: must be at least {least}")
 
     return number
 

@@ -38,11 +38,9 @@ def describe_sharpness(
     """From how high the ground looks sharp, and how its cells compare with the pixels of the photos."""
     if bundle is None:
         return []
-    metres, source = frame.unit == "metre", frame.source
-    height = f"{bundle['eye_floor']:.2g} {'m' if metres else 'camera heights'}"
-    if source:
-        height = f"{bundle['eye_floor'] * source.unit:.2g} units of the splat"
-    said = f"The ground looks sharp from {height} above it"
+    metres, scale = frame.unit == "metre", frame.source.unit if frame.source else 1
+    unit = "m" if metres else "units of the splat" if frame.source else "camera heights"
+    said = f"The ground looks sharp from {scale * bundle['eye_floor']:.2g} {unit} above it"
     if fitted:
         wide = f" ({100 * fitted['cell']:.2g} cm)" if metres else ""
         said += f": its cells{wide} are {fitted['cell'] / fitted['pixel']:.1f} times as wide as pixels of the photos"
