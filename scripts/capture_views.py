@@ -11,7 +11,7 @@ from dav_gswt.views.selection import read_pose_selection
 
 with logging_to(snakemake.log[0]):
     paths, name = snakemake.input, snakemake.wildcards.scene
-    store = PhotoStore(Path("captures") / name)
+    store = PhotoStore(Path("captures").resolve() / name)
     photos = Path(paths.images).parent
     frame, files = read_scene_frame(paths.frame), (paths.get("field"), paths.get("template", ""))
     site = Site(name, snakemake.params.scene, frame, photos, store, *files)

@@ -83,7 +83,7 @@ def describe_outcome(extreme: Extreme, code: int, output: str, folder: Path) -> 
 def extract_message(output: str) -> str:
     """The error message of a run that failed, as `make run` shows it, without lines of progress."""
     lines = [line for line in output.splitlines() if not line.startswith(PROFILE_NOTE)]
-    all_lines = [line.strip() for line in lines if not line.startswith("[") and "jobs to do" not in line]
+    all_lines = [line.strip() for line in lines if not line.startswith("[") and " to do" not in line]
     ends = [i for i, line in enumerate(lines) if line.startswith("[")]
     last = [line.strip() for line in lines[ends[-1] + 1 :]] if ends else all_lines
     return " / ".join(line for line in last if "is not finished; its log" not in line)

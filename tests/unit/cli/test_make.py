@@ -2,6 +2,8 @@
 
 import argparse
 import json
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import yaml
@@ -10,7 +12,7 @@ from fixtures.frames import scene_frame
 import dav_gswt
 from dav_gswt.cli import judgement, main, make
 from dav_gswt.errors import InputError
-from dav_gswt.geometry.scene_frame import LeftOutPhoto, SfmSign, SfmVerdict, write_scene_frame
+from dav_gswt.geometry.scene_frame import LeftOutPhoto, SfmSign, SfmVerdict, SourceFrame, write_scene_frame
 
 JPEG = b"\xff\xd8\xff\xe0" + b"0" * 40
 
@@ -76,6 +78,26 @@ def test_folders_in_the_way_and_other_inputs_are_refused(folder):
         (folder / "my.yaml").write_text("scene: x")
         prepare("my.yaml")
     assert (folder / "full/letter.txt").read_text() == "dear"
+
+
+@pytest.mark.parametrize("option", [("--budget", "1"), ("--test", "-1"), ("--cores", "0"), ("--cores", "two")])
+def test_a_number_that_cannot_be_is_a_wrong_call(folder, option, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main.main(["make", "pit", *option])
+    assert stopped.value.code == 2 and f"{option[1]}" in capsys.readouterr().err
+
+
+def test_a_wrong_option_is_not_kept(folder):
+    wrong = {"--preset": ("fast", "no 'fast'; presets has draft"), "--focal": ("-3", "focal")}
+    wrong |= {key: ("nowhere", f"{key} nowhere: there is no such") for key in ("--model", "--masks")}
+    for option, (value, said) in wrong.items():
+        with pytest.raises(InputError, match=said):
+            prepare("pit", option, value)
+        assert not (folder / "pit-terrain").exists()
+    prepare("pit")
+    with pytest.raises(InputError, match="no 'fast'"):
+        prepare("pit", "--preset", "fast")
+    assert "preset" not in scene_of(folder)["scenes"]["pit"]
 
 
 @pytest.mark.parametrize(
@@ -169,10 +191,27 @@ def test_python_makes_a_terrain_as_the_command_does(folder, monkeypatch):
 
 def test_the_judgement_says_from_how_high_the_ground_looks_sharp():
     manifest, windows = {"eye_floor": 1.96}, {"cell": 0.021, "pixel": 0.014}
-    (said,) = judgement.describe_sharpness("metre", windows, manifest)
+    frame = scene_frame(unit="metre")
+    (said,) = judgement.describe_sharpness(frame, windows, manifest)
     assert said == (
         "The ground looks sharp from 2 m above it: its cells (2.1 cm) are 1.5 times as wide as pixels of the photos."
     )
-    (said,) = judgement.describe_sharpness("flying height", None, manifest)
+    (said,) = judgement.describe_sharpness(replace(frame, unit="flying height"), None, manifest)
     assert said == "The ground looks sharp from 2 camera heights above it."
-    assert not judgement.describe_sharpness("metre", windows, None)
+    splat = replace(
+        frame,
+        unit="flying height",
+        source=SourceFrame((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), 6.5),
+    )
+    (said,) = judgement.describe_sharpness(splat, None, manifest)
+    assert said == "The ground looks sharp from 13 units of the splat above it."
+    assert not judgement.describe_sharpness(frame, windows, None)
+
+
+def test_help_says_where_the_pages_lie_that_messages_name(capsys):
+    with pytest.raises(SystemExit):
+        main.main(["--help"])
+    said = capsys.readouterr().out.strip()
+    assert "dav-gswt make PHOTOS" in said
+    place = said.rpartition(" lie in ")[2].removesuffix(".")
+    assert (Path(place) / "docs/reference/config.md").is_file() and (Path(place) / "docs/photos.md").is_file()

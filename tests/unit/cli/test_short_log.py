@@ -1,6 +1,7 @@
 """The short log of `make run`: a plugin of Snakemake that prints its events in a line each."""
 
 import logging
+import re
 import sys
 from types import SimpleNamespace
 
@@ -30,12 +31,29 @@ END = record(LogEvent.JOB_FINISHED, job_id=3)
 
 
 def test_the_plan_and_the_begin_and_the_end_of_each_job_are_a_line(handler):
-    lines = ["1 jobs to do", "[1 of 1] fit the ground ...", "[1 of 1] fit the ground: 0 s"]
+    lines = ["1 job to do", "[1 of 1] fit the ground ...", "[1 of 1] fit the ground: 0 s"]
     assert [handler.describe(each) for each in (PLAN, JOB, END)] == lines
     assert handler.describe(record(LogEvent.JOB_FINISHED, job_id=4)) is None
     assert handler.describe(record(LogEvent.JOB_INFO, rule_name="all", log=[])) is None
     failed = record(LogEvent.JOB_ERROR, rule_name="fit_coarse", log=["results/logs/a.log"])
     assert handler.describe(failed) == "fit_coarse is not finished; its log: results/logs/a.log"
+
+
+def test_a_log_is_named_from_where_the_run_was_called(handler, tmp_path, monkeypatch):
+    handler.start = tmp_path
+    (tmp_path / "pit-terrain").mkdir()
+    monkeypatch.chdir(tmp_path / "pit-terrain")
+    failed = record(LogEvent.JOB_ERROR, rule_name="fit_coarse", log=["results/logs/a.log"])
+    assert handler.describe(failed) == "fit_coarse is not finished; its log: pit-terrain/results/logs/a.log"
+
+
+def test_every_rule_that_makes_something_has_words(handler, root):
+    text = "\n".join(path.read_text(encoding="utf-8") for path in (root / "rules").glob("*.smk"))
+    rules = {
+        name for name, body in re.findall(r"^rule (\w+):\n((?:(?!^rule ).*\n)*)", text, re.M) if "    log:" in body
+    }
+    words = sys.modules[type(handler).__module__].STAGES
+    assert "fit_windows" in rules and not rules - set(words)
 
 
 def test_jobs_are_numbered_in_the_order_in_which_they_end(handler):

@@ -54,6 +54,46 @@ def test_roofs_hedges_woods_and_trenches_are_in_no_tile_and_a_heap_is_ground(fol
     assert "left out: 3 roofs, hedges or canopies" in caplog.text
 
 
+def average_cells(maps, factor, rng):
+    """The maps as a draft has them: wider cells, softer colours, and heights with specks."""
+    cells = maps.cells // factor
+
+    def average(layer):
+        return layer.reshape(cells, factor, cells, factor, *layer.shape[2:]).mean((1, 3))
+
+    place = replace(maps.exemplar, spacing=factor * maps.exemplar.spacing, cells=cells)
+    layers = {name: average(getattr(maps, name)) for name in ("colour", "height", "cover")}
+    surface = average(maps.surface) + 3 * place.spacing * (rng.random((cells, cells)) < 0.01)
+    return replace(maps, **layers, surface=surface, known=np.ones((cells, cells), bool), exemplar=place), average
+
+
+def test_with_the_wider_cells_of_a_draft_no_piece_of_what_is_left_out_is_an_object():
+    """The hedge is too low there to stand, and its ends are blobs."""
+    maps, average = average_cells(built_up(), 2, np.random.default_rng(1))
+    shrub = average((np.hypot(ROWS - 80, COLUMNS - 30) <= 6).astype(float))  # this is an object
+    colour = np.where(shrub[..., None] > 0.5, made.SHRUB, maps.colour)
+    plan = build.plan_ground(replace(maps, colour=colour, surface=maps.surface + 6 * made.SPACING * shrub), True)
+    (thing,) = (each.cells for each in plan.classes.footprints)
+    assert thing[shrub > 0.5].mean() > 0.7
+    for cells in (ROOF, HEDGE, CANOPY, TRENCH):
+        assert not (thing & (average(cells.astype(float)) > 0)).any()
+
+
+@pytest.mark.parametrize("factor", [1, 2])
+def test_pipes_are_left_out_whole(factor):
+    """Three that lie side by side, as high as they are wide."""
+    maps = made.maps(mixed=False)
+    pipes = np.any([box(66 + 12 * k, 74 + 12 * k, 70 - 3 * k, 120 - 3 * k) for k in range(3)], 0) & ~made.shrub_cells()
+    colour = np.where(pipes[..., None], [0.5, 0.35, 0.3], maps.colour)
+    maps = replace(maps, colour=colour, surface=maps.surface + 8 * made.SPACING * pipes, cover=maps.cover + pipes)
+    maps, average = average_cells(maps, factor, np.random.default_rng(1))
+    plan = build.plan_ground(maps, True)
+    lying = average(pipes.astype(float)) > 0.5
+    assert len(plan.classes.footprints) == len(made.SHRUBS)
+    assert not any((each.cells & lying).any() for each in plan.classes.footprints)
+    assert not np.any([source[lying].any() for source in plan.sources])
+
+
 def test_people_may_name_what_stands(tmp_path):
     from dav_gswt.images import image_files
 

@@ -80,12 +80,15 @@ def test_start_views_are_connected_by_points(flown):
         assert np.linalg.norm(at[:, None] - at, axis=2)[~np.eye(len(at), dtype=bool)].min() > 0.3  # of steps of 0.25
 
 
-def test_photos_of_other_ground_take_no_part(flown):
+def test_photos_of_other_ground_take_no_part_and_are_counted(flown, caplog):
     """An exemplar in one corner: photos of the opposite corner do not see it."""
     frame = scene_frame(exemplar=(-0.9, -0.9, 0.6))
     parts = split(flown, start=4, frame=frame)
     named = [name for part in astuple(parts) for name in part]
     assert 6 <= len(named) < 30
+    assert caplog.messages == [
+        f"{30 - len(named)} of 30 photos show little of the ground that counts, and take no part"
+    ]
     ground = (-0.9, -0.9, -0.3, -0.3)
     assert all(measure_visible_share(flown.camera(n), ground) >= view_split.MIN_VISIBLE_SHARE for n in named)
 

@@ -5,6 +5,7 @@
 
 import errno
 import logging
+import os
 import re
 import resource
 import signal
@@ -47,6 +48,7 @@ STAGES = {  # rules in words
     "select_poses": "choose photos",
     "capture_views": "take photos",
     "update_field": "fit the ground with more photos",
+    "fit_windows": "fit the ground that tiles are cut from",
     "fit_chosen_photos": "fit the ground to the chosen photos",
     "evaluate_round": "judge by test photos",
     "score_round": "score poses",
@@ -57,6 +59,11 @@ STAGES = {  # rules in words
     "make_page": "write the page",
     "render_terrain": "render stills",
     "make_contact_sheet": "lay stills side by side",
+    "export_model": "write the photos' cameras for other programs",
+    "export_terrain": "export a finite terrain",
+    "export_ground": "export the ground",
+    "gather_sweep": "gather the runs of a sweep",
+    "tabulate_timing": "tabulate times",
 }
 ENDINGS = ("Exiting because a job execution failed", "At least one job did not complete")  # said by the caller
 
@@ -65,6 +72,7 @@ class LogHandler(LogHandlerBase):
     """Prints a line for the plan, each job's begin and end, each failed job and each error."""
 
     def __post_init__(self) -> None:
+        self.start = Path.cwd()  # of whoever called; Snakemake goes on to the folder of the results
         self.running: dict[int, tuple[str, float]] = {}  # stages of jobs and when they began, by Snakemake's number
         self.jobs = 0  # to do, without the rule that only names the targets
         self.ended = 0  # jobs end in another order than they begin in, so lines are numbered at the end
@@ -95,7 +103,7 @@ class LogHandler(LogHandlerBase):
 
     def _describe_plan(self, jobs: dict[str, int]) -> str:
         self.jobs = jobs["total"] - 1
-        return f"{self.jobs} jobs to do"
+        return f"{self.jobs} job{'s' * (self.jobs != 1)} to do"
 
     def _describe_job(self, job: dict) -> str | None:
         if not job["log"]:  # a rule that only names targets
@@ -111,7 +119,8 @@ class LogHandler(LogHandlerBase):
 
     def _describe_failed_job(self, job: dict) -> str:
         logs = [Path(path) for path in job.get("log") or []]
-        text = f"{job['rule_name']} is not finished; its log: {', '.join(map(str, logs))}"
+        shown = ", ".join(os.path.relpath(path.absolute(), self.start) for path in logs)
+        text = f"{job['rule_name']} is not finished; its log: {shown}"
         return "\n".join([*explain_signal(self.signals.popleft(), logs), text]) if self.signals else text
 
     def _describe_error(self, record: logging.LogRecord) -> str | None:

@@ -22,6 +22,7 @@ from fixtures.imported_models import (
 )
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.images import image_files
 from dav_gswt.photos import importers
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
@@ -238,6 +239,34 @@ def test_of_several_reconstructions_the_largest_is_taken_and_a_reference_makes_i
     assert found.positions.at == pytest.approx(np.array([c.centre for c in found.model.cameras]))
     whole["reference_lla"] = dict.fromkeys(whole["reference_lla"], 0.0)  # what OpenSfM counts from without GPS
     assert importers._read_model(write_json(tmp_path / "r.json", [whole]), PhotoFolder(photos)).about is None
+
+
+def test_a_model_without_a_place_gets_metres_from_positions_that_agree(photos, tmp_path):
+    for name in SCENE.names:
+        (tmp_path / "images").mkdir(exist_ok=True)
+        (tmp_path / "images" / name).symlink_to(photos / name)
+    write_colmap(tmp_path / "sparse", sees=True)
+    given = import_model(tmp_path / "sparse", tmp_path / "images", OPTIONS)
+    centres = np.stack([camera.centre for camera in given.model.cameras])
+    place, metres = Georeference(48.1, 11.5, 520.0, north=0.0, metres_per_unit=1.0), 200.0
+
+    def write_places(at):
+        rows = [
+            f"{n} {p[1]:.9f} {p[0]:.9f} {p[2]:.6f}" for n, p in zip(given.model.names, place.to_earth(at), strict=True)
+        ]
+        (tmp_path / "geo.txt").write_text("\n".join(["EPSG:4326", *rows]))
+
+    write_places(metres * centres)
+    found = import_model(tmp_path / "sparse", tmp_path / "images", OPTIONS)
+    assert given.positions is None and found.positions.about.latitude == pytest.approx(48.1, abs=0.01)
+    moved = np.stack([camera.centre for camera in found.model.cameras])
+    apart, apart_before = (np.linalg.norm(at[:, None] - at, axis=2) for at in (moved, centres))
+    assert apart == pytest.approx(metres * apart_before, abs=0.01)
+    assert found.error == pytest.approx(given.error, abs=1e-6)  # the cameras moved as one
+    write_places(metres * centres[::-1] * [1, -1, 3])
+    wrong = import_model(tmp_path / "sparse", tmp_path / "images", OPTIONS)
+    assert wrong.positions is None
+    assert [c.centre.tolist() for c in wrong.model.cameras] == [c.centre.tolist() for c in given.model.cameras]
 
 
 def read_transforms(values, photos):

@@ -119,7 +119,11 @@ def test_signs_are_weighed_together(found, grade):
     ("found", "message"),
     [
         ([("tilt", "refused"), ("relief", "refused")], "show no ground: a reason; a reason. Photograph an open patch"),
-        ([("tilt", "refused"), ("reprojection error", "refused")], "do not fit together to one scene"),
+        ([("tilt", "refused"), ("reprojection error", "refused")], "do not fit together to one scene.* it is wrong$"),
+        (
+            [("tilt", "refused"), ("relief", "doubtful"), ("hangs together", "doubtful")],
+            "do not fit together to one scene.* a room or a table: Photograph an open patch",
+        ),
     ],
 )
 def test_a_refused_model_says_what_to_photograph_or_to_mend(found, message):

@@ -3,9 +3,21 @@
 import argparse
 import signal
 import sys
+from collections.abc import Callable
 
 from dav_gswt.errors import InputError
 from dav_gswt.logs import describe_os_error
+
+
+def at_least(least: int) -> Callable[[str], int]:
+    """The type of an option: a whole number, no less than `least`."""
+
+    def number(text: str) -> int:
+        if (value := int(text)) >= least:
+            return value
+        raise argparse.ArgumentTypeError(f"{text}: must be at least {least}")
+
+    return number
 
 
 def run_safely(options: argparse.Namespace) -> int:

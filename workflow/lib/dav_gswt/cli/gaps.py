@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.capture.drone import plan_flight
+from dav_gswt.cli import at_least
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
 from dav_gswt.geometry.scene_frame import SceneFrame
@@ -52,7 +53,7 @@ def add_command(commands) -> None:
     parser.add_argument("-o", "--out", type=Path, metavar="FOLDER", help="where it is written (default: NAME-gaps)")
     parser.add_argument("--model", type=Path, help="known cameras: COLMAP, nerfstudio or OpenSfM")
     parser.add_argument("--focal", type=float, metavar="MM", help="focal length (35 mm equivalent) where EXIF has none")
-    parser.add_argument("--cores", type=int, default=default_threads())
+    parser.add_argument("--cores", type=at_least(1), default=default_threads())
     parser.set_defaults(run=_run)
 
 

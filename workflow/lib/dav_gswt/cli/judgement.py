@@ -29,16 +29,18 @@ def judge_terrain(
     ground = read_scene_frame(frame)
     found, fitted, bundle = (read_json(path) if path else None for path in (materials, windows, manifest))
     said = [*describe_ground(found), *describe_photos(ground), *describe_quality(ground, metrics)]
-    return said + describe_sharpness(ground.unit, fitted, bundle) + list_scarce(found)
+    return said + describe_sharpness(ground, fitted, bundle) + list_scarce(found)
 
 
-def describe_sharpness(unit: str, fitted: Mapping[str, Any] | None, bundle: Mapping[str, Any] | None) -> list[str]:
+def describe_sharpness(
+    frame: SceneFrame, fitted: Mapping[str, Any] | None, bundle: Mapping[str, Any] | None
+) -> list[str]:
     """From how high the ground looks sharp, and how its cells compare with the pixels of the photos."""
     if bundle is None:
         return []
-    metres = unit == "metre"
-    height = f"{bundle['eye_floor']:.2g} {'m' if metres else 'camera heights'}"
-    said = f"The ground looks sharp from {height} above it"
+    metres, scale = frame.unit == "metre", frame.source.unit if frame.source else 1
+    unit = "m" if metres else "units of the splat" if frame.source else "camera heights"
+    said = f"The ground looks sharp from {scale * bundle['eye_floor']:.2g} {unit} above it"
     if fitted:
         wide = f" ({100 * fitted['cell']:.2g} cm)" if metres else ""
         said += f": its cells{wide} are {fitted['cell'] / fitted['pixel']:.1f} times as wide as pixels of the photos"

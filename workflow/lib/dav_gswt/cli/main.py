@@ -1,4 +1,4 @@
-"""`dav-gswt`: the commands beside `make run` and `make view`."""
+"""Photos of ground become an endless terrain: `dav-gswt make PHOTOS`, then `dav-gswt view`."""
 
 import argparse
 import sys
@@ -6,13 +6,16 @@ from pathlib import Path
 
 from dav_gswt.cli import export, gaps, make, run_safely
 from dav_gswt.errors import InputError
+from dav_gswt.files import REPOSITORY
 from dav_gswt.inspect import command as inspect
 from dav_gswt.terrain import serve
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command. Returns the exit status: 1, with a message, where the input cannot be used."""
-    parser = argparse.ArgumentParser(prog="dav-gswt", description=__doc__)
+    pages = f"Pages whose names begin with docs/ lie in {REPOSITORY}."
+    whole = argparse.RawDescriptionHelpFormatter  # breaks no path
+    parser = argparse.ArgumentParser(prog="dav-gswt", description=__doc__, epilog=pages, formatter_class=whole)
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     make.add_command(commands)
     gaps.add_command(commands)

@@ -18,7 +18,7 @@ from typing import Any
 
 import yaml
 
-from dav_gswt.cli import run
+from dav_gswt.cli import at_least, run
 from dav_gswt.cli.judgement import judge_terrain
 from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.errors import InputError
@@ -31,7 +31,8 @@ AGENTS = {"drone": "plan", "handheld": "handheld", "rig": "serial"}  # --capture
 START, USUAL_ROUND = 8, 4  # photos of the first fit and of a round where a budget is given
 HEAD = """\
 # A terrain of {about}.
-# Change what you like and run `dav-gswt make {folder}` again. Every key: docs/reference/config.md.
+# Change what you like and run `dav-gswt make {folder}` again.
+# Every key: docs/reference/config.md (`dav-gswt --help` says where docs is).
 """
 
 
@@ -60,10 +61,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", type=Path, help="known cameras: COLMAP, nerfstudio or OpenSfM")
     parser.add_argument("--masks", type=Path, metavar="FOLDER", help="masks named as the photos: black is no ground")
     parser.add_argument("--focal", type=float, metavar="MM", help="focal length (35 mm equivalent) where EXIF has none")
-    parser.add_argument("--test", type=int, metavar="N", help="photos set aside to judge the result")
-    parser.add_argument("--budget", type=int, metavar="N", help="use N photos, chosen where they matter most")
+    parser.add_argument("--test", type=at_least(0), metavar="N", help="photos set aside to judge the result")
+    parser.add_argument("--budget", type=at_least(2), metavar="N", help="use N photos, chosen where they matter most")
     parser.add_argument("--capture", choices=AGENTS, help="who takes photos that do not exist yet")
-    parser.add_argument("--cores", type=int, default=os.cpu_count() or 2)
+    parser.add_argument("--cores", type=at_least(1), default=os.cpu_count() or 2)
     parser.set_defaults(run=_run)
 
 
@@ -102,12 +103,13 @@ def prepare_scene(options: argparse.Namespace) -> tuple[Path, dict[str, Any]]:
         print(f"{', '.join(map(str, options.input))}: {recognised.about}")
         given = read_earlier(out, recognised)
     changed, path = apply_options(given, options), out / SCENE_FILE
+    settings = load_settings(changed)  # before they are written: a wrong option is not kept
     if not path.is_file() and recognised:
         write_scene(path, changed, HEAD.format(about=recognised.about, folder=out))
     elif changed != given:
         lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
         write_scene(path, changed, "".join(takewhile(lambda line: line.startswith("#"), lines)))
-    return out, load_scene(out)
+    return out, settings
 
 
 def name_terrain(source: Path) -> Path:
@@ -154,6 +156,8 @@ def apply_options(given: Mapping[str, Any], options: argparse.Namespace) -> dict
             entry[key] = getattr(options, key)
     for key in ("model", "masks"):
         if (path := getattr(options, key)) is not None:
+            if not path.exists():
+                raise InputError(f"--{key} {path}: there is no such file or folder")
             entry[key] = str(path.resolve())
     settings = dict(given)
     if options.budget is not None:
@@ -179,10 +183,10 @@ def write_scene(path: Path, settings: Mapping[str, Any], head: str) -> None:
         part.write_text(head + yaml.safe_dump(dict(settings), sort_keys=False, width=100), encoding="utf-8")
 
 
-def load_scene(out: Path) -> dict[str, Any]:
-    """The config of a terrain's folder, with all defaults. Raises: InputError."""
-    files = [REPOSITORY / run.CONFIG, *run.select_overlays(REPOSITORY), out / SCENE_FILE]
-    return check_config(add_scene_files(read_config(files), REPOSITORY / run.SCENES))
+def load_settings(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The config with the settings of a scene.yaml, and all defaults. Raises: InputError."""
+    files = [REPOSITORY / run.CONFIG, *run.select_overlays(REPOSITORY)]
+    return check_config(add_scene_files(read_config(files, given), REPOSITORY / run.SCENES))
 
 
 def run_scene(out: Path, settings: dict[str, Any], cores: int) -> int:

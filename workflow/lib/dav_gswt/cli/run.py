@@ -14,7 +14,7 @@ from pathlib import Path
 
 import psutil
 
-from dav_gswt.cli import run_safely
+from dav_gswt.cli import at_least, run_safely
 from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.errors import InputError
 from dav_gswt.paths import RESULTS, encode_branch, stage_folder
@@ -34,7 +34,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the workflow, or serve its page. Returns the exit status, 130 after a signal."""
     parser = argparse.ArgumentParser(prog="python -m dav_gswt.cli.run", description=__doc__)
     parser.add_argument("--scene", help="a scene of config/scenes or config/config.yaml (default: its `scene`)")
-    parser.add_argument("--cores", type=int, default=2)
+    parser.add_argument("--cores", type=at_least(1), default=2)
     parser.add_argument("--configfile", nargs="+", type=Path, default=[], help="override config/config.yaml, in order")
     parser.add_argument("--view", action="store_true", help="serve the scene's page on this machine")
     parser.add_argument("--port", type=int, default=8000)
@@ -108,7 +108,7 @@ def run_workflow(
         print("\nNot finished. What stands above says why; the same command goes on from here.", file=sys.stderr)
         return code, ""
     seconds = time.monotonic() - start
-    return 0, f"{jobs} jobs done in {seconds:.0f} s" if jobs else "Up to date, nothing to do"
+    return 0, f"{jobs} job{'s' * (jobs != 1)} done in {seconds:.0f} s" if jobs else "Up to date, nothing to do"
 
 
 def find_running_processes(folder: Path = Path()) -> list[int]:

@@ -305,7 +305,8 @@ def _read_pixels(file, path: Path | str, channels: int) -> Float32[Array, "h w c
     finally:
         file.close()
     if pixels is None or trouble:
-        raise InputError(f"{path}: damaged or cut short ({summarize_error(trouble)}); copy it again or remove it")
+        reason = summarize_error(str(trouble).replace(f' ("{path}")', ""))  # it is named already
+        raise InputError(f"{path}: damaged or cut short ({reason}); copy it again or remove it")
     return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
 
 

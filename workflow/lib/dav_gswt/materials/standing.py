@@ -31,6 +31,7 @@ COLOUR_SHARE = 1 / 3  # of that contrast of colour, that a thing which rises mus
 LEAST_DIFFERENCE = 2.5  # weighed CIELAB units between a thing and its ring
 CROWDED = 0.2, 0.3  # share of the ring that looks like the thing, or is nearly as high, from which it is one of many
 SIZES = 0.25, 2.2  # area of a thing over that of its blob's disc
+BEYOND = 0.04  # of a thing's area: where more goes on beyond its blob, as along a hedge, it is a piece
 RISE_WEIGHT = 4.0  # CIELAB units that a cell of height counts in the outline
 
 
@@ -101,7 +102,8 @@ def _compare(contrast: Float[Array, "m m"], around: Surroundings, least: float) 
 
 
 def trace_outline(layers: Float[Array, "m m k"], blob: Blob) -> Bool[Array, "m m"] | None:
-    """The cells of a blob's thing; None if it is one of many, is not as large as its blob, or differs too little.
+    """The cells of a blob's thing; None if it is one of many, is not as large as its blob, goes on beyond it, or
+    differs too little.
 
     layers: weighed height, then colours.
     """
@@ -119,8 +121,10 @@ def trace_outline(layers: Float[Array, "m m k"], blob: Blob) -> Bool[Array, "m m
     axis = (inner - outer) / spread
     along = (values @ axis - outer @ axis) / max(float((inner - outer) @ axis), 1e-9)  # 0 in the ring, 1 in the core
     pieces, _ = label(binary_opening(along > 0.5, np.ones((2, 2), bool)) | (away < 1.5))
-    own = pieces == pieces[blob.row - top, blob.column - left]
-    own = binary_fill_holes(own) & (away <= 1.3 * blob.diameter)
+    whole = binary_fill_holes(pieces == pieces[blob.row - top, blob.column - left])
+    own = whole & (away <= 1.3 * blob.diameter)
+    if (whole & ~own).sum() > BEYOND * own.sum():
+        return None
     area = np.pi * (blob.diameter / 2) ** 2
     if not SIZES[0] * area < own.sum() < SIZES[1] * area or _is_crowded(values, along, own, blob):
         return None

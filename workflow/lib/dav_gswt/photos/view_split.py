@@ -82,7 +82,8 @@ def split_views(
     if not others:
         raise InputError("every image is a test view; leave some to start from")
     if len(among) < len(model.names):
-        _log.info("%d of %d images show enough of the ground to take part", len(among), len(model.names))
+        few = "%d of %d photos show little of the ground that counts, and take no part"
+        _log.warning(few, len(model.names) - len(among), len(model.names))
     first = choose_start_views(model, others, start or len(others), rng)
     pool = [i for i in others if i not in first]
     return ViewSplit(*(tuple(model.names[i] for i in part) for part in (first, pool, tests)))

@@ -73,7 +73,7 @@ def create_server(folder: Path | str, port: int) -> ThreadingHTTPServer:
     Raises: InputError: the folder has no page, or the port cannot be bound.
     """
     if not (Path(folder) / "index.html").is_file():
-        raise InputError(f"{folder}: no page here (index.html is missing); `make run` makes one")
+        raise InputError(f"{folder}: no page here (index.html is missing); `dav-gswt make PHOTOS` makes one")
     try:
         return _Server((HOST, port), partial(_Handler, directory=str(folder)))
     except (OSError, OverflowError) as error:

@@ -2,8 +2,8 @@
 
 `import_model` takes a folder of COLMAP, a transforms.json (nerfstudio, instant-ngp) or a
 reconstruction.json (OpenSfM, OpenDroneMap), and returns a `Registration`. Positions stay in the
-world of the model. A further format needs a reader that returns an `ImportedModel`, and a line in
-`_read_model`.
+world of the model, unless GPS says where that is. A further format needs a reader that returns an
+`ImportedModel`, and a line in `_read_model`.
 """
 
 import logging
@@ -28,7 +28,7 @@ from dav_gswt.photos.importers.opensfm import import_opensfm
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder, match_photos_to_images
 from dav_gswt.photos.photo_listing import Source
 from dav_gswt.photos.recognition import find_colmap_folder
-from dav_gswt.photos.sfm.gps import GpsPositions
+from dav_gswt.photos.sfm.gps import GpsPositions, align_to_gps, read_gps_positions
 from dav_gswt.photos.sfm.mapping import LEAST_PHOTOS
 from dav_gswt.photos.sfm.registration import (
     NEIGHBOURS,
@@ -49,7 +49,8 @@ def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Regis
     A photo belongs to the image of the same name: the path below the folder, else the file name whose last folders
     agree, whatever machine the path is of. No file outside the folder is read. A photo may be a scaled copy. The points
     are those of the model if it says which image sees them. Otherwise they are triangulated from features under the
-    given cameras.
+    given cameras. A model that names no place on earth gets metres and north from GPS positions of its photos, if they
+    agree.
     Raises: InputError: not a model, damaged, one that is not read, or fewer than three photos have a camera in it.
     """
     path, photos = Path(path), PhotoFolder(folder)
@@ -65,6 +66,10 @@ def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Regis
     known, sources = _place_photos(placed, given.points), {place.key: place.path for place in placed}
     if not known.num_points3D():
         known = _find_points(known, sources, options)
+    positions = None if given.about else read_gps_positions(list(sources.values()))
+    at = dict(zip(sources, positions.at, strict=True)) if positions else {}
+    if positions and not align_to_gps(known, at, options.seed, adjust=False):
+        positions = None
     model, lenses = replace_lenses(known, {p.key: (p.lens.width, p.lens.height) for p in placed}, options.side)
     for name, camera, lens in zip(model.names, model.cameras, lenses, strict=True):
         require_invertible(lens, camera, f"{path}: {sources[name].name}")
@@ -82,7 +87,7 @@ def import_model(path: Path | str, folder: Source, options: SfmOptions) -> Regis
         left_out=left_out,
         focal=None,
         error=float(reprojection_errors(model).mean()),
-        positions=GpsPositions(given.about, centres) if given.about else None,
+        positions=GpsPositions(given.about, centres) if given.about else positions,
     )
 
 

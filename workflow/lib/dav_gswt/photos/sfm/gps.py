@@ -97,12 +97,14 @@ def fill_altitudes(model: ColmapModel, at: Float[Array, "n 3"], rng: np.random.G
     return np.c_[at[:, :2], scale * heights]
 
 
-def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]], seed: int = 0) -> bool:
+def align_to_gps(
+    best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]], seed: int = 0, adjust: bool = True
+) -> bool:
     """Bring a reconstruction into the frame of the positions, in place, and adjust it with them as priors.
 
-    at: the positions by the images' names; where they have no altitude the model's own is taken. Returns whether the
-    positions agree with the photos; if not, or if they lie on one line or within the error of receivers, nothing is
-    changed.
+    at: the positions by the images' names; where they have no altitude the model's own is taken. adjust: False: the
+    cameras are given and move as one. Returns whether the positions agree with the photos; if not, or if they lie on
+    one line or within the error of receivers, nothing is changed.
     """
     model = model_from_reconstruction(best)
     filled = fill_altitudes(model, np.stack([at[name] for name in model.names]), np.random.default_rng(seed))
@@ -122,6 +124,9 @@ def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]
         _log.warning("the photos' GPS positions are %.0f m off where the photos themselves place them: unused", off)
         return False
     best.transform(pycolmap.Sim3d(scale, pycolmap.Rotation3d(turn), shift))
+    _log.info("GPS: the photos lie in metres, %.1f m from their positions (median)", off)
+    if not adjust:
+        return True
     priors = [
         pycolmap.PosePrior(
             corr_data_id=best.images[i].data_id,
@@ -132,7 +137,6 @@ def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]
         for i, position in zip(numbers, positions, strict=True)
     ]
     bundle_adjust(best, priors=priors)
-    _log.info("GPS: the photos lie in metres, %.1f m from their positions (median)", off)
     return True
 
 

@@ -187,8 +187,9 @@ def require_trust(verdict: SfmVerdict) -> None:
     names = {sign.name for sign in verdict.objections}
     if names & {"tilt", "relief"} and names <= SHAPE:
         raise InputError(f"the photos show no ground: {reasons}. {PHOTOGRAPH_GROUND}")
-    tried = f" (tried: {'; '.join(verdict.tried)})" if len(verdict.tried) > 1 else ""
+    tried = f" ({len(verdict.tried)} ways were tried; the log has what each gave)" if len(verdict.tried) > 1 else ""
+    indoors = f". If they show a room or a table: {PHOTOGRAPH_GROUND}" if {"tilt", "relief"} <= names else ""
     raise InputError(
         f"the photos do not fit together to one scene: {reasons}{tried}. Take photos that overlap more and show "
-        "texture, give the scene's `focal` if EXIF is wrong, or remove GPS from the photos if it is wrong"
+        f"texture, give the scene's `focal` if EXIF is wrong, or remove GPS from the photos if it is wrong{indoors}"
     )
