@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from fixtures import mixed_ground as made
 
+from dav_gswt.bundle import build as bundles
+from dav_gswt.bundle.store import read_bundle
 from dav_gswt.errors import InputError
+from dav_gswt.lod import store as levels
 from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.materials import build as materials
 from dav_gswt.materials import store as material_store
@@ -47,9 +50,10 @@ def test_tiles_that_a_material_has_no_room_for_are_refused(sets):
         build.cut_materials(narrow, replace(OPTIONS, share=0.8), None, np.random.default_rng)
 
 
-def test_tiles_of_several_materials_are_written_and_read(tiles, tmp_path):
+def test_tiles_of_several_materials_are_written_and_read(tiles, sets, tmp_path):
+    levels.write_levels(sets, tmp_path / "levels", {})
     store.write_tiles(tiles, tmp_path / "tiles", tmp_path / "seams.json", {})
-    read = store.read_material_tiles(tmp_path / "tiles", tmp_path / "seams.json")
+    read = store.read_material_tiles(tmp_path / "tiles", tmp_path / "seams.json", tmp_path / "levels")
     assert len(read) == 2
     for one, two in zip(read, tiles, strict=True):
         np.testing.assert_array_equal(one.fields[-1][3].means, two.fields[-1][3].means)
@@ -65,6 +69,14 @@ def test_a_bundle_is_made_of_tiles_materials_and_objects(found, tiles, tmp_path,
     assert [each.name for each in content.materials] == ["material0", "material1"]
     assert len(content.objects) == len(found.objects)
     assert content.classes is not None and content.scatter is not None
+    bundles.write_bundle(content, tmp_path / "bundle", bundles.BundleOptions(tau=0.5), {})
+    bundle, each = read_bundle(tmp_path / "bundle"), len(tiles[0].labels)
+    assert bundle.manifest.composition.exemplars == [own.recipe.levels[0].exemplar.cells for own in tiles]
+    for number in (0, each + 3):  # of either material
+        cut, composed = tiles[number // each].fields[0][number % each], bundle.chunk(number, 0)
+        assert len(composed) == len(cut)
+        step = max(bundle.manifest.encoding.step)  # ground, underlay and things are stored apart
+        np.testing.assert_allclose(composed.means.mean(0), cut.means.mean(0), atol=step)
     with pytest.raises(InputError, match="of the first one alone"):
         gather_content(tiles[:1], tmp_path / "materials", 7)
     alone = gather_content(tiles[:1], None, 7)
