@@ -9,7 +9,7 @@ import numpy as np
 
 from dav_gswt.files import read_json
 from dav_gswt.images import figures
-from dav_gswt.sweeps import CELL, COLUMNS, QUALITY, TILES, TIMES, describe_origin, tabulate_cell
+from dav_gswt.sweeps import CELL, COLUMNS, ORDERS, QUALITY, TILES, TIMES, describe_origin, tabulate_cell
 from dav_gswt_study import csv_tables, plots
 from dav_gswt_study.experiments import EVERYTHING
 from dav_gswt_study.figures import OKABE_ITO
@@ -18,7 +18,7 @@ from dav_gswt_study.seams import summary
 KEY = ("sweep", *CELL)  # what tells rows apart
 ABOUT = ("samples", "steps")  # of the prior, which its name hides
 SEAMS = ("seam_lpips", "seam_lpips_low", "seam_lpips_high", "seam_psnr", "seam_jump", "seam_density")
-NUMBERS = (*ABOUT, "photos", "gaussians", *QUALITY, *TILES, *SEAMS, *TIMES)
+NUMBERS = (*ABOUT, "photos", "gaussians", *QUALITY, *TILES, *ORDERS, *SEAMS, *TIMES)
 PANELS = {
     "psnr": "PSNR of test views (dB)",
     "worst_psnr": "PSNR, worst tenth (dB)",
@@ -26,7 +26,7 @@ PANELS = {
     "seam_lpips": "Seam-LPIPS over its floor",
     "seam_density": "cuts through strong gradients",
     "uncertainty": "mean uncertainty of tiles",
-    "orders": "pre-sorted orders",
+    "orders": "orders of all tiles",
     "bundle_mb": "bundle (MB)",
     "score_s": "scoring a round (s)",
     "recon_s": "reconstruction (s)",

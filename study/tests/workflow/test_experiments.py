@@ -36,7 +36,7 @@ def read_rows(path: Path) -> list[dict]:
 
 
 def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, copied, tmp_path):
-    """tau over what is there: one bundle and its stills are new; a table, a figure, and what tables make of them."""
+    """tau over what is there: one bundle, its stills and the orders of both are new; a table, a figure, and what tables make of them."""
     sweep = {"scenes": ["desert"], "vary": {"tau": [0.3, 0.6]}, "fixed": {"policy": "farthest"}, "baseline": "0.6"}
     sweep |= {"measure": {"views": [0], "tiles": [0], "stills": [0]}}
     figures = {"scenes": ["desert"], "seed": 0, "estimators": ["w2"], "policy": "farthest", "rounds": 1}
@@ -45,7 +45,7 @@ def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, 
     uncertainty = str(tiny.bundle.relative_to(tiny.folder) / "uncertainty.png")
     configs = write_study(tmp_path, sweeps={"few": sweep}, tables=tables)
     done = snakemake(copied, "--cores", "2", "study/results/sweeps/few.png", *made, uncertainty, configs=configs)
-    assert "5 of 5 steps (100%) done" in done.stdout  # bundle, stills, sweep, tables, uncertainty
+    assert "7 of 7 steps (100%) done" in done.stdout  # bundle, stills, orders, sweep, tables, uncertainty
     rows = read_rows(copied / "study/results/sweeps/few.csv")
     assert [(row["tau"], row["scene"], row["photos"]) for row in rows] == [(t, "desert", "7") for t in ("0.3", "0.6")]
     assert all(float(row[key]) > 0 for row in rows for key in ("psnr", "bundle_mb", "orders", "recon_s", "stills_s"))
@@ -61,7 +61,7 @@ def test_a_finished_run_is_traded_off(snakemake, copied, tmp_path):
     configs = write_study(tmp_path, tradeoff={"scene": "desert", "base": base, "presets": ["draft"], "only": ["tau"]})
     page = "study/docs/results/tradeoff.md"
     done = snakemake(copied, "--cores", "2", "--scheduler", "greedy", page, configs=configs)
-    assert "6 of 6 steps (100%) done" in done.stdout  # metrics, two bundles and their stills, page
+    assert "9 of 9 steps (100%) done" in done.stdout  # metrics, two bundles and their stills, orders of three, page
     rows = read_rows(copied / "study/results/tradeoff/tradeoff.csv")
     assert [row["setting"] for row in rows] == ["draft", "0", "0.6", "1"]
     assert all(float(row[key]) > 0 for row in rows for key in ("seconds", "own_seconds", "psnr", "bundle_mb"))
