@@ -36,7 +36,10 @@ def read_rows(path: Path) -> list[dict]:
 
 
 def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, copied, tmp_path):
-    """tau over what is there: one bundle, its stills and the orders of both are new; a table, a figure, and what tables make of them."""
+    """tau over what is there: one bundle, its stills and the orders of both are new.
+
+    Made are a table, a figure, and what tables make of them.
+    """
     sweep = {"scenes": ["desert"], "vary": {"tau": [0.3, 0.6]}, "fixed": {"policy": "farthest"}, "baseline": "0.6"}
     sweep |= {"measure": {"views": [0], "tiles": [0], "stills": [0]}}
     figures = {"scenes": ["desert"], "seed": 0, "estimators": ["w2"], "policy": "farthest", "rounds": 1}
