@@ -11,8 +11,8 @@ with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
     maps = placed_tiles.ExemplarMaps.from_levels(levels.read_levels(paths.levels))
     sets = {}
-    for name, *files in zip(params.tilings, paths.tiles, paths.seams, strict=True):
-        cut = tiles.read_tiles(*files, paths.levels)
+    for name, folder, seams in zip(params.tilings, paths.tiles, paths.seams, strict=True):
+        cut = tiles.read_tiles(folder, seams, paths.levels)
         sets[name] = placed_tiles.place_tiles(cut, maps.detrend(cut, params.tilings[name]), params.salt, params.tau)
     asked = dict(params.study)
     origin = record_provenance({"seams": list(paths.seams)}, asked)
