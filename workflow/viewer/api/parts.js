@@ -1,7 +1,7 @@
 // What other pages ask of a terrain: the ground, Gaussians for renderers of their own, and a painter for their context.
 // What they pass in is checked before it reaches the worker: a NaN there would draw nothing and say nothing.
 
-import { parseRecords, run } from "../data/compose.js";
+import { parseRecords } from "../data/compose.js";
 import { deviationOf, MAX_TURN, TURN_STEPS } from "../data/layout.js";
 import { OVERLAYS } from "../draw/overlays.js";
 import { createRenderer } from "../draw/renderer.js";
@@ -9,6 +9,7 @@ import { backdropOptions } from "../scene/open_terrain.js";
 import { hitGround } from "../terrain/camera.js";
 import { REACH, tileUnder } from "../terrain/cells.js";
 import { createDepthSorter } from "../terrain/draw_order.js";
+import { run } from "../terrain/steps.js";
 
 /**
  * @typedef {import("../scene/open_terrain.js").OpenTerrain} OpenTerrain

@@ -21,14 +21,6 @@ export const PLANES = 19; // bytes of a Gaussian in a block
 const WIDE = 5; // words of a Gaussian of an exemplar, whose colours have 16 bits
 const LABELS = 9, LAYERS = 3; // ground, its underlay, what else there is
 
-/** All steps at once. @template T @param {Generator<void, T>} steps @returns {T} */
-export function run(steps) {
-  for (;;) {
-    const { done, value } = steps.next();
-    if (done) return value;
-  }
-}
-
 /** @param {number} v @param {number} most */
 const clamp = (v, most) => Math.min(Math.max(v, 0), most);
 /** A difference of two values, kept as 0, -1, 1, -2, ... @param {number} low @param {number} high */

@@ -2,11 +2,11 @@
 // of several together, sorted by depth along one direction, as pages for the GPU. They are made when first needed and
 // evicted when long unused, those of uncertain tiles last.
 
-import { run } from "../data/compose.js";
 import { chunkKey, MAX_LEVELS, MAX_ORDERS, PAGE } from "../data/layout.js";
 import { createPagePool, createRecentCache } from "../terrain/caches.js";
 import { createDepthSorter } from "../terrain/draw_order.js";
 import { materialAt } from "../terrain/scatter.js";
+import { run } from "../terrain/steps.js";
 
 /**
  * @typedef {import("../terrain/cells.js").Border} Border

@@ -1,7 +1,8 @@
 // Where chunks come from: parts are unpacked, and chunks composed of them when a view needs them, the nearest first.
 
-import { createComposer, parseRecords, run } from "../data/compose.js";
+import { createComposer, parseRecords } from "../data/compose.js";
 import { chunkKey } from "../data/layout.js";
+import { run } from "../terrain/steps.js";
 
 /**
  * onChunk: a chunk is at hand; onPart: a part was unpacked.
