@@ -62,6 +62,8 @@ STAGES = {  # rules in words
     "export_model": "write the photos' cameras for other programs",
     "export_terrain": "export a finite terrain",
     "export_ground": "export the ground",
+    "export_tiles": "export the tile set",
+    "measure_orders": "measure draw orders",
     "gather_sweep": "gather the runs of a sweep",
     "tabulate_timing": "tabulate times",
 }
