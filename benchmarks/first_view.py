@@ -45,6 +45,7 @@ WATCH = """
   requestAnimationFrame(look);
 """
 LIVE = """async () => {
+  if (document.readyState === "loading") await new Promise((done) => addEventListener("DOMContentLoaded", done));
   const { viewer } = await import("./main.js"), next = () => new Promise(requestAnimationFrame);
   while (!viewer?.scene?.frame?.count) await next();
   await next();
