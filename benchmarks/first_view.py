@@ -50,7 +50,7 @@ LIVE = """async () => {
   while (!viewer?.scene?.frame?.count) await next();
   await next();
   const live = performance.now() / 1000;
-  while (viewer.scene.frame.missing.length) await next();
+  while (!viewer.loaded || viewer.scene.frame.missing.length) await next();
   await next();
   return [live, performance.now() / 1000];
 }"""

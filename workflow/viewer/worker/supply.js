@@ -60,8 +60,12 @@ export function createSupply(manifest, terrain, store, { onChunk = () => {}, onP
     /** A view begins: it has at least the coarsest level everywhere. @param {number} now its stamp */
     begin(now) {
       stamp = now;
-      if (lists[0].length) finish();
       bringAll(lists[0]);
+      while (lists[0].length && jobs.length) {
+        run(jobs[0]);
+        jobs.shift();
+        bringAll(lists[0]);
+      }
     },
     /** Take a part, to be unpacked step by step. @param {number} index @param {ArrayBuffer} buffer */
     addPart: (index, buffer) => void jobs.push(unpack(index, buffer)),

@@ -177,11 +177,13 @@ def _write_parts(
     coarse = range(composed, len(levels))
     if composed and coarse:
         fields = [(chunks, k, levels[k][tile]) for tile, chunks in enumerate(own) for k in coarse]
-        store(fields, "records")
+        things = zip(theirs, objects, strict=True)
+        store([*fields, *((chunks, k, each[k]) for chunks, each in things for k in coarse)], "records")
     for level in progress(range(len(levels) - 1, -1, -1), "write parts"):
         if level == 0 and objects:
             things = zip(theirs, objects, strict=True)
-            store([(chunks, k, field) for chunks, fields in things for k, field in enumerate(fields)], "objects")
+            rest = range(composed if coarse and composed else len(levels))
+            store([(chunks, k, each[k]) for chunks, each in things for k in rest], "objects")
         if composed and level == composed - 1:
             data = recipes.pack_recipes(content.tiles, content.recipes, encoding)
             written.append(write_part(data, part, parts.RECIPES, "recipes"))
@@ -189,7 +191,8 @@ def _write_parts(
             store_composed(level)
         elif not composed:
             store_level(level)
-    return written, [sorted(each, key=lambda chunk: chunk.level) for each in own], theirs
+    own, theirs = ([sorted(each, key=lambda chunk: chunk.level) for each in chunks] for chunks in (own, theirs))
+    return written, own, theirs
 
 
 def _measure_heights(levels: Sequence[GaussianField]) -> list[float]:
