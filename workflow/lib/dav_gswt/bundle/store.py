@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy import ndarray as Array
@@ -22,7 +23,7 @@ class Bundle:
 
     folder: Path
     manifest: Manifest
-    _parts: dict[int, object] = field(default_factory=dict)
+    _parts: dict[int, Any] = field(default_factory=dict)
 
     def chunk(self, tile: int, level: int) -> GaussianField:
         """A tile's Gaussians at a level. Raises: InputError: see `parts.read_part` and `recipes.unpack_recipes`."""
@@ -66,7 +67,7 @@ class Bundle:
         assert entry.part is not None and entry.first is not None
         return self._read(entry.part)[entry.first : entry.first + entry.count]
 
-    def _read(self, number: int):
+    def _read(self, number: int) -> Any:
         """What a part holds; it is read once."""
         if number not in self._parts:
             manifest, part = self.manifest, self.manifest.parts[number]

@@ -276,7 +276,7 @@ def _equalise_heights(recipe: Recipe, labels: Array, shifts: Array) -> Recipe:
         means.append((total[cells] + count[cells] * change[..., 3]).sum() / many if many else 0.0)
         raises.append((count[cells] * share).sum() / many if many else 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        amounts = np.where(np.array(raises) > 0, (np.mean(means) - means) / raises, 0.0)
+        amounts = np.where(np.array(raises) > 0, (np.mean(means) - np.array(means)) / raises, 0.0)
     raised = []
     for change in recipe.corrections:
         by = amounts[:, None, None] * compose.bump_cells(change.shape[1])

@@ -37,7 +37,7 @@ def write_tiles(sets: list[TileSet], folder: Path | str, seams: Path | str, prov
         for number, tiles in enumerate(sets):
             own = material_folder(part, number)
             own.mkdir(exist_ok=True)
-            arrays = {"labels": tiles.labels, "shifts": tiles.shifts}
+            arrays: dict[str, Any] = {"labels": tiles.labels, "shifts": tiles.shifts}
             if recipe := tiles.recipe:
                 arrays |= {"colour": recipe.trend.colour, "height": recipe.trend.height}
                 arrays |= {f"corrections{level}": values for level, values in enumerate(recipe.corrections)}
