@@ -1,7 +1,8 @@
 """Tiles that are composed of exemplars and recipes: to the byte, once, and nothing of what makes no sense."""
 
 import hashlib
-from base64 import b64encode
+import json
+from base64 import b64decode, b64encode
 
 import numpy as np
 import pytest
@@ -40,6 +41,15 @@ def test_chunks_are_those_of_the_specification_to_the_byte(modules):
     found = compose(modules, MADE.files())
     assert [bytes(one) for one in found] == [MADE.records(*chunk) for chunk in CHUNKS]
     assert len({bytes(one) for one in found}) == len(CHUNKS) and min(map(len, found)) > 0
+
+
+def test_chunks_are_those_of_the_golden_file(modules, root):
+    golden = json.loads((root / "tests/golden/composition.json").read_text())
+    files = {name: b64decode(text) for name, text in golden["files"].items()}
+    chunks = [(tile, level) for tile in range(len(golden["chunks"])) for level in range(len(golden["chunks"][0]))]
+    found = iter(compose(modules, files, chunks))
+    for levels in golden["chunks"]:
+        assert [hashlib.sha256(bytes(next(found))).hexdigest() for _ in levels] == levels
 
 
 def test_parts_of_kinds_that_come_later_are_left_aside(modules):
