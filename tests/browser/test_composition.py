@@ -84,9 +84,14 @@ def promise(name: str, **values):
     return edit
 
 
-def bomb(manifest, size: int = 1000):
+def half_a_step(manifest):
+    manifest["encoding"]["origin"][0] -= 0.5 * manifest["encoding"]["step"][0]
+
+
+def bomb(manifest):
     """The finest level unpacks to more than it says; what it has is the digest of that."""
-    promise("level0", size=size)(manifest)
+    part = next(part for part in manifest["parts"] if part["file"] == "parts/level0.bin")
+    part["size"] = part["bytes"]
 
 
 @pytest.mark.parametrize(
@@ -123,6 +128,11 @@ def bomb(manifest, size: int = 1000):
         pytest.param(MADE.files(lambda m: m["composition"].update(side=3)), "“composition”", id="odd side"),
         pytest.param(MADE.files(lambda m: m["composition"].update(exemplars=[7])), "“composition”", id="one exemplar"),
         pytest.param(MADE.files(lambda m: m["encoding"].update(origin=[0.1, 0, 0])), "“composition”", id="origin"),
+        pytest.param(MADE.files(half_a_step), "“composition”", id="half a step"),
+        pytest.param(MADE.files(lambda m: m["composition"].update(exemplars=[7, 5000])), "“composition”", id="cells"),
+        pytest.param(MADE.files(promise("level0", bytes=10**6)), "“parts” is missing", id="more bytes than it holds"),
+        pytest.param(MADE.files(lambda m: m["parts"][1].pop("sha256")), "“parts” is missing", id="no digest"),
+        pytest.param(MADE.files(lambda m: m["parts"].append(dict(m["parts"][0]))), "“parts” is missing", id="twice"),
         pytest.param(MADE.files(lambda m: m.pop("composition")), "“composition”", id="none"),
         pytest.param(MADE.files(lambda m: m["tiles"][2].pop("orders")), "the orders of tile 2", id="no orders"),
         pytest.param(MADE.files(lambda m: m.update(version=3)), "bundle of version 3", id="older"),
@@ -140,6 +150,19 @@ def test_a_splat_outside_of_its_cell_is_refused(modules):
     at = 98 + int(cells[0].sum())
     level[at] = 255  # high byte of the first x
     assert "a splat lies outside of its cell" in compose(modules, MADE.files(level0=bytes(level)))
+
+
+def test_counts_beyond_32_bits_are_refused(modules):
+    """65537 cells of 65535 splats and one of 1 are 2^32 splats, not none."""
+    counts = np.zeros(257**2, np.uint16)
+    counts[:65537], counts[65537] = 65535, 1
+
+    def edit(manifest):
+        manifest["composition"].update(exemplars=[257, 257])
+        manifest["parts"].insert(1, manifest["parts"].pop())
+
+    files = MADE.files(edit, level0=6 * split(counts.tolist()))
+    assert "level0.bin makes no sense: it is cut short" in compose(modules, files)
 
 
 def test_what_is_not_zlib_is_refused(modules):

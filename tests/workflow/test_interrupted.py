@@ -127,7 +127,7 @@ def test_the_lock_of_a_killed_run_does_not_stop_the_next_one(story):
 
 def test_what_is_said_at_the_end_is_there(story):
     named = [word for word in story.last.stdout.split() if word.startswith("results/")]
-    assert len(named) > 4 and all(list(story.folder.glob(word)) for word in named)
+    assert len(named) == 4 and all(list(story.folder.glob(word)) for word in named)
     assert len(list(story.folder.glob(next(word for word in named if word.endswith("*.png"))))) == 3
 
 

@@ -16,6 +16,7 @@ from plyfile import PlyData
 from dav_gswt.bundle.manifest import NAME
 from dav_gswt.bundle.store import read_bundle
 from dav_gswt.cli.run import PROFILE_NOTE, short_log
+from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.images import image_files, metrics
@@ -101,10 +102,18 @@ def is_finite(path: Path) -> bool:
     if path.suffix == ".ply":
         rows = PlyData.read(str(path))["vertex"].data
         return all(np.isfinite(rows[name]).all() for name in rows.dtype.names)
-    if path.name == NAME and not all(_is_field_finite(f) for level in read_bundle(path.parent).fields() for f in level):
+    if path.name == NAME and not _is_bundle_finite(path.parent):
         return False
     words = path.read_text(encoding="utf-8").lower().replace(",", " ").replace(":", " ").split()
     return not {"nan", "inf", "-inf", "infinity", "-infinity"} & set(words)
+
+
+def _is_bundle_finite(folder: Path) -> bool:
+    """Whether a bundle can be read and the splats of its tiles are finite."""
+    try:
+        return all(_is_field_finite(field) for level in read_bundle(folder).fields() for field in level)
+    except InputError:
+        return False
 
 
 def _is_field_finite(field: GaussianField) -> bool:

@@ -13,7 +13,7 @@ from fixtures.compositions import CELL, EXEMPLARS, LEVELS, SIDE, Composed
 from dav_gswt.bundle import manifest, store
 from dav_gswt.bundle.blocks import unpack_block
 from dav_gswt.bundle.parts import read_part
-from dav_gswt.bundle.recipes import coarsen_correction
+from dav_gswt.bundle.recipes import coarsen_correction, coarsen_rotation
 from dav_gswt.errors import InputError
 from dav_gswt.tiles.compose import coarsen_labels
 
@@ -205,6 +205,10 @@ def of_kind(value, kind):
     return next(part for part in value["parts"] if part["kind"] == kind)
 
 
+def shift_origin(value, steps: float):
+    value["encoding"]["origin"][0] -= steps * value["encoding"]["step"][0]
+
+
 @pytest.mark.parametrize(
     "message, change",
     [
@@ -218,7 +222,7 @@ def of_kind(value, kind):
         ("levels do not fit the tiles", lambda m: m["composition"].update(levels=4)),
         ("one of each composed level is needed", lambda m: m["composition"].update(levels=1)),
         ("one of each composed level is needed", lambda m: of_kind(m, "level").update(level=0)),
-        ("one of each composed level is needed", lambda m: of_kind(m, "level").update(kind="later")),
+        ("only those", lambda m: of_kind(m, "level").update(kind="later")),
         ("recipes or exemplars are missing", lambda m: of_kind(m, "recipes").update(kind="later")),
         ("recipes or exemplars are missing", lambda m: m["composition"].update(exemplars=[8])),
         ("size does not fit the tiles", lambda m: of_kind(m, "recipes").update(size=1)),
@@ -228,6 +232,14 @@ def of_kind(value, kind):
         ("a tile does not fit the grid", lambda m: m["encoding"].update(origin=[0, -23, 0])),
         ("count", lambda m: m["tiles"][0]["chunks"][0].update(count=(1 << 24) + 1)),
         ("exemplars", lambda m: m["composition"].update(exemplars=[8, 1 << 20])),
+        ("do not|does not begin at a step", lambda m: shift_origin(m, 0.5)),
+        ("only those", lambda m: m["parts"][1].update(level=3)),
+        ("only those", lambda m: m["parts"].append(m["parts"][0] | {"kind": "level", "file": "parts/more.bin"})),
+        ("size and bytes of a plain one", lambda m: m["parts"][0].update(kind="plain", size=2**20)),
+        ("tile_side below", lambda m: m.update(tile_side=1e-300)),
+        ("more than .* bytes", lambda m: m["parts"][0].update(size=2**29)),
+        ("more than .* splats", lambda m: [t["chunks"][0].update(count=2**24) for t in m["tiles"]]),
+        ("exemplars", lambda m: m["composition"].update(exemplars=[7, 5000])),
     ],
 )
 def test_a_manifest_whose_composition_contradicts_itself_is_refused(made, message, change):
@@ -235,3 +247,22 @@ def test_a_manifest_whose_composition_contradicts_itself_is_refused(made, messag
     change(value)
     with pytest.raises(InputError, match=message):
         manifest.Manifest.from_dict(value)
+
+
+def test_a_manifest_that_is_no_file_or_a_part_that_leads_to_itself_is_refused(composed, tmp_path):
+    made = write_files(composed.files(), tmp_path / "b")
+    part = made.folder / "parts/level0.bin"
+    part.unlink()
+    part.symlink_to("level0.bin")
+    with pytest.raises(InputError, match="level0.bin: not readable"):
+        made.chunk(0, 0)
+    (made.folder / manifest.NAME).unlink()
+    (made.folder / manifest.NAME).symlink_to("/dev/zero")
+    with pytest.raises(InputError, match="no file"):
+        store.read_bundle(made.folder)
+
+
+def test_coarser_rotations_are_at_most_a_step_away():
+    steps = np.arange(256, dtype=np.uint8)
+    found = coarsen_rotation(np.stack([steps] * 3, 1))[:, 0].astype(int)
+    assert np.abs(found - steps)[:255].max() <= 1 and found.min() >= 1 and found.max() <= 253

@@ -86,3 +86,16 @@ def test_nothing_of_others_is_replaced(result, tmp_path, capsys):
     shutil.rmtree(tmp_path / "terrain")
     for _ in range(2):  # an earlier export is
         assert run(result, "--columns", 1, "--rows", 1, "-o", tmp_path) == 0
+
+
+def test_other_peoples_files_are_no_earlier_tile_set(result, tmp_path, capsys):
+    (tmp_path / "tiles").mkdir()
+    (tmp_path / "tiles/lod0_tile_00.ply").write_bytes(b"mine")
+    (tmp_path / "gswt.zip").write_bytes(b"mine")
+    for name in ("tiles", "gswt"):
+        assert run(result, "--formats", name, "-o", tmp_path) == 1
+        assert "is in the way" in capsys.readouterr().err
+    assert (tmp_path / "tiles/lod0_tile_00.ply").read_bytes() == (tmp_path / "gswt.zip").read_bytes() == b"mine"
+    for _ in range(2):
+        assert run(result, "--formats", "tiles", "gswt", "-o", tmp_path / "out") == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["gswt.zip", "tiles"]

@@ -133,9 +133,10 @@ export function createComposer(manifest) {
       for (let layer = 0; layer < LAYERS; layer++) {
         if (at + 2 * cells > bytes.length) throw broken(file, "it is cut short");
         const starts = new Uint32Array(cells + 1);
-        for (let k = 0; k < cells; k++) starts[k + 1] = starts[k] + (bytes[at + k] | (bytes[at + cells + k] << 8));
+        let sum = 0; // beyond 32 bits in a hostile part
+        for (let k = 0; k < cells; k++) starts[k + 1] = sum += bytes[at + k] | (bytes[at + cells + k] << 8);
         at += 2 * cells;
-        if (at + PLANES * starts[cells] > bytes.length) throw broken(file, "it is cut short");
+        if (at + PLANES * sum > bytes.length) throw broken(file, "it is cut short");
         const words = yield* unpackBlock(bytes, at, starts[cells], true);
         at += PLANES * starts[cells];
         for (let w = 0; w < words.length;) {

@@ -47,8 +47,9 @@ const WIDEST = 8; // of deviations, in tile sides
 const MAX_TERMS = 64, MAX_OBJECTS = 256, MAX_CELLS = 64; // of a rule; of a terrain; of the scatter along a tile's side
 /** @type {Record<string, number>} */
 const UNITS = { records: PLANES, plain: RECORD }; // bytes of a splat
-const MAX_PARTS = 4096, MAX_UNPACKED = 2 ** 30; // bytes of all parts
-const WHOLE = 1e-9; // relative error of a tile's side in steps
+const MAX_PARTS = 1024, MAX_UNPACKED = 2 ** 29; // bytes of all parts
+const WHOLE = 1e-9; // relative error of whole numbers of steps
+const MAX_GROUND = 4096; // along a tile or an exemplar
 const MAX_WAVES = 4096; // cells of the jitter along a tile's side
 const UNTURNED = 180; // degrees
 const DEEPEST = 6; // levels of lists and objects within a manifest
@@ -84,6 +85,7 @@ const PARTS = {
     && tiles.length % (16 * materials.length) === 0
     && materials.every((one, m) => isMaterial(one, (m * tiles.length) / materials.length)),
   parts: (parts) => isFilled(parts) && parts.length <= MAX_PARTS && parts.every(isPart)
+    && new Set(parts.map((/** @type {any} */ part) => part.file ?? part)).size === parts.length
     && parts.reduce((/** @type {number} */ sum, /** @type {any} */ { kind, size }) => (
       KINDS.has(kind) ? sum + size : sum), 0) <= MAX_UNPACKED,
   composition: (composition, m) => (composition ? isComposition(composition, m)
@@ -170,16 +172,21 @@ function isPart(part) {
   const { kind, file, bytes, size, sha256, level } = part;
   return typeof file === "string" && /^parts\/\w{1,100}\.bin$/.test(file) && isDigest(sha256)
     && isWhole(bytes, 1, MAX_UNPACKED) && isWhole(size, 1, MAX_RATIO * bytes)
-    && size % (UNITS[kind] ?? 1) === 0 && (kind !== "plain" || size === bytes)
+    && size % (UNITS[kind] ?? 1) === 0 && bytes <= 1.001 * size + 64
+    && (kind === "plain" ? size === bytes : sha256 !== undefined)
     && (kind === "level") === (level !== undefined) && (kind !== "level" || isNatural(level));
 }
+
+/** @param {number} x */
+const isNearWhole = (x) => Math.abs(x - Math.round(x)) <= WHOLE * Math.max(1, Math.abs(x));
 
 /** @param {any} composition @param {any} m */
 function isComposition(composition, { tile_side: long, encoding: { origin, step }, levels, materials, parts }) {
   const { side, cell, levels: many, exemplars } = composition;
-  if (![side, cell].every((n) => isWhole(n, 1, MAX_STEPS)) || !isWhole(many, 1, levels.length)) return false;
-  if (side % 2 ** (many - 1) || !isList(exemplars, materials.length, (m) => isWhole(m, 1, MAX_STEPS))) return false;
+  if (!isWhole(side, 1, MAX_GROUND) || !isWhole(cell, 1, MAX_STEPS) || !isWhole(many, 1, levels.length)) return false;
+  if (side % 2 ** (many - 1) || !isList(exemplars, materials.length, (m) => isWhole(m, 1, MAX_GROUND))) return false;
   const fits = [0, 1].every((axis) => Math.abs(side * cell * step[axis] - long) <= WHOLE * long
+    && isNearWhole(-origin[axis] / step[axis])
     && isWhole(Math.round(-origin[axis] / step[axis]) || 0, 0, MAX_STEPS - side * cell));
   /** @param {string} kind */
   const listed = (kind) => parts.filter((/** @type {any} */ part) => part.kind === kind);

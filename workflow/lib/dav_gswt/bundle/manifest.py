@@ -29,7 +29,7 @@ from dav_gswt.bundle.encoding import (
     Size,
 )
 from dav_gswt.bundle.land_cover import ClassesEntry, Name, ObjectEntry, Salt, ScatterEntry
-from dav_gswt.bundle.parts import LEVEL, PLAIN, RECIPES, RECORDS, ChunkEntry, PartEntry
+from dav_gswt.bundle.parts import LEVEL, MAX_SIZE, MAX_TOTAL, PLAIN, RECIPES, RECORDS, ChunkEntry, PartEntry
 from dav_gswt.bundle.recipes import Composition, locate_corner
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import parse_record, read_json
@@ -38,6 +38,7 @@ NAME = "davgswt.json"
 FORMAT, VERSION = "davgswt", 4
 ONLY_MATERIAL = "ground"  # the name of the material of a set that has one
 MAX_BYTES = 1 << 26  # of a manifest
+WHOLE = 1e-9  # error of whole numbers of steps, of their own size
 FARTHEST, MAX_LOG_SCALE = 1e9, 60.0  # of lengths, whose squares single precision keeps; of logarithms of deviations
 
 
@@ -166,6 +167,14 @@ def _find_wrong_parts(manifest: Manifest) -> Iterator[str]:
     parts, composed, levels = manifest.parts, manifest.composition, len(manifest.levels)
     if len({part.file for part in parts}) < len(parts):
         yield "parts: a file is there twice"
+    if any((part.level is not None) != (part.kind == LEVEL) for part in parts):
+        yield "parts: those of a level have a level, and only those"
+    if any(part.kind == PLAIN and part.size != part.bytes for part in parts):
+        yield "parts: size and bytes of a plain one differ"
+    if sum(part.size for part in parts) > MAX_SIZE:
+        yield f"parts: more than {MAX_SIZE} bytes"
+    if sum(chunk.count for each in (*manifest.tiles, *(manifest.objects or [])) for chunk in each.chunks) > MAX_TOTAL:
+        yield f"chunks: more than {MAX_TOTAL} splats"
     if composed:
         yield from _find_wrong_composition(manifest, composed)
     for name, orders, chunks, own in [
@@ -198,9 +207,13 @@ def _find_wrong_composition(manifest: Manifest, composed: Composition) -> Iterat
         if part.kind == RECIPES and part.size != composed.recipes_size(len(manifest.tiles)):
             yield f"{part.file}: size does not fit the tiles"
     steps = composed.side * composed.cell
-    if any(abs(steps * step - manifest.tile_side) > 1e-9 * manifest.tile_side for step in encoding.step[:2]):
+    if any(abs(steps * step - manifest.tile_side) > WHOLE * manifest.tile_side for step in encoding.step[:2]):
         yield "composition: a cell is not a whole number of steps"
+        return
     corner = locate_corner(encoding)
+    places = [-at / step for at, step in zip(encoding.origin[:2], encoding.step[:2], strict=True)]
+    if any(abs(place - whole) > WHOLE * max(1, abs(place)) for place, whole in zip(places, corner, strict=True)):
+        yield "composition: a tile does not begin at a step of the grid"
     if not all(c >= 0 and c + steps <= POSITION_STEPS for c in corner):
         yield "composition: a tile does not fit the grid"
 
@@ -212,8 +225,8 @@ def _find_wrong_lengths(manifest: Manifest) -> Iterator[str]:
     lengths += [*encoding.origin, *(POSITION_STEPS * step for step in encoding.step)]
     lengths += [z for part in (manifest.tiles, objects) for each in part for z in each.z]
     lengths += [each.radius for each in objects]
-    if not max(map(abs, lengths)) <= FARTHEST:
-        yield f"a length is beyond {FARTHEST:g}"
+    if not max(map(abs, lengths)) <= FARTHEST or manifest.tile_side < 1 / FARTHEST:
+        yield f"a length is beyond {FARTHEST:g}, or tile_side below {1 / FARTHEST:g}"
     widest = encoding.log_scale[0] + SCALE_STEPS * encoding.log_scale[1]
     if not max(abs(encoding.log_scale[0]), abs(widest)) <= MAX_LOG_SCALE:
         yield "encoding: log_scale makes no sense"
@@ -241,6 +254,8 @@ def read_manifest(folder: Path | str) -> Manifest:
     Raises: InputError: missing, too large, no JSON, of another format or version, or see `Manifest.from_dict`.
     """
     path = Path(folder) / NAME
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: no file; make the bundle again")
     if path.is_file() and path.stat().st_size > MAX_BYTES:
         raise InputError(f"{path}: {path.stat().st_size} bytes are no manifest; make the bundle again")
     value = read_json(path)

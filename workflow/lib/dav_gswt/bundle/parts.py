@@ -17,8 +17,8 @@ from dav_gswt.errors import InputError
 
 FOLDER = "parts"
 LEVEL, RECIPES, RECORDS, PLAIN = "level", "recipes", "records", "plain"  # kinds
-MAX_SIZE = 1 << 30  # bytes that a part may inflate to
-MAX_COUNT = 1 << 24  # Gaussians of a tile at a level
+MAX_SIZE = 1 << 29  # bytes that all parts may inflate to
+MAX_COUNT, MAX_TOTAL = 1 << 24, 1 << 26  # Gaussians of a tile at a level, and of all
 EFFORT = 9  # of zlib; its strategy for noise saves 4 %
 
 
@@ -78,14 +78,14 @@ def read_exactly(folder: Path | str, name: str, size: int, sha256: str) -> bytes
     read) or another digest.
     """
     path = Path(folder) / name
-    if not path.resolve().is_relative_to(Path(folder).resolve()):
-        raise InputError(f"{path}: lies outside of the folder; make the bundle again")
     try:
+        if not path.resolve().is_relative_to(Path(folder).resolve()):
+            raise InputError(f"{path}: lies outside of the folder; make the bundle again")
         if (found := path.stat().st_size) != size:
             raise InputError(f"{path}: {found} bytes where the manifest says {size}; make the bundle again")
         data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: not readable ({error.strerror}); make the bundle again") from None
+    except (OSError, RuntimeError) as error:  # of a link to itself the latter
+        raise InputError(f"{path}: not readable ({getattr(error, 'strerror', error)}); make the bundle again") from None
     if hashlib.sha256(data).hexdigest() != sha256:
         raise InputError(f"{path}: its digest is not the manifest's; make the bundle again")
     return data

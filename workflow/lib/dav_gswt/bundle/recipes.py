@@ -29,6 +29,7 @@ from dav_gswt.tiles.build import Recipe, TileSet
 from dav_gswt.tiles.compose import BinnedLevel, coarsen_labels, find_underlay
 from dav_gswt.tiles.layout import LABELS, source_cells
 
+MAX_CELLS = 4096  # along a tile or an exemplar
 CHANNELS = 4  # of a correction: z, green, red, blue
 SHIFTS = 2 * len(LABELS)  # numbers, of two bytes each
 GROUND, UNDERLAY, REST = range(3)  # layers of a level
@@ -45,10 +46,10 @@ class Composition(Entry):
         exemplars: finest cells along the side of each material's exemplar.
     """
 
-    side: Annotated[int, Field(ge=1, le=POSITION_STEPS)]
+    side: Annotated[int, Field(ge=1, le=MAX_CELLS)]
     cell: Annotated[int, Field(ge=1, le=POSITION_STEPS)]
     levels: Annotated[int, Field(ge=1, le=16)]
-    exemplars: Annotated[list[Annotated[int, Field(ge=1, le=1 << 14)]], Field(min_length=1, max_length=8)]
+    exemplars: Annotated[list[Annotated[int, Field(ge=1, le=MAX_CELLS)]], Field(min_length=1, max_length=8)]
 
     def recipes_size(self, tiles: int) -> int:
         """Bytes of the recipes of so many tiles."""
@@ -100,7 +101,8 @@ def pack_level(sets: Sequence[TileSet], recipes: Sequence[Recipe], level: int, e
 
 def coarsen_rotation(rotation: UInt8[Array, "n 3"]) -> UInt8[Array, "n 3"]:
     """Every second step of a rotation: half a degree, which no picture shows."""
-    return (ROTATION_STEPS + np.rint((rotation.astype(float) - ROTATION_STEPS) / 2) * 2).astype(np.uint8)
+    steps = np.rint((rotation.astype(float) - ROTATION_STEPS) / 2) * 2
+    return (ROTATION_STEPS + np.clip(steps, 1 - ROTATION_STEPS, ROTATION_STEPS - 1)).astype(np.uint8)
 
 
 def find_used_cells(tiles: TileSet, level: BinnedLevel) -> Bool[Array, "k"]:
@@ -167,13 +169,15 @@ def unpack_recipes(data: bytes, composition: Composition, tiles: int, name: str)
         labels = np.frombuffer(data, np.uint8, k * k, at + 2 * SHIFTS).reshape(k, k)
         planes = np.frombuffer(data, np.uint8, 2 * CHANNELS * k * k, at + 2 * SHIFTS + k * k)
         at += 2 * SHIFTS + (1 + 2 * CHANNELS) * k * k
-        if labels.max() >= len(LABELS) or (shift[np.unique(labels)] % (1 << composition.levels - 1)).any():
+        if labels.max() >= len(LABELS):
             raise InputError(f"{name}: tile {tile} has an unknown label; make the bundle again")
         values = [unpack_differences(join_bytes(channel)) for channel in planes.reshape(CHANNELS, 2, k * k)]
         correction, levels = np.stack(values).view(np.int16).reshape(CHANNELS, k, k), []
         for level in range(composition.levels):
             majority, cells = coarsen_labels(labels, 1 << level), composition.exemplars[tile // each] >> level
             rows, columns = source_cells(majority, shift, 1 << level)
+            if (shift[np.unique(majority)] % (1 << level)).any():
+                raise InputError(f"{name}: tile {tile} is shifted by part of a cell; make the bundle again")
             if min(rows.min(), columns.min()) < 0 or max(rows.max(), columns.max()) >= cells:
                 raise InputError(f"{name}: tile {tile} shows ground beyond its exemplar; make the bundle again")
             levels.append(TileRecipe(rows * cells + columns, coarsen_correction(correction, labels, majority)))

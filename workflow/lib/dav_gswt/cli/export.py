@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import zipfile
 from pathlib import Path
 from typing import Any, get_args
 
@@ -55,7 +56,9 @@ def run_export(options: argparse.Namespace) -> None:
     for name in wanted:
         check_target(options.out / name, f"{name}.json")
     if TILES in more:
-        check_target(options.out / TILES, "lod0_tile_00.ply")
+        check_target(options.out / TILES, gswt.MARK)
+    if GSWT in more:
+        check_archive(options.out / gswt.NAME)
     parents = source.resolve().parents
     if ground:
         result = next((folder for folder in parents if (folder / "seams.json").is_file()), None)
@@ -114,3 +117,11 @@ def check_target(folder: Path, mark: str) -> None:
         raise InputError(f"-o {folder.parent}: a file is in the way; name a folder")
     if folder.is_symlink() or (folder.exists() and not (folder / mark).is_file()):
         raise InputError(f"{folder} is in the way, and is no export (it has no {mark}): name another folder with -o")
+
+
+def check_archive(path: Path) -> None:
+    """Raises: InputError: what is in the way is no archive of tiles, or no folder is where it shall lie."""
+    if path.parent.exists() and not path.parent.is_dir():
+        raise InputError(f"-o {path.parent}: a file is in the way; name a folder")
+    if path.exists() and not (zipfile.is_zipfile(path) and "lod0_tile_00.ply" in zipfile.ZipFile(path).namelist()):
+        raise InputError(f"{path} is in the way, and is no archive of tiles: name another folder with -o")

@@ -15,7 +15,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField, concatenate_fields, write_field
-from dav_gswt.files import atomic_file, atomic_folder
+from dav_gswt.files import atomic_file, atomic_folder, write_json
 from dav_gswt.logs import progress
 from dav_gswt.materials.model import ObjectLevels, turn_and_scale, turn_rows
 from dav_gswt.tiles.compose import equalise_heights
@@ -23,7 +23,7 @@ from dav_gswt.tiles.store import write_tile_fields
 
 _log = logging.getLogger(__name__)
 
-NAME = "gswt.zip"
+NAME, MARK = "gswt.zip", "tiles.json"
 TILE_WIDTH = 4.0
 MAX_SPLATS = 8_388_608
 STAMP = (1980, 1, 1, 0, 0, 0)  # the earliest a zip knows: the same tiles give the same bytes
@@ -91,9 +91,10 @@ def export_archive(bundle: Bundle, path: Path | str) -> None:
 
 
 def export_tiles(bundle: Bundle, folder: Path | str) -> None:
-    """Write lod{l}_tile_{TT}.ply of all tiles to a folder. Raises: InputError: see `Bundle.chunk`."""
+    """Write lod{l}_tile_{TT}.ply of all tiles, and MARK, to a folder. Raises: InputError: see `Bundle.chunk`."""
     with atomic_folder(folder) as part:
         write_tile_fields(bundle.fields(), part)
+        write_json(part / MARK, {"tile_side": bundle.manifest.tile_side, "tiles": len(bundle.manifest.tiles)})
 
 
 def bake_objects(
