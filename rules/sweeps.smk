@@ -16,7 +16,7 @@ rule measure_orders:
         "<logs>/<bundle>/measure_orders.log",
     benchmark:
         "<benchmarks>/<bundle>/measure_orders.tsv"
-    threads: 1  # its seconds are those of one core
+    threads: 1  # it reports CPU seconds of one core
     resources:
         mem_mb=per_attempt(2500),
         runtime=per_attempt("20m"),

@@ -62,7 +62,7 @@ RECIPE = 36 + 9 * SIDE**2  # bytes
 
 
 def recipes_with(at: int, data: bytes) -> bytes:
-    """All recipes, with other bytes in that of tile 3."""
+    """All recipes, with some bytes of the recipe of tile 3 replaced."""
     at += 3 * RECIPE
     return RECIPES[:at] + data + RECIPES[at + len(data) :]
 

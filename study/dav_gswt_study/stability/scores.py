@@ -72,7 +72,7 @@ def _close_deviation_cases() -> list[Case]:
 
 
 def _w2_sq(means: Array, variances: Array) -> Array:
-    """Squared W2 between diagonal Gaussians: squared distance of the means plus that of the deviations."""
+    """Squared W2 between diagonal Gaussians: the squared distances of means and of deviations, summed."""
     return un.w2_sq(means)[1] + un.w2_sq(np.sqrt(variances, dtype=np.float64))[1]
 
 

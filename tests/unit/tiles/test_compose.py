@@ -136,7 +136,7 @@ def read_again(tiles, sample_ground, tmp_path):
 
 def without_a_correction(data: bytes) -> bytes:
     arrays, out = dict(np.load(io.BytesIO(data))), io.BytesIO()
-    del arrays["corrections2"]
+    del arrays["corrections"]
     np.savez(out, **arrays)
     return out.getvalue()
 

@@ -182,7 +182,7 @@ def _write_parts(
     for level in progress(range(len(levels) - 1, -1, -1), "write parts"):
         if level == 0 and objects:
             things = zip(theirs, objects, strict=True)
-            rest = range(composed if coarse and composed else len(levels))
+            rest = range(composed or len(levels))
             store([(chunks, k, each[k]) for chunks, each in things for k in rest], "objects")
         if composed and level == composed - 1:
             data = recipes.pack_recipes(content.tiles, content.recipes, encoding)

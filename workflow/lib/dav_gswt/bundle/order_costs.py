@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 
-from dav_gswt.bundle import direction_search
+from dav_gswt.bundle import direction_search, level_distances
 from dav_gswt.bundle.orders import sort_back_to_front, unit_vectors
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.logs import progress
@@ -48,7 +48,7 @@ def measure_orders(bundle: Bundle) -> dict[str, float | int | None]:
 def _measure_error(bundle: Bundle, fields: list) -> float | None:
     """PSNR of every tile, seen once at each elevation, in the order of the nearest of its directions."""
     tiles, side, pairs = bundle.manifest.tiles, bundle.manifest.tile_side, []
-    along, pixel = np.array(bundle.manifest.directions), side / direction_search.level_distances.FOCAL
+    along, pixel = np.array(bundle.manifest.directions), side / level_distances.FOCAL
     for number, down in enumerate(direction_search.ELEVATIONS.values()):
         # azimuths in the golden angle: of all directions each tile meets others
         azimuths = (np.arange(len(tiles)) + number * len(tiles)) * np.pi * (3 - 5**0.5)

@@ -144,7 +144,7 @@ def pack_recipes(sets: Sequence[TileSet], recipes: Sequence[Recipe], encoding: E
     for tiles, recipe in zip(sets, recipes, strict=True):
         for number, (labels, shift) in enumerate(zip(tiles.labels, tiles.shifts, strict=True)):
             found += [shift.astype("<i2").tobytes(), labels.tobytes()]
-            for channel in quantize_correction(recipe.corrections[0][number], encoding):
+            for channel in quantize_correction(recipe.corrections[number], encoding):
                 found.append(split_bytes(pack_differences(channel.ravel().astype(np.uint16))))
     return b"".join(found)
 

@@ -6,6 +6,7 @@ one header line too many, so nothing here is optional. It knows tiles only, so o
 
 import logging
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,7 +19,7 @@ from dav_gswt.field import GaussianField, concatenate_fields, write_field
 from dav_gswt.files import atomic_file, atomic_folder, write_json
 from dav_gswt.logs import progress
 from dav_gswt.materials.model import ObjectLevels, turn_and_scale, turn_rows
-from dav_gswt.tiles.compose import equalise_heights
+from dav_gswt.tiles.compose import bump
 from dav_gswt.tiles.store import write_tile_fields
 
 _log = logging.getLogger(__name__)
@@ -115,6 +116,28 @@ def bake_objects(
             own[tile] = concatenate_fields([own[tile], *(each[level] for each in drawn)])
     tiles_first = [list(levels) for levels in zip(*fields, strict=True)]
     return [list(level) for level in zip(*equalise_heights(tiles_first, side), strict=True)]
+
+
+def equalise_heights(tiles: list[list[GaussianField]], side: float) -> list[list[GaussianField]]:
+    """Give all tiles the same mean height at the finest level; tiles[t][l] is level l of tile t.
+
+    A rigid shift would tear borders apart, so a tile is raised by A_t bump(x, y) in all its levels alike; A_t makes
+    the mean over its finest Gaussians that of all tiles.
+    """
+    heights = [float(levels[0].means[:, 2].astype(float).mean()) for levels in tiles]
+    goal = float(np.mean(heights))
+    raised = []
+    for levels, mean in zip(tiles, heights, strict=True):
+        share = bump(levels[0].means, side).mean()
+        amount = (goal - mean) / share if share > 0 else 0.0
+        raised.append([_raise_tile(field, amount, side) for field in levels])
+    return raised
+
+
+def _raise_tile(field: GaussianField, amount: float, side: float) -> GaussianField:
+    means = field.means.copy()
+    means[:, 2] += (amount * bump(field.means, side)).astype(np.float32)
+    return replace(field, means=means)
 
 
 def _draw_objects(

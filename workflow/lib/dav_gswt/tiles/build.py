@@ -81,12 +81,12 @@ class Recipe:
     Attributes:
         levels: the exemplar without its trend, by cell.
         trend: what was taken out of it.
-        corrections: [level][tile, y, x], what a tile's cells change of colour (3) and height.
+        corrections: what each tile's finest cells change of colour (3) and height; coarser cells take the mean.
     """
 
     levels: list[compose.BinnedLevel]
     trend: texture.Trend
-    corrections: list[Float32[Array, "tiles _ _ 4"]]
+    corrections: Float32[Array, "tiles n n 4"]
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def _raise_to(tiles: TileSet, height: float) -> TileSet:
     """The tiles at another mean height."""
     by, recipe = np.array([0, 0, 0, height - _mean_height(tiles)], np.float32), tiles.recipe
     assert recipe is not None
-    recipe = replace(recipe, corrections=[each + by for each in recipe.corrections])
+    recipe = replace(recipe, corrections=recipe.corrections + by)
     return replace(tiles, recipe=recipe, fields=compose_tiles(recipe, tiles.layout, tiles.labels, tiles.shifts))
 
 
@@ -209,8 +209,7 @@ def cut_tiles(
     shifts = np.stack([layout.label_shifts(plan, found.places, tile) for tile in range(len(found.labels))])
     soft = poisson_blending.make_soft_maps(colour, height)
     corrections = options.corrected * poisson_blending.solve_corrections(plan, found, shifts, soft)
-    coarser = [_coarsen_corrections(corrections, found.labels, level.cell) for level in binned]
-    recipe = _equalise_heights(Recipe(binned, trend, coarser), found.labels, shifts)
+    recipe = _equalise_heights(Recipe(binned, trend, corrections.astype(np.float32)), found.labels, shifts)
     fields = compose_tiles(recipe, plan, found.labels, shifts)
     report = {
         "places": {name: places.tolist() for name, places in vars(found.places).items()},
@@ -250,50 +249,41 @@ def _average_uncertainty(uncertainty: Array, labels: Array, shifts: Array) -> Fl
     return means
 
 
-def _coarsen_corrections(corrections: Array, labels: Array, cell: int) -> Float32[Array, "tiles k k 4"]:
-    """The corrections of all tiles on a level's cells."""
-    found = [
-        poisson_blending.coarsen_correction(change, own, compose.coarsen_labels(own, cell))
-        for change, own in zip(corrections, labels, strict=True)
-    ]
-    return np.stack(found).astype(np.float32)
-
-
 def _equalise_heights(recipe: Recipe, labels: Array, shifts: Array) -> Recipe:
     """Corrections that give all tiles the same mean height at the finest level.
 
     A rigid shift would tear borders apart, so a tile is raised by A_t bump(x, y) in all its levels alike; A_t makes
     the mean over its finest Gaussians that of all tiles.
     """
-    finest, changes = recipe.levels[0], recipe.corrections[0]
+    finest = recipe.levels[0]
     count = np.diff(finest.start)
     total = np.bincount(finest.numbers, finest.field.means[:, 2].astype(float), len(count))
-    share, means, raises = compose.bump_cells(labels.shape[1]), [], []
-    for own, shift, change in zip(labels, shifts, changes, strict=True):
+    middles = np.arange(labels.shape[1]) + 0.5
+    share = compose.bump(np.stack(np.meshgrid(middles, middles), -1).reshape(-1, 2), float(len(middles)))
+    means, raises = [], []
+    for own, shift, change in zip(labels, shifts, recipe.corrections, strict=True):
         rows, columns = layout.source_cells(own, shift)
         cells = rows * finest.cells + columns
         many = count[cells].sum()
         means.append((total[cells] + count[cells] * change[..., 3]).sum() / many if many else 0.0)
-        raises.append((count[cells] * share).sum() / many if many else 0.0)
+        raises.append((count[cells].ravel() * share).sum() / many if many else 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         amounts = np.where(np.array(raises) > 0, (np.mean(means) - np.array(means)) / raises, 0.0)
-    raised = []
-    for change in recipe.corrections:
-        by = amounts[:, None, None] * compose.bump_cells(change.shape[1])
-        raised.append(np.concatenate([change[..., :3], (change[..., 3] + by)[..., None]], -1).astype(np.float32))
+    raised = recipe.corrections.copy()
+    raised[..., 3] += (amounts[:, None] * share).reshape(raised.shape[:3])
     return replace(recipe, corrections=raised)
 
 
 def compose_tiles(recipe: Recipe, plan: Layout, labels: Array, shifts: Array) -> list[list[GaussianField]]:
     """fields[level][tile] of all levels: those up to a block's of the exemplar, the others of each tile's own cells."""
-    spacing = recipe.levels[0].exemplar.spacing
-    fields = [
-        [
-            compose.compose_tile(level, compose.coarsen_labels(own, level.cell), shift, change)
-            for own, shift, change in zip(labels, shifts, changes, strict=True)
-        ]
-        for level, changes in zip(progress(recipe.levels, "compose tiles"), recipe.corrections, strict=True)
-    ]
+    spacing, fields = recipe.levels[0].exemplar.spacing, []
+    for level in progress(recipe.levels, "compose tiles"):
+        tiles = []
+        for own, shift, correction in zip(labels, shifts, recipe.corrections, strict=True):
+            coarse = compose.coarsen_labels(own, level.cell)
+            change = poisson_blending.coarsen_correction(correction, own, coarse)
+            tiles.append(compose.compose_tile(level, coarse, shift, change))
+        fields.append(tiles)
     for number in range(len(fields), plan.levels):
         cell = 2 ** (number - 1)
         fields.append([compose.merge_cells(tile, plan.side // cell, cell * spacing) for tile in fields[-1]])

@@ -131,34 +131,6 @@ def bump(points: Float[Array, "n d"], side: float) -> Float[Array, "n"]:
     return s[:, 0] * s[:, 1]
 
 
-def bump_cells(cells: int) -> Float[Array, "n n"]:
-    """`bump` at the middles of a tile's cells."""
-    s = np.sin(np.pi * (np.arange(cells) + 0.5) / cells) ** 2
-    return s[:, None] * s
-
-
-def equalise_heights(tiles: list[list[GaussianField]], side: float) -> list[list[GaussianField]]:
-    """Give all tiles the same mean height at the finest level; tiles[t][l] is level l of tile t.
-
-    A rigid shift would tear borders apart, so a tile is raised by A_t bump(x, y) in all its levels alike; A_t makes
-    the mean over its finest Gaussians that of all tiles.
-    """
-    heights = [float(levels[0].means[:, 2].astype(float).mean()) for levels in tiles]
-    goal = float(np.mean(heights))
-    raised = []
-    for levels, mean in zip(tiles, heights, strict=True):
-        share = bump(levels[0].means, side).mean()
-        amount = (goal - mean) / share if share > 0 else 0.0
-        raised.append([_raise_tile(field, amount, side) for field in levels])
-    return raised
-
-
-def _raise_tile(field: GaussianField, amount: float, side: float) -> GaussianField:
-    means = field.means.copy()
-    means[:, 2] += (amount * bump(field.means, side)).astype(np.float32)
-    return replace(field, means=means)
-
-
 def merge_cells(tile: GaussianField, cells: int, spacing: float) -> GaussianField:
     """The next level of a tile of `cells` x `cells` cells, an even number of at least 4, each `spacing` wide.
 

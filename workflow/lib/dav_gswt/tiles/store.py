@@ -40,7 +40,7 @@ def write_tiles(sets: list[TileSet], folder: Path | str, seams: Path | str, prov
             arrays: dict[str, Any] = {"labels": tiles.labels, "shifts": tiles.shifts}
             if recipe := tiles.recipe:
                 arrays |= {"colour": recipe.trend.colour, "height": recipe.trend.height}
-                arrays |= {f"corrections{level}": values for level, values in enumerate(recipe.corrections)}
+                arrays |= {"corrections": recipe.corrections}
             else:
                 write_tile_fields(tiles.fields, own)
             np.savez_compressed(own / "labels.npz", **arrays)
@@ -125,4 +125,4 @@ def _make_recipe(arrays: dict[str, Array], levels: Levels, plan: Layout) -> Reci
     trend = Trend(exemplar, arrays["colour"], arrays["height"])
     flat = [remove_trend(field, trend) for field in levels.fields[: plan.composed_levels]]
     binned = [bin_gaussians(field, exemplar, 2**level) for level, field in enumerate(flat)]
-    return Recipe(binned, trend, [arrays[f"corrections{level}"] for level in range(len(binned))])
+    return Recipe(binned, trend, arrays["corrections"])
