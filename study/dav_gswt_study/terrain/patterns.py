@@ -12,7 +12,6 @@ exemplar is that of its finest level with its trend, pixels as wide as those of 
 import hashlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -24,7 +23,6 @@ from scipy.spatial import cKDTree
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
-from dav_gswt.geometry import cameras
 from dav_gswt.images import image_files
 from dav_gswt.lod.levels import Levels
 from dav_gswt.reconstruction import top_view
@@ -160,28 +158,24 @@ def _digest(bright: Float[Array, "m m"]) -> str:
 
 
 def write_landmarks(marks: list[Landmarks], path: Path | str) -> None:
-    """Write the landmarks of each material's exemplar as JSON: runs of cells [landmark, y, x, length]."""
+    """Write the landmarks of each material's exemplar as JSON: runs of cells, row by row from the south."""
     out = []
     for own in marks:
-        flat = np.concatenate([[0], np.pad(own.numbers, ((0, 0), (0, 1))).ravel(), [0]])
-        first = np.flatnonzero((flat[1:] != flat[:-1]) & (flat[1:] > 0))
-        last = np.flatnonzero((flat[1:] != flat[:-1]) & (flat[:-1] > 0))
-        wide = own.numbers.shape[1] + 1
-        runs = np.stack([flat[1:][first], first // wide, first % wide, last - first], 1)
-        out.append({"digest": own.digest, "cells": len(own.numbers), "runs": runs.tolist()})
+        first = np.flatnonzero(np.diff(own.numbers.ravel(), prepend=-1))
+        runs = {"first": first.tolist(), "numbers": own.numbers.ravel()[first].tolist()}
+        out.append({"digest": own.digest, "cells": len(own.numbers)} | runs)
     write_json(path, out)
 
 
 def read_landmarks(path: Path | str, sets: list[Levels]) -> list[Landmarks]:
     """Read what `write_landmarks` wrote for these exemplars. Raises: InputError: they are those of others."""
-    content, marks = read_json(path), []
-    for own, levels in zip(content, sets, strict=True):
-        grid, numbers = levels.grids[0], np.zeros((own["cells"],) * 2, int)
-        if own["digest"] != _digest(picture_exemplar(levels, grid.cells * grid.spacing, grid.cells)):
-            raise InputError(f"{path}: the landmarks are those of another exemplar: find them again")
-        for number, y, x, length in own["runs"]:
-            numbers[y, x : x + length] = number
+    marks = []
+    for own, levels in zip(read_json(path), sets, strict=True):
+        size = own["cells"]
+        numbers = np.repeat(own["numbers"], np.diff([*own["first"], size**2])).reshape(size, size)
         marks.append(Landmarks(own["digest"], numbers))
+        if own["digest"] != find_landmarks(levels).digest:
+            raise InputError(f"{path}: the landmarks are those of another exemplar: find them again")
     return marks
 
 
@@ -395,27 +389,12 @@ def measure_jumps(terrain: EndlessTerrain, manifest: Manifest, exact: bool) -> J
     found, ground = [], float(np.median(terrain.tiles[0, 0].means[:, 2]))
     for k in range(PLACES):
         shot = stills.Shot("above", (5.5 * k + 0.5, 3.5 * k + 0.5), ABOVE, 90.0, 90.0)
-        eye = stills.shot_camera(shot, terrain, manifest.eye_floor, WIDTH, WIDTH).centre
-        focal = 0.5 * WIDTH / np.tan(np.radians(30))
-        camera = cameras.top_down(0.0, 0.0, WIDTH, WIDTH, 1.0, 1.0)
-        camera = cameras.Camera(
-            camera.rotation, -camera.rotation @ eye, focal, focal, WIDTH / 2, WIDTH / 2, WIDTH, WIDTH
-        )
+        camera = stills.shot_camera(shot, terrain, manifest.eye_floor, WIDTH, WIDTH)
         picture = (
             stills.render_view(terrain, camera, manifest.sky, manifest.ground_colour, exact).astype(float).mean(-1)
         )
-        pixel = (eye[2] - ground) / focal
-        lines = [
-            sign * (terrain.side * np.arange(np.ceil(low / terrain.side), high / terrain.side) - middle) / pixel
-            + WIDTH / 2
-            for middle, sign in ((eye[0], 1), (eye[1], -1))
-            for low, high in [(middle - pixel * WIDTH / 2, middle + pixel * WIDTH / 2)]
-        ]
-        found.append(measure_jump(picture, *lines))
+        lines = terrain.side * np.arange(-terrain.reach, terrain.reach)[:, None] * [1, 1, 0] + [0, 0, ground]
+        columns, rows = (np.where(kept, lines, [*camera.centre[:2], ground]) for kept in ([1, 0, 0], [0, 1, 0]))
+        found.append(measure_jump(picture, camera.project(columns)[0][:, 0], camera.project(rows)[0][:, 1]))
     means = np.mean([list(asdict(jump).values()) for jump in found], 0).tolist()
     return Jump(means[0], means[1], means[2] / np.sqrt(PLACES))
-
-
-def tabulate(name: str, **parts: Any) -> dict[str, Any]:
-    """A row of a table: fields of measures, each after its measure's name."""
-    return {"of": name} | {f"{key}.{k}": v for key, part in parts.items() for k, v in asdict(part).items()}
