@@ -40,7 +40,7 @@ WIDE = 1 / 8  # of the exemplar's width: blur of what is wider than a period
 REGULAR = 0.15  # autocorrelation at the first period of regular ground, at least
 LONGEST = 0.25  # of the exemplar's width: a period, at most
 TURNS, SIZES = np.radians(np.arange(0, 360, 1.0)), np.linspace(0.85, 1.15, 31)  # of periods that are looked for
-ABOVE, WIDTH, SPAN, PLACES = 12.0, 900, 2, 4  # eye floors, pixels, pixels about a border, pictures of jumps
+ABOVE, WIDTH, SPAN, PLACES = 24.0, 900, 2, 2  # eye floors, pixels, pixels about a border, pictures of jumps
 LINES = 200  # random lines beside borders
 
 
@@ -385,7 +385,10 @@ def measure_jump(picture: Float[Array, "h w"], columns: Float[Array, "k"], rows:
 
 
 def measure_jumps(terrain: EndlessTerrain, manifest: Manifest, exact: bool) -> Jump:
-    """The jump in pictures from straight above, drawn in the order of cells as usual, or exactly by depth."""
+    """The jump in pictures from straight above, drawn in the order of cells as usual, or exactly by depth.
+
+    From ABOVE eye floors: the 3 x 3 cells about the eye, which are sorted exactly, are a small part of the picture.
+    """
     found, ground = [], float(np.median(terrain.tiles[0, 0].means[:, 2]))
     for k in range(PLACES):
         shot = stills.Shot("above", (5.5 * k + 0.5, 3.5 * k + 0.5), ABOVE, 90.0, 90.0)
