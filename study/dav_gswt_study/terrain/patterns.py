@@ -92,7 +92,7 @@ def compare_spectra(
     [2^k, 2^(k + 1)) periods a crop.
     """
     size = len(exemplar) // 2
-    halves = [measure_power(exemplar[:, :size]), measure_power(exemplar[:, -size:])]
+    halves = [measure_power(half, size) for half in (exemplar[:, :size], exemplar[:, -size:])]
     own = [measure_power(picture, size) for picture in terrains]
     octaves, across = [], size / pixels
     for k in range(int(np.ceil(np.log2(max(across / 0.5, 1)) - 1e-9))):
@@ -103,9 +103,8 @@ def compare_spectra(
     return octaves
 
 
-def measure_power(picture: Float[Array, "h w"], size: int | None = None) -> Float[Array, "k"]:
-    """Mean power in octaves of square crops (`compare_spectra`), the widest octave first. size: None: as they fit."""
-    size = size or min(picture.shape)
+def measure_power(picture: Float[Array, "h w"], size: int) -> Float[Array, "k"]:
+    """Mean power in octaves of square crops (`compare_spectra`), the widest octave first. size: of a crop, pixels."""
     y, x = (v.ravel() for v in np.mgrid[:size, :size])
     base = np.linalg.qr(np.stack([np.ones(size**2), x, y], 1))[0]
     hann = np.sin(np.pi * (np.arange(size) + 0.5) / size) ** 2
@@ -230,7 +229,7 @@ def measure_landmarks(
     nearest = np.full(len(where), np.inf)
     for number in np.unique(which[seen]):
         mine = which[seen] == number
-        nearest[mine] = cKDTree(where[mine]).query(where[mine], 2)[0][:, 1]
+        nearest[mine] = np.asarray(cKDTree(where[mine]).query(where[mine], 2)[0])[:, 1]
     total = max(int(marks.areas.sum()), 1)
     return LandmarkMeasures(
         len(marks.areas),
@@ -400,4 +399,4 @@ def measure_jumps(terrain: EndlessTerrain, manifest: Manifest, exact: bool) -> J
         columns, rows = (np.where(kept, lines, [*camera.centre[:2], ground]) for kept in ([1, 0, 0], [0, 1, 0]))
         found.append(measure_jump(picture, camera.project(columns)[0][:, 0], camera.project(rows)[0][:, 1]))
     means = np.mean([list(asdict(jump).values()) for jump in found], 0).tolist()
-    return Jump(means[0], means[1], means[2] / np.sqrt(PLACES))
+    return Jump(means[0], means[1], means[2] / PLACES**0.5)

@@ -33,9 +33,9 @@ def test_octaves_reach_from_half_the_exemplar_to_half_a_tile_and_ground_of_one_k
 
 def test_a_wave_lies_in_its_own_octave():
     wave = np.sin(2 * np.pi * np.arange(SIZE) * 6 / SIZE) * np.ones((SIZE, 1))
-    power = patterns.measure_power(wave)
+    power = patterns.measure_power(wave, SIZE)
     assert np.argmax(power) == 2 and power[2] > 0.95 * power.sum()  # 4 to 8 periods
-    assert patterns.measure_power(3 * wave).sum() == pytest.approx(9 * power.sum())
+    assert patterns.measure_power(3 * wave, SIZE).sum() == pytest.approx(9 * power.sum())
 
 
 CELLS = 8  # a side of a tile
