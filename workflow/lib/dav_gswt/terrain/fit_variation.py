@@ -24,9 +24,8 @@ from dav_gswt.raster import render
 from dav_gswt.terrain.choice import tiles_at
 from dav_gswt.terrain.variation import make_wave
 from dav_gswt.tiles import layout
-from dav_gswt.tiles.build import Recipe, TileSet
-from dav_gswt.tiles.compose import coarsen_labels
-from dav_gswt.tiles.poisson_blending import coarsen_correction
+from dav_gswt.tiles.build import TileSet
+from dav_gswt.tiles.compose import BinnedLevel
 
 WAVELENGTHS = 0.63, 1.57  # tile sides: widths of noise's cells. Its power is greatest at 1.6 times that
 WIDE = 0.1  # tile sides: blur of what counts as large scale
@@ -71,27 +70,30 @@ def map_colours(tiles: TileSet) -> tuple[Float[Array, "m m 3"], Float[Array, "t 
     """The exemplar with its trend, and each tile, from straight above: colours of the coarsest composed level's cells."""
     recipe = tiles.recipe
     assert recipe is not None
-    level = recipe.levels[-1]
-    flat, pieces = _see_flat(recipe), []
-    for own, shift, correction in zip(tiles.labels, tiles.shifts, recipe.corrections, strict=True):
-        coarse = coarsen_labels(own, level.cell)
-        change = coarsen_correction(correction, own, coarse)[..., :3]
-        pieces.append(flat[layout.source_cells(coarse, shift, level.cell)] + change)
-    whole = level.cells * level.cell
-    trend = recipe.trend.colour[:whole, :whole].reshape(level.cells, level.cell, level.cells, level.cell, 3)
-    return flat + trend.mean((1, 3)), np.array(pieces)
+    flat, trend, cell = _see_flat(recipe.levels[0]), recipe.trend.colour, recipe.levels[-1].cell
+    pieces = [
+        _shrink(flat[layout.source_cells(own, shift)] + correction[..., :3], cell)
+        for own, shift, correction in zip(tiles.labels, tiles.shifts, recipe.corrections, strict=True)
+    ]
+    return _shrink(flat + trend, cell), np.array(pieces)
 
 
-def _see_flat(recipe: Recipe) -> Float[Array, "m m 3"]:
+def _see_flat(level: BinnedLevel) -> Float[Array, "m m 3"]:
     """The exemplar without its trend; a hole has the mean colour."""
-    level = recipe.levels[-1]
-    step, (west, south) = level.exemplar.spacing * level.cell, (level.exemplar.west, level.exemplar.south)
+    step, cells, (west, south) = level.exemplar.spacing, level.cells, (level.exemplar.west, level.exemplar.south)
     top = float(level.field.means[:, 2].max()) + 10 * step
-    seen = render(level.field, cameras.top_down(west, south, level.cells, level.cells, step, top))
+    seen = render(level.field, cameras.top_down(west, south, cells, cells, step, top))
     known = seen.alpha > 0.5
     colour = seen.colour / np.maximum(seen.alpha, 0.5)[..., None]
     mean = colour[known].mean(0) if known.any() else 0.0
     return np.where(known[..., None], colour, mean)[::-1].astype(float)
+
+
+def _shrink(values: Float[Array, "h w c"], cell: int) -> Float[Array, "h1 w1 c"]:
+    """Means of whole cells that are so many times as wide."""
+    rows, columns = (n // cell for n in values.shape[:2])
+    whole = values[: rows * cell, : columns * cell]
+    return whole.reshape(rows, cell, columns, cell, -1).mean((1, 3))
 
 
 def find_axis(colour: Float[Array, "m m 3"], width: float) -> tuple[Float[Array, "3"], Float[Array, "m m"]]:
