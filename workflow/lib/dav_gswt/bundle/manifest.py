@@ -121,7 +121,17 @@ class Manifest(Entry):
         value = asdict(self)
         entries = [chunk for each in (*value["tiles"], *(value["objects"] or [])) for chunk in each["chunks"]]
         for entry in (value, *value["parts"], *entries):
-            for key in ("classes", "objects", "scatter", "variation", "composition", "heights", "level", "part", "first"):
+            for key in (
+                "classes",
+                "objects",
+                "scatter",
+                "variation",
+                "composition",
+                "heights",
+                "level",
+                "part",
+                "first",
+            ):
                 if key in entry and entry[key] is None:
                     del entry[key]
         if "classes" in value and not value["classes"]["painted"]:

@@ -37,9 +37,7 @@ LEAST = 1e-9  # power that is rounding
 DIGITS = 5  # of amplitudes
 
 
-def fit_variation(
-    tiles: Sequence[TileSet], factor: float, salt: int, across: slice = EVERY
-) -> list[WaveEntry] | None:
+def fit_variation(tiles: Sequence[TileSet], factor: float, salt: int, across: slice = EVERY) -> list[WaveEntry] | None:
     """The waves of all materials, times a factor; None: nothing is missing, or it is not known what the tiles lack.
 
     Args:   salt: of the terrain that is measured. across: the exemplar's windows that count, of WINDOWS from the west.
@@ -62,12 +60,13 @@ def _fit_waves(tiles: TileSet, salt: int, across: slice) -> Float[Array, "waves 
     target = measure_octaves(wanted, cells, side, across)
     own, *gains = (measure_octaves(values, cells, side) for values in (terrain, *noises))
     known = target > LEAST
-    power = nnls((np.array(gains) / np.maximum(target, LEAST)).T[known], (1 - own / np.maximum(target, LEAST))[known])[0]
+    shares, missing = (values[..., known] / target[known] for values in (np.array(gains), target - own))
+    power = nnls(shares.T, missing)[0]
     return np.sqrt(power)[:, None] * axis
 
 
 def map_colours(tiles: TileSet) -> tuple[Float[Array, "m m 3"], Float[Array, "t n n 3"]]:
-    """The exemplar with its trend, and each tile, from straight above: colours of the coarsest composed level's cells."""
+    """The exemplar with its trend, and each tile, from straight above, in cells of the coarsest composed level."""
     recipe = tiles.recipe
     assert recipe is not None
     flat, trend, cell = _see_flat(recipe.levels[0]), recipe.trend.colour, recipe.levels[-1].cell

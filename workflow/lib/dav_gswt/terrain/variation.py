@@ -45,9 +45,7 @@ class Variation:
         return change
 
 
-def make_wave(
-    x: Float[Array, "*n"], y: Float[Array, "*n"], number: int, width: float, salt: int
-) -> Float[Array, "*n"]:
+def make_wave(x: Float[Array, "*n"], y: Float[Array, "*n"], number: int, width: float, salt: int) -> Float[Array, "*n"]:
     """Noise in cells of a width, at points in the wave's own axes; |noise| <= 1, its standard deviation about 0.18."""
     noise, _ = gradient_noise(x / width + number * SHIFT[0], y / width + number * SHIFT[1], VARIATION + number, salt)
     return noise
