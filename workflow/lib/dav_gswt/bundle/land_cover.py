@@ -1,7 +1,7 @@
 """Entries of the manifest that say which material lies where, where objects stand, and how colours vary.
 
-`terrain.classes`, `terrain.scatter` and `terrain.variation` compute from them; docs/formats.md says what each key means and has the
-formulas.
+`terrain.classes`, `terrain.scatter` and `terrain.variation` compute from them; docs/formats.md says what each key means
+and has the formulas.
 """
 
 from collections.abc import Iterator, Sequence

@@ -36,6 +36,7 @@ from dav_gswt.files import parse_record, read_json
 
 NAME = "davgswt.json"
 FORMAT, VERSION = "davgswt", 4
+OPTIONAL = "classes", "objects", "scatter", "variation", "composition", "heights"  # keys that are left out for None
 ONLY_MATERIAL = "ground"  # the name of the material of a set that has one
 MAX_BYTES = 1 << 26  # of a manifest
 WHOLE = 1e-9  # error of whole numbers of steps, of their own size
@@ -121,17 +122,7 @@ class Manifest(Entry):
         value = asdict(self)
         entries = [chunk for each in (*value["tiles"], *(value["objects"] or [])) for chunk in each["chunks"]]
         for entry in (value, *value["parts"], *entries):
-            for key in (
-                "classes",
-                "objects",
-                "scatter",
-                "variation",
-                "composition",
-                "heights",
-                "level",
-                "part",
-                "first",
-            ):
+            for key in (*OPTIONAL, "level", "part", "first"):
                 if key in entry and entry[key] is None:
                     del entry[key]
         if "classes" in value and not value["classes"]["painted"]:

@@ -64,8 +64,8 @@ class Config(ConfigModel):
         "installed",
     )
     variation: float = key(
-        "large-scale light and dark of the ground, as a multiple of what the exemplar has; 0: none. Neither on a sphere "
-        "nor in gswt.zip",
+        "large-scale light and dark of the ground, as a multiple of what the exemplar has; 0: none. Neither on a "
+        "sphere nor in gswt.zip",
         1,
         ge=0,
         le=4,

@@ -144,5 +144,5 @@ def terrain_from_fields(
         objects=list(objects),
         extents=extents,
         scatter=scatter,
-        variation=manifest.variation and Variation(manifest.variation, side, manifest.salt),
+        variation=Variation(manifest.variation, side, manifest.salt) if manifest.variation else None,
     )

@@ -48,7 +48,7 @@ def gather_content(
 ) -> BundleContent:
     """What a bundle is made of.
 
-    Args:   materials: the folder of rule `find_materials`; None: one material, without objects. variation: of the config.
+    Args:   materials: the folder of rule `find_materials`; None: one material, without objects. variation: the key.
     Raises: InputError: tiles of another number of materials; see also `materials.store`.
     """
     if materials is None:
