@@ -1,4 +1,5 @@
-"""Bundle: what a viewer loads. Here tau enters: tiles of higher uncertainty are drawn in more orders, which viewers keep.
+"""Bundle: what a viewer loads. Here tau enters: tiles of higher uncertainty are drawn in more orders, which viewers keep. So does variation: how much
+large-scale light and dark the ground has.
 
 In: the tiles. Out: davgswt.json (the contract with the viewer, docs/formats.md) and its parts.
 """
@@ -26,6 +27,7 @@ rule bundle_tiles:
         runtime=per_attempt("10m"),
     params:
         tau=real("tau"),
+        variation=lookup(dpath="variation", within=config),
         seed=integer("seed"),
         source=code_of("bundle_tiles"),
     script:

@@ -15,10 +15,10 @@ with logging_to(snakemake.log[0]):
     inputs = {name: paths[name] for name in ("seams", "frame", "tiles", "levels", "photos")}
     inputs |= {"materials": paths.materials} if paths.get("materials") else {}
     reports = {"tiles": read_json(paths.seams), "levels": read_json(Path(paths.levels, "levels.json"))}
-    source = record_provenance(inputs, {"tau": params.tau, "seed": params.seed})
+    source = record_provenance(inputs, {"tau": params.tau, "variation": params.variation, "seed": params.seed})
     tiles = store.read_material_tiles(paths.tiles, paths.seams, paths.levels)
     build.write_bundle(
-        gather_content(tiles, paths.get("materials"), params.seed),
+        gather_content(tiles, paths.get("materials"), params.seed, params.variation),
         Path(snakemake.output.manifest).parent,
         build.BundleOptions(tau=params.tau, salt=params.seed, unit=frame.unit),
         source | {name: report["provenance"] for name, report in reports.items()},

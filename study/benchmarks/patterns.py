@@ -7,21 +7,26 @@ named by the exemplars. `patterns.py make brick|furrows FOLDER` makes the tiles 
 
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from dav_gswt.bundle import build as bundles
 from dav_gswt.bundle import store
+from dav_gswt.bundle.land_cover import WaveEntry
 from dav_gswt.lod.store import material_folder, read_material_levels, write_levels
 from dav_gswt.terrain import endless
 from dav_gswt.terrain.fit_cover import gather_content
+from dav_gswt.terrain.fit_variation import fit_variation
+from dav_gswt.terrain.variation import Variation
 from dav_gswt.tiles import build
 from dav_gswt.tiles import store as tile_store
 from dav_gswt.tiles.semantics import SemanticSource
 from dav_gswt_study.markdown import format_table
 from dav_gswt_study.terrain import lattice, patterns, regular
 
+WEST, EAST = slice(1), slice(-1, None)  # the exemplar's windows in its halves
 FINE = 96  # pixels a tile of the pictures that periods are measured in
 TILING = {"tile": "auto", "strip": "auto", "variants": 2, "energy": "colour"}
 KEPT = os.environ.get("LANDMARKS")
@@ -44,12 +49,22 @@ def make_ground(kind: str, folder: Path) -> None:
     bundles.write_bundle(gather_content(tiles, None, 0), folder / "bundle", bundles.BundleOptions(tau=0.6), {})
 
 
+def vary(alone: endless.EndlessTerrain, waves: list[WaveEntry] | None, number: int) -> endless.EndlessTerrain:
+    """A terrain of one material alone, with its part of other waves."""
+    own = [replace(wave, colours=[wave.colours[number]]) for wave in waves or []]
+    return replace(alone, variation=Variation(own, alone.side, alone.salt))
+
+
 def measure_bundle(folder: Path) -> list[list[str]]:
     """Rows of the table, one for all and one for each material."""
     around = folder.parent
-    levels = read_material_levels(next(p for p in (around / "levels", around.parent / "levels") if p.exists()))
+    at = next(p for p in (around / "levels", around.parent / "levels") if p.exists())
+    levels = read_material_levels(at)
     bundle = store.read_bundle(folder)
-    terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
+    varied = endless.terrain_from_bundle(bundle, {"kind": "flat"})
+    terrain = replace(varied, variation=None)  # noise of the place would hide a lattice from the measures
+    tiles, salt = tile_store.read_material_tiles(around / "tiles", around / "seams.json", at), bundle.manifest.salt
+    halves = [fit_variation(tiles, float(bool(varied.variation)), salt, side) for side in (WEST, EAST)]
     marks = [patterns.find_landmarks(own) for own in levels]
     if KEPT:
         path = Path(KEPT, "-".join(own.digest for own in marks) + ".json")
@@ -62,8 +77,9 @@ def measure_bundle(folder: Path) -> list[list[str]]:
     for number, (own, found) in enumerate(zip(levels, marks, strict=True)):
         alone = lattice.take_material(terrain, number)
         picture = patterns.picture_terrain(alone)
-        bright, exemplar = picture.mean(-1), patterns.picture_exemplar(own, terrain.side, lattice.PIXELS)
-        octaves = patterns.compare_spectra((bright, bright), exemplar, lattice.PIXELS)
+        both = [patterns.picture_terrain(vary(alone, waves, number)).mean(-1) for waves in halves]
+        exemplar = patterns.picture_exemplar(own, terrain.side, lattice.PIXELS)
+        octaves = patterns.compare_spectra((both[0], both[1]), exemplar, lattice.PIXELS)
         grid = lattice.measure_lattice(picture)
         with np.load(material_folder(around / "tiles", number) / "labels.npz") as tiles:
             copies = patterns.measure_landmarks(found, tiles["labels"], tiles["shifts"], patterns.choose_around(alone))

@@ -1,4 +1,5 @@
-"""The page's pictures beside the library's: on level ground, hills and a height map, of one material and of two.
+"""The page's pictures beside the library's: on level ground, hills and a height map, of one material and of two, whose
+colours vary.
 
 They may differ by what is done differently on purpose: the page fades a level on each pixel's alpha, the library on the
 Gaussian's peak; the page blends in 8 bits, so each of the splats that cover a pixel rounds by half a step.
@@ -43,6 +44,10 @@ CASES = [
     for place in PLACES
     if (place != "above" if covered else place not in ONLY_COVERED)
 ]
+WAVES = [
+    {"wavelength": 0.63, "colours": [[0.3, 0.3, 0.2], [0.1, 0.4, -0.2]]},
+    {"wavelength": 1.57, "colours": [[0.2, 0.1, 0.1], [0.3, 0.2, 0.5]]},
+]
 MEAN, MOST = 1.0, 32  # of 255: mean and largest difference that is allowed
 
 
@@ -55,7 +60,9 @@ def pair(request, tmp_path_factory):
     else:
         write_bundle(folder / "bundle", Ground(levels=3, speckle=40, things=4))
     write_page(folder / "bundle", VIEWER, folder / "page", surface)
-    manifest = Manifest.from_dict(json.loads((folder / "page/davgswt.json").read_text()))
+    value = json.loads((folder / "page/davgswt.json").read_text()) | ({"variation": WAVES} if covered else {})
+    (folder / "page/davgswt.json").write_text(json.dumps(value))
+    manifest = Manifest.from_dict(value)
     terrain = replace(endless.terrain_from_bundle(Bundle(folder / "page", manifest), {"kind": "flat"}), heights=surface)
     if covered:
         classes = replace(terrain.classes, heights=surface)

@@ -92,6 +92,19 @@ def test_surfaces_have_the_heights_slopes_and_bounds_shared_with_the_library(mod
         np.testing.assert_allclose(found["points"], expected, rtol=1e-12, atol=1e-12)
 
 
+def test_the_place_has_the_variation_shared_with_the_library(modules):
+    varied = golden("heights")["variation"]
+    computed = modules.evaluate(
+        """async ({ waves, side, salt, points }) => {
+          const { createVariation } = await import("./terrain/variation.js");
+          const { at } = createVariation({ variation: waves, tile_side: side, salt });
+          return points.map(({ x, y, material }) => at(x, y, material));
+        }""",
+        varied,
+    )
+    np.testing.assert_allclose(computed, [point["change"] for point in varied["points"]], rtol=0, atol=1e-12)
+
+
 def test_levels_have_the_weights_shared_with_the_library(modules):
     values = golden("weights")
     sharp = [entry for entry in values["levels"] if not entry["smooth"]]  # the page has no smooth fades

@@ -118,6 +118,7 @@ export interface Terrain {
   loaded: Promise<void>;
   height(x: number, y: number): number;
   normal(x: number, y: number): Vector;
+  variation(x: number, y: number, material?: number): Vector;
   cellAt(x: number, y: number): Cell;
   pick(origin: ArrayLike<number>, direction: ArrayLike<number>, farthest?: number): Hit | null;
   camera(place: Place, width: number, height: number): Camera;

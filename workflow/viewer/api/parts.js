@@ -10,6 +10,7 @@ import { hitGround } from "../terrain/camera.js";
 import { REACH, tileUnder } from "../terrain/cells.js";
 import { createDepthSorter } from "../terrain/draw_order.js";
 import { run } from "../terrain/steps.js";
+import { createVariation } from "../terrain/variation.js";
 
 /**
  * @typedef {import("../scene/open_terrain.js").OpenTerrain} OpenTerrain
@@ -54,11 +55,12 @@ function checkIndex(name, value, end) {
 }
 
 /**
- * Height and normal of the ground, the cell there, and where a ray meets it.
+ * Height and normal of the ground, its variation, the cell there, and where a ray meets it.
  *
  * @param {Pick<OpenTerrain, "manifest" | "heights" | "lift">} terrain
  */
 export function createGround({ manifest, heights, lift }) {
+  const variation = createVariation(manifest);
   /** @param {number} x @param {number} y */
   const height = (x, y) => {
     checkNumbers("x, y", [x, y], 2);
@@ -73,6 +75,12 @@ export function createGround({ manifest, heights, lift }) {
   return {
     height,
     normal,
+    /** @param {number} x @param {number} y @param {number} [material] */
+    variation(x, y, material = 0) {
+      checkNumbers("x, y", [x, y], 2);
+      checkIndex("material", material, manifest.materials.length);
+      return /** @type {[number, number, number]} */ (variation?.at(x, y, material) ?? [0, 0, 0]);
+    },
     /** @param {number} x @param {number} y */
     cellAt(x, y) {
       checkNumbers("x, y", [x, y], 2);

@@ -5,6 +5,7 @@ import { MAX_OCTAVES } from "../terrain/heights.js";
 import { MAX_OCTAVES as MAX_JITTER } from "../terrain/jitter.js";
 import { findRunFault } from "../terrain/painted.js";
 import { MAX_RADIUS } from "../terrain/scatter.js";
+import { MAX_WAVES as MAX_VARIATION } from "../terrain/variation.js";
 import {
   brief, isColour, isCoordinate, isDigest, isDirection, isFilled, isInside, isLength, isList, isName, isNatural,
   isRange, isSalt, isShare, isSize, isVector, isWhole, REMAKE,
@@ -33,7 +34,7 @@ import { MAX_RATIO } from "./zip.js";
  *   levels: LevelEntry[], parts: PartEntry[], composition?: Composition, tiles: TileEntry[],
  *   materials: MaterialEntry[],
  *   classes?: import("../terrain/classes.js").ClassesEntry, objects?: ObjectEntry[],
- *   scatter?: import("../terrain/scatter.js").ScatterEntry,
+ *   scatter?: import("../terrain/scatter.js").ScatterEntry, variation?: import("../terrain/variation.js").Wave[],
  *   heights?: import("../terrain/heights.js").HeightsEntry }} Manifest
  */
 
@@ -49,6 +50,7 @@ const MAX_TERMS = 64, MAX_OBJECTS = 256, MAX_CELLS = 64; // of a rule; of a terr
 const UNITS = { records: PLANES, plain: RECORD }; // bytes of a splat
 const MAX_PARTS = 1024, MAX_UNPACKED = 2 ** 29; // bytes of all parts
 const WHOLE = 1e-9; // relative error of whole numbers of steps
+const NARROWEST = 0.01, BROADEST = 1e4; // cells of the variation, in tile sides
 const MAX_GROUND = 4096; // along a tile or an exemplar
 const MAX_WAVES = 4096; // cells of the jitter along a tile's side
 const UNTURNED = 180; // degrees
@@ -59,7 +61,7 @@ const KEYS = new Set(`format version unit tile_side salt eye_floor ground_colour
   parts part first composition side cell exemplars
   wavelength octaves radius cells rows columns width materials name share first_tile classes
   rule weight wavelengths biases material low high soft jitter amplitude rise slope most ground
-  clearance painted objects density probability scatter turn size`.split(/\s+/));
+  clearance painted objects density probability scatter turn size variation colours`.split(/\s+/));
 
 /**
  * What each part of a manifest must be, given the whole; the parts before it are sound.
@@ -95,6 +97,8 @@ const PARTS = {
     || (isFilled(objects) && objects.length <= MAX_OBJECTS
       && objects.every((/** @type {any} */ one) => isObject(one, materials.length, side))),
   scatter: (scatter, { objects }) => (objects ? isScatter(scatter) : scatter === undefined),
+  variation: (waves, { materials: { length } }) => waves === undefined || (isFilled(waves) && waves.length <= MAX_VARIATION
+    && waves.every((/** @type {any} */ wave) => isWave(wave, length))),
   heights: (heights, m) => heights === undefined || (isSurface(heights, m.tile_side)
     && !(heights.kind === "sphere" && (m.classes || m.objects))),
 };
@@ -234,6 +238,10 @@ function isSurface(h, side) {
   return h?.kind === "image" && isInside(h.file) && [h.rows, h.columns].every((n) => isWhole(n, 1, MAX_SIDE))
     && isLength(h.width) && h.bytes === 4 * h.rows * h.columns && isDigest(h.sha256);
 }
+
+/** @param {any} wave @param {number} count of materials */
+const isWave = (wave, count) => isCoordinate(wave?.wavelength) && wave.wavelength >= NARROWEST && wave.wavelength <= BROADEST
+  && isList(wave.colours, count, (colour) => isList(colour, 3, (v) => isCoordinate(v) && Math.abs(v) <= 1));
 
 /** @param {any} one @param {number} firstTile */
 const isMaterial = (one, firstTile) => isName(one?.name) && isShare(one.share) && one.first_tile === firstTile

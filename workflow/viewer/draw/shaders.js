@@ -37,20 +37,22 @@ vec3 backdrop(float rise) {
 
 const FLAT = `vec3 surface(vec2 at) { return vec3(0.0); }`;
 
+const HASH = `
+uint mixBits(uint h) {
+  h = (h ^ h >> 16) * 0x85ebca6bu;
+  h = (h ^ h >> 13) * 0xc2b2ae35u;
+  return h ^ h >> 16;
+}
+uint hashCell(ivec2 cell, uint seed) { // seed: of axis and salt
+  return mixBits(mixBits(uint(cell.x) * 0x8da6b343u ^ seed) + uint(cell.y) * 0xd8163841u);
+}`;
+
 const HILLS = `
 uniform ivec2 cellUnder[${MAX_OCTAVES}]; // the noise's cell under the eye, octave by octave, and the place in it
 uniform vec2 placeUnder[${MAX_OCTAVES}];
 uniform float amplitude[${MAX_OCTAVES}], scale[${MAX_OCTAVES}];
 uniform int octaves;
 uniform uint salt;
-uint mixBits(uint h) {
-  h = (h ^ h >> 16) * 0x85ebca6bu;
-  h = (h ^ h >> 13) * 0xc2b2ae35u;
-  return h ^ h >> 16;
-}
-uint hashCell(ivec2 cell, uint axis) {
-  return mixBits(mixBits(uint(cell.x) * 0x8da6b343u ^ axis * 0xcb1ab31fu ^ salt) + uint(cell.y) * 0xd8163841u);
-}
 vec3 surface(vec2 at) { // height and slope at a place seen from the eye
   vec3 sum = vec3(0.0);
   for (int k = 0; k < octaves; k++) {
@@ -59,7 +61,7 @@ vec3 surface(vec2 at) { // height and slope at a place seen from the eye
     vec3 noise = vec3(0.0);
     for (int c = 0; c < 4; c++) {
       ivec2 corner = ivec2(c & 1, c >> 1);
-      uint bits = hashCell(cellUnder[k] + ivec2(cell) + corner, uint(3 + k));
+      uint bits = hashCell(cellUnder[k] + ivec2(cell) + corner, uint(3 + k) * 0xcb1ab31fu ^ salt);
       vec2 gradient = vec2(float(bits & 0xffffu), float(bits >> 16)) / 32767.5 - 1.0;
       float plane = dot(gradient, t - vec2(corner));
       bool east = corner.x == 1, north = corner.y == 1;
@@ -71,6 +73,31 @@ vec3 surface(vec2 at) { // height and slope at a place seen from the eye
     sum += amplitude[k] * noise * vec3(1.0, scale[k], scale[k]);
   }
   return sum;
+}`;
+
+/**
+ * Change of a material's colours at a place seen from the eye. Without loops: software renderers take twice as long.
+ *
+ * @param {number} waves @param {number} materials
+ */
+const variationCode = (waves, materials) => `
+uniform ivec2 waveUnder[${waves}]; // as cellUnder and placeUnder
+uniform vec2 wavePlace[${waves}], waveScale[${waves}]; // scale: cosine and sine of the turn, in cells a unit
+uniform vec3 waveColours[${waves * materials}];
+uniform uint waveSeeds[${waves}];
+float wave(ivec2 under, vec2 p, uint seed) {
+  vec2 low = floor(p), t = p - low, fade = t * t * t * (t * (6.0 * t - 15.0) + 10.0);
+  ivec2 cell = under + ivec2(low);
+  uvec4 bits = uvec4(hashCell(cell, seed), hashCell(cell + ivec2(1, 0), seed), hashCell(cell + ivec2(0, 1), seed),
+    hashCell(cell + 1, seed));
+  vec4 east = vec4(bits & 0xffffu) / 32767.5 - 1.0, north = vec4(bits >> 16) / 32767.5 - 1.0;
+  vec4 planes = east * (t.x - vec4(0, 1, 0, 1)) + north * (t.y - vec4(0, 0, 1, 1));
+  vec2 rows = mix(planes.xz, planes.yw, fade.x);
+  return mix(rows.x, rows.y, fade.y);
+}
+vec3 variation(vec2 at, int material) {
+  return ${Array.from({ length: waves }, (_, k) => `waveColours[${k * materials} + material]
+    * wave(waveUnder[${k}], wavePlace[${k}] + mat2(waveScale[${k}], -waveScale[${k}].y, waveScale[${k}].x) * at, waveSeeds[${k}])`).join("\n    + ")};
 }`;
 
 const IMAGE = `
@@ -153,6 +180,10 @@ const PLACE_ON_PLANE = `  vec2 way = vec2(1.0, 0.0); // cosine and sine of an ob
 const SHEAR = `    if (place > 0u) axes[k].xy = vec2(way.x * axes[k].x - way.y * axes[k].y, way.y * axes[k].x + way.x * axes[k].y);
     axes[k].z += dot(rise.yz, axes[k].xy); // the surface shears shapes along its slope`;
 
+const VARY = `  vec2 spot = place > 0u ? cell * side + corner.xy : seen.xy; // an object varies as the ground at its foot
+  uint soil = texelFetch(owners, ivec2(0, int(row / ${ROW}u)), 0).x >> 8u;
+  one.paint.rgb = clamp(one.paint.rgb + variation(spot, int(soil)), 0.0, 1.0);`;
+
 /** Sky that thins out with height, and far ground, as dav_gswt/terrain/sphere_backdrop.py has them. */
 export const SPHERE_BACKDROP = `
 uniform vec3 zenith, horizon, ground;
@@ -203,14 +234,17 @@ const PLACE_ON_SPHERE = `
   mat3 bent = face * mat3(
     grow.x * (vec3(1.0, 0.0, 0.0) - outward * outward.x), grow.y * (vec3(0.0, 1.0, 0.0) - outward * outward.y), outward);`;
 
-/** @param {import("../terrain/heights.js").HeightField["kind"]} kind */
-export const vertexShader = (kind) => `#version 300 es
+/**
+ * @param {import("../terrain/heights.js").HeightField["kind"]} kind
+ * @param {import("../terrain/variation.js").Variation | null} varied
+ */
+export const vertexShader = (kind, varied) => `#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2D;
 layout(location = 0) in uvec4 block;
 uniform usampler2D records, entries, places;
-uniform usampler2D owners;      // of each row of records, the number of the material, or of objects
+uniform usampler2D owners;      // of each row of records, the number of the material, or of objects; from bit 8 the material
 uniform highp sampler2D hues;   // of overlays, see overlays.js
 uniform vec3 right, up, ahead;  // camera axes in the world
 uniform vec3 corner;            // south-west corner of the middle cell, on the ground, seen from the eye
@@ -223,7 +257,9 @@ flat out float weight;          // of the Gaussian's level
 out vec2 at;                    // in standard deviations from the centre
 ${DECODE}
 ${kind === "sphere" ? SPHERE_BACKDROP : BACKDROP}
+${kind === "hills" || varied ? HASH : ""}
 ${kind === "sphere" ? SPHERE : SURFACES[kind]}
+${varied ? variationCode(varied.waves.length, varied.waves[0].colours.length) : ""}
 mat3 rotation(vec4 q) { // of length 1
   float w = q.x, x = q.y, y = q.z, z = q.w;
   return mat3(
@@ -281,12 +317,13 @@ ${kind === "sphere" ? "    axes[k] = bent * axes[k];" : SHEAR}
   at = (vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) * 2.0 - 1.0) * reach;
   vec2 pixel = focal * p.xy / p.z + at.x * lengths.x * major + at.y * lengths.y * vec2(-major.y, major.x);
   ${kind === "sphere" ? SPHERE_GOING : PLANE_GOING}
+${varied ? VARY : ""}
   vec3 paint = mix(one.paint.rgb, backdrop(${kind === "sphere" ? "seen / distance" : "seen.z / distance"}), going * going * (3.0 - 2.0 * going));
   if (overlay > 0) {
     uint owner = texelFetch(owners, ivec2(0, int(row / ${ROW}u)), 0).x;
-    uint numbers[5] = uint[5](mark & 255u, uint(level) * 32u, mark >> 8u & 255u, mark >> 16u & 255u, owner);
+    uint numbers[5] = uint[5](mark & 255u, uint(level) * 32u, mark >> 8u & 255u, mark >> 16u & 255u, owner & 255u);
     uint number = numbers[overlay - 1];
-    float share = overlay == ${UNCERTAINTY} && owner == ${OBJECTS}u ? 0.0 : 0.7; // objects have no uncertainty
+    float share = overlay == ${UNCERTAINTY} && numbers[4] == ${OBJECTS}u ? 0.0 : 0.7; // objects have no uncertainty
     paint = mix(vec3(dot(paint, vec3(0.3, 0.6, 0.1))), texelFetch(hues, ivec2(int(number), 0), 0).rgb, share);
   }
   colour = vec4(paint, opacity);

@@ -7,6 +7,7 @@ import {
 } from "../data/layout.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import { rateOf } from "../terrain/sphere.js";
+import { createVariation, VARIATION } from "../terrain/variation.js";
 import { createProgram, createTexture, setAxes } from "./gl.js";
 import { OBJECTS, overlayColours } from "./overlays.js";
 import { FRAGMENT, vertexShader } from "./shaders.js";
@@ -16,6 +17,7 @@ import { setHorizon } from "./sky.js";
  * @typedef {import("./gl.js").GL} GL
  * @typedef {import("../data/manifest.js").Manifest} Manifest
  * @typedef {import("../terrain/heights.js").HeightField} HeightField
+ * @typedef {import("../terrain/variation.js").Variation} Variation
  * @typedef {import("../worker/frame_builder.js").FrameAnswer} FrameAnswer
  * @typedef {Record<string, WebGLUniformLocation | null>} Uniforms
  *
@@ -32,7 +34,8 @@ const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3, PLACES = 4, OWNERS = 5; //
 
 /** @param {GL} gl @param {Manifest} manifest @param {HeightField} heights */
 export function createSplats(gl, manifest, heights) {
-  const { use, uniforms } = createProgram(gl, vertexShader(heights.kind), FRAGMENT);
+  const variation = createVariation(manifest);
+  const { use, uniforms } = createProgram(gl, vertexShader(heights.kind, variation), FRAGMENT);
   const tallest = Math.max(recordRows(manifest), orderPages(manifest) / PAGES_A_ROW);
   if (tallest > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new PageError(FULL);
   const records = createTexture(gl, gl.RGBA32UI, ROW, recordRows(manifest));
@@ -49,6 +52,7 @@ export function createSplats(gl, manifest, heights) {
   if (gl.getError() === gl.OUT_OF_MEMORY) throw new PageError(FULL);
   use();
   setConstants(gl, uniforms, manifest, heights);
+  if (variation) setWaves(gl, uniforms, variation);
 
   /** @param {number} unit @param {WebGLTexture} texture */
   function bind(unit, texture) {
@@ -78,7 +82,8 @@ export function createSplats(gl, manifest, heights) {
      * @param {{ tile: number, rows: Uint32Array, records: Uint32Array }} chunk
      */
     addRecords({ tile, rows, records: words }) {
-      const owner = Uint32Array.of(tile < manifest.tiles.length ? Math.floor(tile / each) : OBJECTS);
+      const object = manifest.objects?.[tile - manifest.tiles.length], material = object?.material ?? Math.floor(tile / each);
+      const owner = Uint32Array.of((object ? OBJECTS : material) + 256 * material);
       bind(OWNERS, owners);
       for (const row of rows) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, 1, 1, gl.RED_INTEGER, gl.UNSIGNED_INT, owner);
       bind(RECORDS, records);
@@ -132,6 +137,7 @@ export function createSplats(gl, manifest, heights) {
       if (!frame) return;
       use();
       setView(gl, uniforms, heights, manifest.tile_side, camera, frame);
+      if (variation) setWavesUnder(gl, uniforms, variation, camera);
       if (heights.kind === "sphere") {
         gl.uniform1f(uniforms.begin, 0.5 * (Math.max(Math.hypot(...camera.eye) - heights.radius, 0) + end));
       }
@@ -225,6 +231,20 @@ function setView(gl, uniforms, heights, side, camera, { i0, j0, eye, switches, b
     gl.uniform2iv(uniforms["cellUnder[0]"], cells);
     gl.uniform2fv(uniforms["placeUnder[0]"], places);
   }
+}
+
+/** @param {GL} gl @param {Uniforms} uniforms @param {Variation} variation */
+function setWaves(gl, uniforms, { waves, scales, salt }) {
+  gl.uniform1uiv(uniforms["waveSeeds[0]"], waves.map((_, k) => Math.imul(VARIATION + k, 0xcb1ab31f) ^ salt));
+  gl.uniform2fv(uniforms["waveScale[0]"], scales);
+  gl.uniform3fv(uniforms["waveColours[0]"], waves.flatMap(({ colours }) => colours.flat()));
+}
+
+/** @param {GL} gl @param {Uniforms} uniforms @param {Variation} variation @param {import("../terrain/camera.js").Camera} camera */
+function setWavesUnder(gl, uniforms, variation, { eye: [x, y] }) {
+  const { cells, places } = variation.under(x, y);
+  gl.uniform2iv(uniforms["waveUnder[0]"], cells);
+  gl.uniform2fv(uniforms["wavePlace[0]"], places);
 }
 
 /** @param {number[]} list @param {number} length */

@@ -106,6 +106,7 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
         classes=content.classes,
         objects=things or None,
         scatter=content.scatter,
+        variation=content.variation,
         format=manifest.FORMAT,
         version=manifest.VERSION,
         unit=options.unit,

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dav_gswt.bundle.land_cover import ClassesEntry, ScatterEntry
+from dav_gswt.bundle.land_cover import ClassesEntry, ScatterEntry, WaveEntry
 from dav_gswt.bundle.manifest import ONLY_MATERIAL
 from dav_gswt.field import GaussianField
 from dav_gswt.materials.model import MaterialInfo, ObjectLevels
@@ -21,6 +21,7 @@ class BundleContent:
         objects: may be none.
         classes: which material lies where; needed with several materials (`terrain.fit_cover`).
         scatter: where objects stand, and the probability of each; needed with objects.
+        variation: large-scale light and dark (`terrain.fit_variation`); None: none.
     """
 
     tiles: list[TileSet]
@@ -29,6 +30,7 @@ class BundleContent:
     classes: ClassesEntry | None = None
     scatter: ScatterEntry | None = None
     probabilities: list[float] = field(default_factory=list)
+    variation: list[WaveEntry] | None = None
 
     @classmethod
     def of_one_material(cls, tiles: TileSet) -> "BundleContent":

@@ -1,7 +1,7 @@
-"""Entries of the manifest that say which material lies where, and where objects stand.
+"""Entries of the manifest that say which material lies where, where objects stand, and how colours vary.
 
-`terrain.classes` and `terrain.scatter` compute from them; docs/formats.md says what each key means and has the
-formulas.
+`terrain.classes`, `terrain.scatter` and `terrain.variation` compute from them; docs/formats.md says what each key means
+and has the formulas.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,6 +20,7 @@ Octaves = Annotated[int, Field(ge=1, le=8)]
 Pixels = Annotated[int, Field(ge=1, le=4096)]
 Salt = Annotated[int, Field(ge=0, lt=2**32)]
 Name = Annotated[str, Field(min_length=1, max_length=80)]
+Change = Annotated[list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=3, max_length=3)]
 
 
 @dataclass(frozen=True)
@@ -130,3 +131,13 @@ class ScatterEntry(Entry):
     turn: Annotated[float, Field(ge=0, le=180)]
     size: Annotated[float, Field(ge=0, lt=1)]
     salt: Salt
+
+
+@dataclass(frozen=True)
+class WaveEntry(Entry):
+    """A wave of the variation: noise whose cells are `wavelength` tile sides wide, and of each material what noise of 1
+    adds to its red, green and blue.
+    """
+
+    wavelength: Annotated[float, Field(ge=0.01, le=1e4)]
+    colours: Annotated[list[Change], Field(min_length=1, max_length=8)]

@@ -28,7 +28,7 @@ from dav_gswt.bundle.encoding import (
     Share,
     Size,
 )
-from dav_gswt.bundle.land_cover import ClassesEntry, Name, ObjectEntry, Salt, ScatterEntry
+from dav_gswt.bundle.land_cover import ClassesEntry, Name, ObjectEntry, Salt, ScatterEntry, WaveEntry
 from dav_gswt.bundle.parts import LEVEL, MAX_SIZE, MAX_TOTAL, PLAIN, RECIPES, RECORDS, ChunkEntry, PartEntry
 from dav_gswt.bundle.recipes import Composition, locate_corner
 from dav_gswt.errors import InputError, summarize_error
@@ -36,6 +36,7 @@ from dav_gswt.files import parse_record, read_json
 
 NAME = "davgswt.json"
 FORMAT, VERSION = "davgswt", 4
+OPTIONAL = "classes", "objects", "scatter", "variation", "composition", "heights"  # keys that are left out for None
 ONLY_MATERIAL = "ground"  # the name of the material of a set that has one
 MAX_BYTES = 1 << 26  # of a manifest
 WHOLE = 1e-9  # error of whole numbers of steps, of their own size
@@ -105,6 +106,7 @@ class Manifest(Entry):
     classes: ClassesEntry | None = None
     objects: Annotated[Sequence[ObjectEntry], Field(min_length=1, max_length=256)] | None = None
     scatter: ScatterEntry | None = None
+    variation: Annotated[list[WaveEntry], Field(min_length=1, max_length=3)] | None = None
     format: Literal["davgswt"]
     version: Literal[4]
     unit: Annotated[str, Field(min_length=1)]
@@ -120,7 +122,7 @@ class Manifest(Entry):
         value = asdict(self)
         entries = [chunk for each in (*value["tiles"], *(value["objects"] or [])) for chunk in each["chunks"]]
         for entry in (value, *value["parts"], *entries):
-            for key in ("classes", "objects", "scatter", "composition", "heights", "level", "part", "first"):
+            for key in (*OPTIONAL, "level", "part", "first"):
                 if key in entry and entry[key] is None:
                     del entry[key]
         if "classes" in value and not value["classes"]["painted"]:
@@ -242,6 +244,8 @@ def _find_wrong_cover(manifest: Manifest) -> Iterator[str]:
         yield "classes: needed with several materials, and only then"
     if (manifest.scatter is None) != (not objects):
         yield "scatter: needed with objects, and only then"
+    if any(len(wave.colours) != count for wave in manifest.variation or []):
+        yield f"variation: a wave does not have a colour for each of {count} materials"
     if any(each.material >= count for each in objects):
         yield "objects: one stands on a material that is not there"
     for fault in manifest.classes.find_faults(count) if manifest.classes else []:

@@ -63,6 +63,13 @@ class Config(ConfigModel):
         "know colours and superpixels only, scores and metrics lack LPIPS",
         "installed",
     )
+    variation: float = key(
+        "large-scale light and dark of the ground, as a multiple of what the exemplar has; 0: none. Neither on a "
+        "sphere nor in gswt.zip",
+        1,
+        ge=0,
+        le=4,
+    )
     heights: Surface = key("the surface that the tiles are placed on", Flat(kind="flat"))
     classes: list[ClassTerm] = key(
         "which material lies where, on a terrain of several: terms whose scores are added",

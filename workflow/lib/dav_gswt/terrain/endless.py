@@ -18,6 +18,7 @@ from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_missing
 from dav_gswt.terrain.classes import Classes
 from dav_gswt.terrain.heights import FlatSurface, HeightField
 from dav_gswt.terrain.scatter import Scatter
+from dav_gswt.terrain.variation import Variation
 from dav_gswt.tiles.layout import EDGES
 
 NEAR = 0.1  # near plane, as a share of the eye floor
@@ -35,7 +36,7 @@ class EndlessTerrain:
     material's tiles. near: distance of the near plane. reach: distance to the last tiles, in tile sides; beyond it the
     ground has the terrain's mean colour. classes: which material lies where; None with one. objects:
     objects[number][level], about the foot. extents: of each object, the largest distance of a Gaussian's rim from the
-    foot. scatter: where they stand; None without objects.
+    foot. scatter: where they stand; None without objects. variation: of colours, not on a sphere; None: none.
     """
 
     tiles: dict[tuple[int, int], GaussianField]
@@ -55,6 +56,7 @@ class EndlessTerrain:
     objects: list[list[GaussianField]] = field(default_factory=list)
     extents: list[float] = field(default_factory=list)
     scatter: Scatter | None = None
+    variation: Variation | None = None
 
     @property
     def object_entries(self) -> Sequence[ObjectEntry]:
@@ -142,4 +144,5 @@ def terrain_from_fields(
         objects=list(objects),
         extents=extents,
         scatter=scatter,
+        variation=Variation(manifest.variation, side, manifest.salt) if manifest.variation else None,
     )

@@ -17,6 +17,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.materials.borders import measure_bend
 from dav_gswt.materials.store import read_objects, read_report
 from dav_gswt.terrain.classes import LATTICE, Classes
+from dav_gswt.terrain.fit_variation import fit_variation
 from dav_gswt.terrain.scatter import Scatter
 from dav_gswt.tiles.build import TileSet
 
@@ -42,18 +43,23 @@ WANTED, MAX_WINDOW = 600.0, 96  # objects that a probability is measured with; t
 SCATTER_PASSES = 5
 
 
-def gather_content(tiles: list[TileSet], materials: Path | str | None, salt: int) -> BundleContent:
-    """What a bundle is made of. materials: the folder of rule `find_materials`; None: one material, without objects.
+def gather_content(
+    tiles: list[TileSet], materials: Path | str | None, salt: int, variation: float = 1.0
+) -> BundleContent:
+    """What a bundle is made of.
 
+    Args:   materials: the folder of rule `find_materials`; None: one material, without objects. variation: the key.
     Raises: InputError: tiles of another number of materials; see also `materials.store`.
     """
     if materials is None:
-        return BundleContent.of_one_material(tiles[0])
+        content = BundleContent.of_one_material(tiles[0])
+        return replace(content, variation=fit_variation(tiles[:1], variation, salt))
     report = read_report(materials)
     if len(tiles) != len(report.materials):
         raise InputError("materials: this tiling is of the first one alone; choose another or `materials: one`")
     objects = read_objects(materials, len(tiles[0].fields), tiles[0].spacing)
-    return fit_cover(BundleContent(tiles, [*report.materials], objects), salt)
+    waves = fit_variation(tiles, variation, salt)
+    return fit_cover(BundleContent(tiles, [*report.materials], objects, variation=waves), salt)
 
 
 def fit_cover(content: BundleContent, salt: int) -> BundleContent:

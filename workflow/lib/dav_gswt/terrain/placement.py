@@ -16,6 +16,7 @@ from dav_gswt.terrain.draw_order import crossfade_opacity, level_weights, neares
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import displace_means
 from dav_gswt.terrain.scatter import Instances
+from dav_gswt.terrain.variation import tint_field
 from dav_gswt.terrain.visibility import GridCells, active_levels, active_range
 
 Part = tuple[GaussianField, Int[Array, "_"]]  # Gaussians, and the level of each
@@ -48,10 +49,13 @@ def concatenate_parts(parts: list[Part]) -> Part:
 
 
 def collect_tiles(terrain: EndlessTerrain, cell: GridCells, levels: list[int]) -> dict[int, GaussianField]:
-    """The Gaussians of one cell's tiles by level: of several materials those that stay (see `classes`)."""
+    """The Gaussians of one cell's tiles by level, with the colours of the place: of several materials those that stay
+    (see `classes`).
+    """
     (i,), (j,), (tile,), (bits,) = cell.i.tolist(), cell.j.tolist(), cell.tile.tolist(), cell.materials.tolist()
     if terrain.classes is None or bits & (bits - 1) == 0:
-        return {level: terrain.tiles[level, tile] for level in levels}
+        material = tile // terrain.tiles_each
+        return {level: _vary_colours(terrain, terrain.tiles[level, tile], i, j, material) for level in levels}
     found, each = {}, terrain.tiles_each
     for level in levels:
         parts = {
@@ -59,8 +63,30 @@ def collect_tiles(terrain: EndlessTerrain, cell: GridCells, levels: list[int]) -
         }
         field = concatenate_fields(list(parts.values()))
         material = np.repeat(list(parts), [len(part) for part in parts.values()])
-        found[level] = field[terrain.classes.keep(i, j, field.means, material)]
+        kept = terrain.classes.keep(i, j, field.means, material)
+        found[level] = _vary_colours(terrain, field[kept], i, j, material[kept])
     return found
+
+
+def _vary_colours(
+    terrain: EndlessTerrain, field: GaussianField, i: int, j: int, material: int | Int[Array, "n"]
+) -> GaussianField:
+    """Gaussians of a cell, positions from its corner, with the colours of their places."""
+    if terrain.variation is None:
+        return field
+    x, y = (at * terrain.side + field.means[:, axis].astype(float) for axis, at in enumerate((i, j)))
+    return tint_field(field, terrain.variation.at(x, y, material))
+
+
+def vary_objects(
+    terrain: EndlessTerrain, field: GaussianField, found: Instances, row: Int[Array, "n"]
+) -> GaussianField:
+    """Gaussians of objects with the colours of the ground at their feet. row: the object of each."""
+    if terrain.variation is None:
+        return field
+    x, y = (found.i + found.u) * terrain.side, (found.j + found.v) * terrain.side
+    material = np.array([each.material for each in terrain.object_entries])[found.number]
+    return tint_field(field, terrain.variation.at(x, y, material)[row])
 
 
 def order_gaussians(parts: dict[int, GaussianField], direction: Vector) -> Part:
@@ -155,4 +181,5 @@ def place_objects(terrain: EndlessTerrain, found: Instances, cell: tuple[int, in
         parts.append(order_gaussians(shown or {len(levels) - 1: levels[-1][:0]}, terrain.directions[order]))
     field, level = concatenate_parts(parts)
     row = np.repeat(sequence, [len(levels) for _, levels in parts])
-    return turn_and_scale(field, turn_rows(angle)[row], found.size[row], feet[row]), level
+    field = turn_and_scale(field, turn_rows(angle)[row], found.size[row], feet[row])
+    return vary_objects(terrain, field, found, row), level
