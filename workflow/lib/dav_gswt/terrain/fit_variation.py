@@ -2,12 +2,12 @@
 
 Power is measured in square windows of half the exemplar's side: first that of the plane through each, which is all that
 is wider, then by octaves of wavelength down to half a tile, without the plane and by a Hann window. The exemplar loses
-its mean before. Terrain and noise are cut into squares as large as the exemplar and measured alike: what windows do to
-a spectrum, they do to all. The amplitudes of the waves are then those of least squares over
-octaves of (terrain + noise) / exemplar - 1. Where tiles have power themselves, only what is missing is added.
+its mean before. Terrain and noise are cut into squares as large as the exemplar and measured alike, so windows change
+all spectra alike. The amplitudes of the waves solve a least-squares problem over octaves: (terrain + noise) / exemplar
+is to be 1. Where tiles have power themselves, only what is missing is added.
 
-Colours vary along one axis, the main one of the exemplar's large scale: on photographed grounds the second one had a
-tenth of its amplitude at most. A bright blob is no statistic: along the axis, large-scale values are cut.
+Colours vary along one axis, the main one of the exemplar's large scale: on photographed grounds the second one has a
+third of its amplitude at most. A bright blob is no statistic: along the axis, large-scale values are cut.
 """
 
 from collections.abc import Sequence
