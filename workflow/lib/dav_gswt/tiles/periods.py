@@ -28,7 +28,8 @@ AROUND = 7  # bins of the spectrum on each side that a line is compared with
 RISE = 40.0  # times the power around: noise reaches 10 to 15 somewhere in a spectrum
 PARTS = 3  # parts of the exemplar along each side, in which a line is followed
 STEADY = 0.75  # of a line's mean power in the parts that is left in the mean of their amplitudes
-SHARE = 1e-3  # of the colours' variance that a line explains at least
+SHARE, VISIBLE = 1e-3, 0.02  # of the colours' variance that a line, and all of them, explain at least
+FAINTEST = (1 / 255) ** 2  # variance that they explain at least: else nobody sees them
 LINES = 16  # of the spectrum, the strongest
 ALIKE = 0.9  # correlation of the pattern with itself, moved by a period
 APART = 0.75  # bins that a line may lie from a whole number of waves
@@ -85,10 +86,12 @@ class _Line:
 
 def find_waves(colour: Float[Array, "m m c"]) -> Float[Array, "k 2"]:
     """Wave vectors (east, north; cycles per cell) of a map's pattern: of none, one or two periods. NaN: not known."""
-    values = colour - np.nanmean(colour, (0, 1))
-    values = np.nan_to_num(values).astype(float)
+    known, values = np.isfinite(colour), np.nan_to_num(colour).astype(float)
+    values = np.where(known, values - values.sum((0, 1)) / np.maximum(known.sum((0, 1)), 1), 0)
     lines = _find_lines(values)
-    return _find_generators(lines, len(values)) if lines else np.zeros((0, 2))
+    share = sum(line.share for line in lines)
+    seen = share >= VISIBLE and share * values.var((0, 1)).sum() >= FAINTEST
+    return _find_generators(lines, len(values)) if seen else np.zeros((0, 2))
 
 
 def _find_lines(values: Float[Array, "m m c"]) -> list[_Line]:
@@ -171,12 +174,12 @@ def _fit_generators(waves: Array, weights: Array, counts: Float[Array, "n k"], r
     return generators
 
 
-def describe_rows(waves: Float[Array, "k 2"], spacing: float) -> str:
+def describe_rows(waves: Float[Array, "k 2"], spacing: float, unit: str = "") -> str:
     """The periods of waves in world units, and the directions that their rows run in, in words."""
     degrees = (np.degrees(np.arctan2(waves[:, 1], waves[:, 0])) + 90) % 180
     periods = spacing / np.linalg.norm(waves, axis=1)
     pairs = zip(periods.tolist(), degrees.tolist(), strict=True)
-    return " and ".join(f"every {period:.3g}, {angle:.0f} degrees from east" for period, angle in pairs)
+    return " and ".join(f"every {period:.2g}{unit}, {angle:.0f} degrees from east" for period, angle in pairs)
 
 
 def measure_turn(turn: Float[Array, "2 2"]) -> tuple[float, float]:
@@ -236,7 +239,7 @@ def _turn_level(
     x, y = np.moveaxis(np.stack(np.meshgrid(at, at), -1) @ turn.T + middle, -1, 0)
     row, column = (y - grid.south) / grid.spacing - 0.5, (x - grid.west) / grid.spacing - 0.5
 
-    def sample(values: Float[Array, "n"]) -> Float[Array, "m m"]:
+    def sample(values: Float[Array, "..."]) -> Float[Array, "m m"]:
         return map_coordinates(values.reshape(grid.shape).astype(float), [row, column], order=3, mode="nearest")
 
     nearest = tuple(np.clip(np.rint(v).astype(int), 0, n - 1) for v, n in zip((row, column), grid.shape, strict=True))

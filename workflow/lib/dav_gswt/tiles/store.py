@@ -3,8 +3,9 @@
 labels.npz has labels, shifts and what composed tiles need beside the levels: the trend that is taken out of these and
 each tile's corrections. Tiles that are not composed are lod{l}_tile_{TT}.ply beside it.
 
-seams.json is written last and holds the counts: where it exists, the set is whole. The sets of further materials are
-in the folders material1, material2, ... of the first one's, their tables in its seams.json under `materials`.
+seams.json has the turn of an exemplar whose ground is regular, which the levels lack. It is written last and holds the
+counts: where it exists, the set is whole. The sets of further materials are in the folders material1, material2, ... of
+the first one's, their tables in its seams.json under `materials`.
 """
 
 from pathlib import Path
