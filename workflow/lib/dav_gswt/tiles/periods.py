@@ -151,6 +151,8 @@ def _find_generators(lines: list[_Line], cells: int) -> Float[Array, "k 2"]:
             return _fit_generators(waves, weights, waves @ periods[[0, apart[0]]].T, near)
     along = waves[parallel] @ way
     period = _find_periods(along[:, None], weights[parallel], reach[reach > 0, None])[:1]
+    if not len(period):  # lines of several patterns: the strongest counts
+        return waves[[np.argmax(weights)]]
     return _fit_generators(waves[parallel], weights[parallel], along[:, None] @ period, near)
 
 
@@ -166,7 +168,7 @@ def _find_periods(waves: Float[Array, "n d"], weights: Float[Array, "n"], lags: 
 
 def _fit_generators(waves: Array, weights: Array, counts: Float[Array, "n k"], reach: float) -> Float[Array, "k 2"]:
     """Generators by least squares, from the waves and how many of each they are, without those that lie apart."""
-    counts = np.rint(counts)
+    counts, generators = np.rint(counts), np.zeros((counts.shape[1], 2))
     for _ in range(3):
         generators = np.linalg.pinv(counts * weights[:, None]) @ (waves * weights[:, None])
         fits = np.linalg.norm(counts @ generators - waves, axis=1) < reach
@@ -234,7 +236,7 @@ def _turn_level(
     """One level. Colours and heights of the ground are sampled by cubic splines; all else of a disc is its cell's."""
     west, south, side = grid.exemplar
     middle = np.array([west + side / 2, south + side / 2])
-    corner = middle - cells * grid.spacing / 2
+    west, south = (middle - cells * grid.spacing / 2).tolist()
     at = (np.arange(cells) + 0.5 - cells / 2) * grid.spacing
     x, y = np.moveaxis(np.stack(np.meshgrid(at, at), -1) @ turn.T + middle, -1, 0)
     row, column = (y - grid.south) / grid.spacing - 0.5, (x - grid.west) / grid.spacing - 0.5
@@ -243,7 +245,7 @@ def _turn_level(
         return map_coordinates(values.reshape(grid.shape).astype(float), [row, column], order=3, mode="nearest")
 
     nearest = tuple(np.clip(np.rint(v).astype(int), 0, n - 1) for v, n in zip((row, column), grid.shape, strict=True))
-    made = Ground(*corner.tolist(), grid.spacing, 0, 0, cells, sample(grid.heights), grid.seen[nearest])
+    made = Ground(west, south, grid.spacing, 0, 0, cells, sample(grid.heights), grid.seen[nearest])
     parts, standing = [], discs.remove_underlay(field, grid)
     if field.ground.any():
         layer, standing = standing[: grid.heights.size], standing[grid.heights.size :]
