@@ -1,6 +1,6 @@
 """Alpha-expansion: all patches of a tile moved against one another at once, as the paper has it, instead of exact cuts.
 
-In: the levels. Out: tiles_{tiling}-expansion/. It was not shown to help (study/docs/lab-notes.md).
+In: the levels. Out: tiles_{tiling}-expansion/. It was not shown to help (study/docs/results/seams.md).
 """
 
 

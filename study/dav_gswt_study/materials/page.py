@@ -1,6 +1,5 @@
 """The tables of study/docs/results/materials.md, from the tables of study/docs/data."""
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -56,5 +55,4 @@ def _describe_verdict(row: dict[str, str]) -> Sequence[str]:
 
 
 def _round(row: dict[str, str], names: Iterable[str], digits: int = 3) -> list[str]:
-    """Numbers without the 0 before the point."""
-    return [re.sub(r"^(-?)0\.", r"\1.", f"{float(row[name]):.{digits}f}") for name in names]
+    return [f"{float(row[name]):.{digits}f}" for name in names]

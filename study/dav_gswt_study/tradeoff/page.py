@@ -4,14 +4,7 @@ from dav_gswt_study.experiments import PRESET
 from dav_gswt_study.markdown import format_number, format_table
 from dav_gswt_study.tradeoff.tables import UNITS
 
-SAME = 0.02  # of the time: a setting that takes that much more or less is as fast
-MIN_LOSS = {"dB": 0.005, "LPIPS": 0.00005, "grey levels": 0.005}  # a smaller loss is none: it would be written as 0
 DIGITS = {"dB": 2, "LPIPS": 4, "grey levels": 2}
-WHAT = {
-    "views": "of PSNR of test views; seconds of all jobs to the bundle",
-    "stills": "root mean square difference of the stills; seconds of the jobs on tiles",
-    "seams": "how much more Seam-LPIPS over its floor; seconds of the jobs on tiles",
-}
 
 
 def describe_tradeoff(rows: list[dict], pareto: list[dict]) -> dict:
@@ -38,32 +31,6 @@ def describe_preset(row: dict) -> str:
     return f"`{row['setting']}` is not the best for its time: another setting is as good and faster."
 
 
-def describe_change(row: dict, best: dict) -> str:
-    """What turning a knob from its most accurate setting to another brings and costs, as a sentence."""
-    unit, own, other = UNITS[row["measure"]], row["own_seconds"], best["own_seconds"]
-    said = f"`{row['knob']}` {row['setting']} instead of {best['setting']}: "
-    if None in (own, other, row["loss"]):
-        return f"{said}not measured."
-    lost = row["loss"] if abs(row["loss"]) >= MIN_LOSS[unit] else 0.0
-    amount = f"{abs(lost):.{DIGITS[unit]}f} {unit}"
-    value = {1: f"costs {amount}", 0: "costs nothing", -1: f"is better by {amount}"}[(lost > 0) - (lost < 0)]
-    joined = "but" if (own > other) == (lost < 0) and lost else "and"
-    return f"{said}{_describe_pace(own / other)} {joined} {value}{_describe_bytes(row, best)}."
-
-
-def _describe_bytes(row: dict, best: dict) -> str:
-    if None in (row["bundle_mb"], best["bundle_mb"]) or abs(row["bundle_mb"] / best["bundle_mb"] - 1) <= SAME:
-        return ""
-    return f"; the bundle is {row['bundle_mb'] / best['bundle_mb']:.2f} times as large"
-
-
-def _describe_pace(share: float) -> str:
-    """share: of the most accurate setting's time."""
-    if abs(share - 1) <= SAME:
-        return "is as fast"
-    return f"is {1 / share:.2f} times as fast" if share < 1 else f"takes {share:.2f} times as long"
-
-
 def _tabulate_presets(pareto: list[dict]) -> tuple[list[str], list[list[str]]]:
     form = {"seconds": 0, "psnr": 2, "ssim": 3, "lpips": 3, "peak_mb": 0, "bundle_mb": 1}
     head = ["preset", "seconds", "PSNR (dB)", "SSIM", "LPIPS", "memory (MB)", "bundle (MB)"]
@@ -78,7 +45,7 @@ def _tabulate_presets(pareto: list[dict]) -> tuple[list[str], list[list[str]]]:
 
 def _describe_knob(knob: str, rows: list[dict]) -> dict:
     mine = [row for row in rows if row["knob"] == knob]
-    best, unit = next(row for row in mine if row["most"]), UNITS[mine[0]["measure"]]
+    unit = UNITS[mine[0]["measure"]]
     head = ["setting", "seconds", "PSNR (dB)", "LPIPS", f"loss ({unit})", "memory (MB)", "bundle (MB)"]
     form = {"own_seconds": 1, "psnr": 2, "lpips": 3, "loss": DIGITS[unit], "peak_mb": 0, "bundle_mb": 1}
     bold = {0: "{}", 1: "**{}**"}
@@ -88,8 +55,6 @@ def _describe_knob(knob: str, rows: list[dict]) -> dict:
     ]
     return {
         "name": knob,
-        "what": WHAT[best["measure"]],
-        "policy": best["policy"],
+        "policy": mine[0]["policy"],
         "table": format_table(head, shown),
-        "changes": [describe_change(row, best) for row in mine if not row["most"]],
     }

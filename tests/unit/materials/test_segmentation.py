@@ -98,6 +98,7 @@ def test_each_merger_is_the_cheapest_of_all_that_are_allowed():
 
 K = 200
 ROWS, COLUMNS = np.mgrid[:K, :K]
+NOISE = gaussian_filter(np.random.default_rng(0).normal(size=(K, K)), 8)
 
 
 def test_a_winding_path_that_is_found_twice_counts_once():
@@ -124,6 +125,7 @@ def test_a_fork_of_roads_is_found_whole_also_with_something_lying_across():
         (COLUMNS // 25) % 2 == 0,  # one of many
         COLUMNS % 50 < 8,  # the same, far apart
         ((ROWS % 24 < 9) | (COLUMNS % 24 < 9)) & (ROWS > 60),  # a net
+        NOISE > np.quantile(NOISE, 2 / 3),  # branched, over a third of the ground
         np.zeros((K, K), bool),
     ],
 )
