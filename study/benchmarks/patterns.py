@@ -13,7 +13,7 @@ import numpy as np
 
 from dav_gswt.bundle import build as bundles
 from dav_gswt.bundle import store
-from dav_gswt.lod.store import material_folder, read_material_levels, write_levels
+from dav_gswt.lod.store import material_folder, write_levels
 from dav_gswt.terrain import endless
 from dav_gswt.terrain.fit_cover import gather_content
 from dav_gswt.tiles import build
@@ -47,7 +47,8 @@ def make_ground(kind: str, folder: Path) -> None:
 def measure_bundle(folder: Path) -> list[list[str]]:
     """Rows of the table, one for all and one for each material."""
     around = folder.parent
-    levels = read_material_levels(next(p for p in (around / "levels", around.parent / "levels") if p.exists()))
+    given = next(p for p in (around / "levels", around.parent / "levels") if p.exists())
+    levels = tile_store.read_exemplars(around / "seams.json", given)
     bundle = store.read_bundle(folder)
     terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
     marks = [patterns.find_landmarks(own) for own in levels]
