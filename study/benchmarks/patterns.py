@@ -15,7 +15,7 @@ import numpy as np
 from dav_gswt.bundle import build as bundles
 from dav_gswt.bundle import store
 from dav_gswt.bundle.land_cover import WaveEntry
-from dav_gswt.lod.store import material_folder, read_material_levels, write_levels
+from dav_gswt.lod.store import material_folder, write_levels
 from dav_gswt.terrain import endless
 from dav_gswt.terrain.fit_cover import gather_content
 from dav_gswt.terrain.fit_variation import fit_variation
@@ -58,12 +58,12 @@ def vary(alone: endless.EndlessTerrain, waves: list[WaveEntry] | None, number: i
 def measure_bundle(folder: Path) -> list[list[str]]:
     """Rows of the table, one for all and one for each material."""
     around = folder.parent
-    at = next(p for p in (around / "levels", around.parent / "levels") if p.exists())
-    levels = read_material_levels(at)
+    given = next(p for p in (around / "levels", around.parent / "levels") if p.exists())
+    levels = tile_store.read_exemplars(around / "seams.json", given)
     bundle = store.read_bundle(folder)
     varied = endless.terrain_from_bundle(bundle, {"kind": "flat"})
     terrain = replace(varied, variation=None)  # noise of the place would hide a lattice from the measures
-    tiles, salt = tile_store.read_material_tiles(around / "tiles", around / "seams.json", at), bundle.manifest.salt
+    tiles, salt = tile_store.read_material_tiles(around / "tiles", around / "seams.json", given), bundle.manifest.salt
     halves = [fit_variation(tiles, float(bool(varied.variation)), salt, side) for side in (WEST, EAST)]
     marks = [patterns.find_landmarks(own) for own in levels]
     if KEPT:

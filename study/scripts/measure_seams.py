@@ -4,7 +4,6 @@ from pathlib import Path
 
 from dav_gswt.files import write_json
 from dav_gswt.images import lpips_weights
-from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import record_provenance
 from dav_gswt.tiles import store
@@ -15,7 +14,7 @@ with logging_to(snakemake.log[0]):
     paths, params, tiling = snakemake.input, snakemake.params, dict(snakemake.params.tiling)
     alexnet = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
     cut = store.read_material_tiles(paths.tiles, paths.seams, paths.levels)
-    sets = zip(levels.read_material_levels(paths.levels), cut, strict=True)
+    sets = zip(store.read_exemplars(paths.seams, paths.levels), cut, strict=True)
     rows, dense = measure.measure_materials(sets, tiling, alexnet, params.seed, params.tau)
     csv_tables.write_table(snakemake.output.crops, rows)
     inputs = {"seams": paths.seams, "level0": Path(paths.levels, "level0.ply")}

@@ -125,7 +125,7 @@ def test_a_fork_of_roads_is_found_whole_also_with_something_lying_across():
         (COLUMNS // 25) % 2 == 0,  # one of many
         COLUMNS % 50 < 8,  # the same, far apart
         ((ROWS % 24 < 9) | (COLUMNS % 24 < 9)) & (ROWS > 60),  # a net
-        NOISE > np.quantile(NOISE, 2 / 3),  # branched, over a third of the ground
+        np.quantile(NOISE, 2 / 3) < NOISE,  # branched, over a third of the ground
         np.zeros((K, K), bool),
     ],
 )

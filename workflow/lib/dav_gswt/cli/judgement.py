@@ -6,9 +6,12 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import numpy as np
+
 from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.materials.left_out import describe_left_out
+from dav_gswt.tiles.periods import describe_rows
 
 # PSNR of test photos, after their exposure is fitted, from which a grade holds
 GRADES = ((30.0, "very good"), (25.0, "good"), (20.0, "fair: softer than they are"))
@@ -19,17 +22,38 @@ AGAIN = "Photograph the ground again, sharply, with one camera and zoom, while n
 
 
 def judge_terrain(
-    frame: Path, materials: Path | None, metrics: Path | None, windows: Path | None = None, manifest: Path | None = None
+    frame: Path,
+    materials: Path | None,
+    metrics: Path | None,
+    windows: Path | None = None,
+    manifest: Path | None = None,
+    seams: Path | None = None,
 ) -> list[str]:
     """Sentences on a finished terrain.
 
     frame: ground.json. materials: materials.json. metrics: of the last round. windows: windows.json. manifest:
-    davgswt.json. Raises: InputError: a file is not readable.
+    davgswt.json. seams: seams.json. Raises: InputError: a file is not readable.
     """
     ground = read_scene_frame(frame)
-    found, fitted, bundle = (read_json(path) if path else None for path in (materials, windows, manifest))
+    found, fitted, bundle, cut = (read_json(path) if path else None for path in (materials, windows, manifest, seams))
     said = [*describe_ground(found), *describe_photos(ground), *describe_quality(ground, metrics)]
-    return said + describe_sharpness(ground, fitted, bundle) + list_scarce(found)
+    return said + describe_sharpness(ground, fitted, bundle) + describe_patterns(ground, cut) + list_scarce(found)
+
+
+def describe_patterns(frame: SceneFrame, cut: Mapping[str, Any] | None) -> list[str]:
+    """The rows of regular ground, material by material."""
+    said, (unit, scale) = [], measure_unit(frame)
+    for tiles in (cut, *cut.get("materials", [])) if cut else ():
+        if pattern := tiles["seams"].get("pattern"):
+            rows = describe_rows(np.array(pattern["waves"]), scale * tiles["spacing"], f" {unit}")
+            said.append(f"The ground has rows {rows}: tiles are whole numbers of them.")
+    return said
+
+
+def measure_unit(frame: SceneFrame) -> tuple[str, float]:
+    """What lengths are said in, and how many of it a unit of the scene is."""
+    unit = "m" if frame.unit == "metre" else "units of the splat" if frame.source else "camera heights"
+    return unit, frame.source.unit if frame.source else 1.0
 
 
 def describe_sharpness(
@@ -38,11 +62,10 @@ def describe_sharpness(
     """From how high the ground looks sharp, and how its cells compare with the pixels of the photos."""
     if bundle is None:
         return []
-    metres, scale = frame.unit == "metre", frame.source.unit if frame.source else 1
-    unit = "m" if metres else "units of the splat" if frame.source else "camera heights"
+    unit, scale = measure_unit(frame)
     said = f"The ground looks sharp from {scale * bundle['eye_floor']:.2g} {unit} above it"
     if fitted:
-        wide = f" ({100 * fitted['cell']:.2g} cm)" if metres else ""
+        wide = f" ({100 * fitted['cell']:.2g} cm)" if unit == "m" else ""
         said += f": its cells{wide} are {fitted['cell'] / fitted['pixel']:.1f} times as wide as pixels of the photos"
     return [f"{said}."]
 

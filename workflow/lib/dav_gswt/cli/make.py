@@ -212,8 +212,9 @@ def collect_results(out: Path, settings: dict[str, Any]) -> Made:
     if materials.is_file():
         link_file(materials.with_name("materials.png"), out / "materials.png")
     read = (materials, round_folder / "metrics.json", round_folder / "windows/windows.json")
-    manifest = out / stage_folder("bundle", branch) / "davgswt.json"
-    said = judge_terrain(photos / "ground.json", *(each if each.is_file() else None for each in (*read, manifest)))
+    bundle, tiles = (out / stage_folder(stage, branch) for stage in ("bundle", "tiles"))
+    read = (*read, bundle / "davgswt.json", tiles / "seams.json")
+    said = judge_terrain(photos / "ground.json", *(each if each.is_file() else None for each in read))
     if report:
         add_to_report(photos / "report.html", said, report)
     return Made(out / "page", out / "terrain.png", out / "field.ply", report, out / SCENE_FILE, tuple(said))

@@ -15,12 +15,14 @@ from dav_gswt.field import GaussianField
 from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.logs import progress
 from dav_gswt.reconstruction import top_view
-from dav_gswt.tiles import compose, energy, layout, patches, poisson_blending, search, semantics, texture
+from dav_gswt.tiles import compose, energy, layout, patches, periods, poisson_blending, search, semantics, texture
 from dav_gswt.tiles.layout import EDGES, Exemplar, Layout
 
 _log = logging.getLogger(__name__)
 
 WARN_UNCERTAINTY = 0.5  # mean of a tile, above which a warning is logged
+MOST_RESIZED = 0.3  # logarithm of a tile's size over the wanted one, for whole rows
+SIZE_COST = 0.2  # of that logarithm, where the norm of the exemplar's change costs 1
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class TilingOptions:
         levels: of the tiles, a number or AUTO; None: as many as are given.
         corrected: steps across seams are spread out (`poisson_blending`).
         relabel: see `search.SearchProblem`.
+        pattern: of the exemplar, whose levels are turned already.
     """
 
     share: float | str = 0.5
@@ -54,6 +57,7 @@ class TilingOptions:
     levels: int | str | None = None
     corrected: bool = True
     relabel: search.Relabel | None = None
+    pattern: periods.Pattern | None = None
 
     @classmethod
     def from_config(
@@ -122,12 +126,46 @@ class TileSet:
         return Layout.from_dict(self.report["layout"])
 
 
-def cut_levels(levels: Levels, options: TilingOptions, rng: np.random.Generator) -> TileSet:
-    """Cut the tile set of a field's levels, as they look from straight above. Raises: InputError: see `cut_tiles`."""
-    grid = levels.grids[0]
-    above = top_view.render_exemplar(levels.fields[0], grid)
-    exemplar = Exemplar.from_grid(grid)
+def cut_levels(levels: Levels, options: TilingOptions, rng: np.random.Generator, fixed: bool = False) -> TileSet:
+    """Cut the tile set of a field's levels, as they look from straight above; of regular ground, in whole periods.
+
+    fixed: tiles must have the side that the options say. Raises: InputError: see `cut_tiles`.
+    """
+    above = top_view.render_exemplar(levels.fields[0], levels.grids[0])
+    if len(waves := periods.find_waves(above.colour_or_nan())):
+        options = _fit_periods(waves, levels, above, options, fixed)
+        if options.pattern is not None:
+            levels = periods.turn_levels(levels, options.pattern.turn, options.pattern.cells)
+            above = top_view.render_exemplar(levels.fields[0], levels.grids[0])
+    exemplar = Exemplar.from_grid(levels.grids[0])
     return cut_tiles(levels.fields, exemplar, above.colour_or_nan(), above.uncertainty, options, rng)
+
+
+def _fit_periods(
+    waves: Float[Array, "k 2"], levels: Levels, above: top_view.TopView, options: TilingOptions, fixed: bool
+) -> TilingOptions:
+    """The options with the pattern and the sizes for which the exemplar changes least; unchanged where none will do."""
+    grid, fitted = levels.grids[0], len(levels.fields)
+    colour, _ = _fill_holes(above.colour_or_nan(), above.uncertainty)
+    plan = _plan_layout(options, texture.measure_texture_scale(colour), Exemplar.from_grid(grid), fitted)
+    rows, strip, cell = periods.describe_rows(waves, grid.spacing), plan.strip / plan.side, 2 ** (plan.levels - 1)
+    found = []
+    for side in [plan.side] if fixed else range(cell, grid.cells + 1, cell):
+        if (size := abs(float(np.log(side / plan.side)))) > MOST_RESIZED:
+            continue
+        pattern = periods.fit_pattern(waves, grid.cells, side, 2 ** (fitted - 1), plan.block)
+        if pattern and layout.plan_layout(pattern.cells, plan.levels, side / pattern.cells, strip, fitted).side == side:
+            found.append((pattern.cost + SIZE_COST * size, pattern))
+    if not found:
+        _log.warning("rows %s: they will break, as no tile is a whole number of them", rows)
+        return options
+    pattern = min(found, key=lambda each: each[0])[1]
+    said = "rows %s: tiles of %s cross %s (east x north); the ground is turned by %.1f degrees and stretched by %.1f %%"
+    crossed = " and ".join(f"{abs(east)} x {abs(north)}" for east, north in pattern.counts)
+    angle, stretch = periods.measure_turn(pattern.turn)
+    _log.info(said, rows, f"{pattern.side * grid.spacing:.3g}", crossed, angle, 100 * stretch)
+    sizes = {"share": pattern.side / pattern.cells, "strip": strip, "levels": plan.levels}
+    return replace(options, **sizes, pattern=pattern)
 
 
 def cut_materials(
@@ -150,7 +188,7 @@ def cut_materials(
     side = tile_side if options.share == AUTO else None
     for number, own in enumerate(sets):
         share = options.share if side is None else min(1.0, side / own.grids[0].cells)
-        tiles.append(cut_levels(own, replace(options, share=share), make_rng(number)))
+        tiles.append(cut_levels(own, replace(options, share=share), make_rng(number), bool(tiles)))
         side, options = tiles[0].layout.side, replace(options, levels=len(tiles[0].fields))
     if len({(len(own.fields), own.layout.side) for own in tiles}) > 1:
         raise InputError(
@@ -204,7 +242,9 @@ def cut_tiles(
     semantic = None if options.kind == "colour" else semantics.make_semantic_layer(colour, options.source)
     seam_energy = energy.SeamEnergy(options.kind, options.slope, energy.make_colour_layer(colour), semantic, hidden)
     guide = patches.make_guidance(colour, height, uncertainty, plan)
-    problem = search.SearchProblem(plan, guide, seam_energy, options.candidates, options.tries, options.relabel)
+    problem = search.SearchProblem(
+        plan, guide, seam_energy, options.candidates, options.tries, options.relabel, options.pattern
+    )
     found = search.search_patches(problem, options.variants, rng)
     shifts = np.stack([layout.label_shifts(plan, found.places, tile) for tile in range(len(found.labels))])
     soft = poisson_blending.make_soft_maps(colour, height)
@@ -220,6 +260,7 @@ def cut_tiles(
         "layout": plan.to_dict(),
         "texture": scale * exemplar.spacing,
         "energy": options.kind,
+        "pattern": options.pattern and options.pattern.describe(),
     }
     means = _average_uncertainty(uncertainty, found.labels, shifts)
     return TileSet(plan.side * exemplar.spacing, exemplar.spacing, fields, found.labels, shifts, means, report, recipe)

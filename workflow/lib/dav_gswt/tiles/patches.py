@@ -49,11 +49,16 @@ def make_guidance(
     return GuidanceMaps(np.concatenate([colour, 2 * soft, height[..., None]], -1), uncertainty)
 
 
-def draw_candidates(layout: Layout, size: tuple[int, int], count: int, rng: np.random.Generator) -> Int[Array, "n 2"]:
-    """At most `count` different places (x, y) for a patch of `size` (width, height) cells, on the coarsest grid."""
+def list_places(layout: Layout, size: tuple[int, int]) -> Int[Array, "n 2"]:
+    """All places (x, y) for a patch of `size` (width, height) cells, on the coarsest grid."""
     columns, rows = ((layout.exemplar - s) // layout.block + 1 for s in size)
-    pick = rng.permutation(columns * rows)[:count] if columns * rows > count else np.arange(columns * rows)
-    return np.stack([pick % columns, pick // columns], 1) * layout.block
+    number = np.arange(columns * rows)
+    return np.stack([number % columns, number // columns], 1) * layout.block
+
+
+def draw_places(places: Int[Array, "n 2"], count: int, rng: np.random.Generator) -> Int[Array, "m 2"]:
+    """At most `count` different ones of these places."""
+    return places[rng.permutation(len(places))[:count]] if len(places) > count else places
 
 
 def patch_means(values: Float[Array, "m m"], places: Int[Array, "n 2"], size: tuple[int, int]) -> Float[Array, "n"]:
@@ -116,7 +121,7 @@ def find_least_salient(guide: GuidanceMaps, layout: Layout) -> Int[Array, "2"]:
     Every place on the coarsest grid is compared; of equal ones the most south-western is taken.
     """
     size = (2 * layout.corner, 2 * layout.corner)
-    places = keep_certain(guide, draw_candidates(layout, size, layout.exemplar**2, np.random.default_rng(0)), size)
+    places = keep_certain(guide, list_places(layout, size), size)
     return places[np.argmin(patch_means(compute_saliency(guide), places, size))]
 
 

@@ -12,6 +12,7 @@ from dav_gswt.logs import progress
 from dav_gswt.tiles import layout, patches
 from dav_gswt.tiles.energy import Cells, Cut, OverlapZone, SeamEnergy, compute_edge_costs, find_cut
 from dav_gswt.tiles.layout import CENTRE, EDGES, Layout, PatchPlaces
+from dav_gswt.tiles.periods import Pattern
 
 MIN_FITTING = 4  # times the number of tries: least number of fitting places
 MAX_PAIRED = 200  # strips that are compared pairwise
@@ -40,6 +41,7 @@ class SearchProblem:
         candidates: places that are compared; tries: the best of them that are cut before one is taken.
         relabel: replaces a tile's labels, given its centre, labels and shifts, after the exact cut;
             None: labels stay.
+        pattern: that patches continue; None: the ground has none.
     """
 
     plan: Layout
@@ -48,6 +50,18 @@ class SearchProblem:
     candidates: int
     tries: int
     relabel: Relabel | None = None
+    pattern: Pattern | None = None
+
+    def draw(self, size: tuple[int, int], move: Int[Array, "2"], rng: np.random.Generator) -> Int[Array, "n 2"]:
+        """Candidate places of a patch over ground that is known, in phase with the corner patch.
+
+        move: of a tile's cells under the patch, less that of the cells under the corner (`layout.label_shifts`).
+        """
+        places = patches.list_places(self.plan, size)
+        if self.pattern is not None:
+            places = self.pattern.admit(places, move)
+        drawn = patches.draw_places(places, self.candidates, rng)
+        return patches.keep_certain(self.guide, drawn, size)
 
     def place(self, shown: Cells, place: Int[Array, "2"], size: tuple[int, int], zone: OverlapZone) -> PlacedPatch:
         """Cut a patch from a place against the exemplar's cells (rows, columns) that are visible before the cut."""
@@ -116,7 +130,7 @@ def _search_strips(
     overlap = OverlapZone(depth < b, depth >= a, straight)
     ends = np.where(along < n // 2, 1, 2)
     shown = problem.source_cells(ends, layout.strip_shifts(plan, np.zeros(2, int), corner, upright))
-    drawn = patches.keep_certain(problem.guide, patches.draw_candidates(plan, size, problem.candidates, rng), size)
+    drawn = problem.draw(size, np.array([b, 0] if upright else [0, b]) - corner - a, rng)
     places, cost = _choose_strip_candidates(problem, shown, _end_lines(plan, upright), drawn, size)
     overlay = patches.start_overlay(problem.guide.features[..., :3], n, size, cover=(~straight, shown))
     pair_cost = REPETITION_COST * overlay.compute_pair_costs(places)
@@ -155,7 +169,7 @@ def _search_centres(
     frame = (plan.block + b) // 2  # its width where the cut is straight
     overlap = OverlapZone(depth < plan.block, depth >= b, depth >= frame)
     size = (n, n)
-    drawn = patches.keep_certain(problem.guide, patches.draw_candidates(plan, size, problem.candidates, rng), size)
+    drawn = problem.draw(size, -places.corner - plan.corner, rng)
     overlay = patches.start_overlay(problem.guide.features[..., :3], n, size, (frame, frame))
     centres: list[PlacedPatch] = []
     found = []

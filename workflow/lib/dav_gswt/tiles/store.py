@@ -3,8 +3,9 @@
 labels.npz has labels, shifts and what composed tiles need beside the levels: the trend that is taken out of these and
 each tile's corrections. Tiles that are not composed are lod{l}_tile_{TT}.ply beside it.
 
-seams.json is written last and holds the counts: where it exists, the set is whole. The sets of further materials are
-in the folders material1, material2, ... of the first one's, their tables in its seams.json under `materials`.
+seams.json has the turn of an exemplar whose ground is regular, which the levels lack. It is written last and holds the
+counts: where it exists, the set is whole. The sets of further materials are in the folders material1, material2, ... of
+the first one's, their tables in its seams.json under `materials`.
 """
 
 from pathlib import Path
@@ -17,11 +18,12 @@ from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.field import GaussianField, read_field, write_field
 from dav_gswt.files import UNREADABLE, atomic_folder, read_json, write_json
 from dav_gswt.lod.levels import Levels
-from dav_gswt.lod.store import material_folder, read_levels
+from dav_gswt.lod.store import material_folder, read_levels, read_material_levels
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import Recipe, TileSet, compose_tiles
 from dav_gswt.tiles.compose import bin_gaussians
 from dav_gswt.tiles.layout import Exemplar, Layout
+from dav_gswt.tiles.periods import turn_levels
 from dav_gswt.tiles.texture import Trend, remove_trend
 
 
@@ -105,9 +107,8 @@ def _read_folder(folder: Path, table: Any, seams: Path | str, levels: Path) -> T
         raise InputError(f"{folder / 'labels.npz'}: not readable ({error}); cut the tiles again") from error
     recipe = None
     if "colour" in arrays:
-        given = read_levels(levels)
         try:
-            recipe = _make_recipe(arrays, given, plan)
+            recipe = _make_recipe(arrays, turn_levels_of(report, read_levels(levels)), plan)
             fields = compose_tiles(recipe, plan, labels, shifts)
         except UNREADABLE as error:
             raise InputError(f"{folder / 'labels.npz'}: not of {levels} ({error}); cut the tiles again") from error
@@ -117,6 +118,19 @@ def _read_folder(folder: Path, table: Any, seams: Path | str, levels: Path) -> T
     if [[len(f) for f in level] for level in fields] != counts:
         raise InputError(f"{folder}: the tiles are not those of {seams}; cut them again")
     return TileSet(side, spacing, fields, labels, shifts, uncertainty, report, recipe)
+
+
+def read_exemplars(seams: Path | str, levels: Path | str) -> list[Levels]:
+    """The levels of each material as its tiles were cut from them. Raises: InputError: as `read_tiles`."""
+    table = read_json(seams)
+    reports = [own["seams"] for own in (table, *table.get("materials", []))]
+    return [turn_levels_of(*each) for each in zip(reports, read_material_levels(levels), strict=True)]
+
+
+def turn_levels_of(report: dict[str, Any], levels: Levels) -> Levels:
+    """Levels turned as the report of the tiles says; as they are for ground without a pattern."""
+    pattern = report.get("pattern")
+    return turn_levels(levels, np.array(pattern["turn"]), report["layout"]["exemplar"]) if pattern else levels
 
 
 def _make_recipe(arrays: dict[str, Array], levels: Levels, plan: Layout) -> Recipe:
