@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.tiles import layout, patches
+from dav_gswt.tiles import energy, layout, patches, search
 
 
 def exemplar(seed=0, m=40):
@@ -25,7 +25,7 @@ def test_charges_sum_to_the_power_of_what_comes_back_but_for_the_patches_own():
     shown = patches.start_overlay(exemplar(), 16, (16, 16))
     places, total = np.array([[0, 0], [8, 4], [20, 24]]), 0.0
     for place in places:
-        total += shown.compute_costs(place[None])[0]
+        total += shown.compute_costs(shown.crop_all(place[None]))[0]
         shown = shown.with_patch(place)
     tiles = [shown.ground[y : y + 16, x : x + 16] for x, y in places]
     assert total == pytest.approx(power(np.sum(tiles, 0)) - sum(own(tile) for tile in tiles))
@@ -36,7 +36,9 @@ def test_only_what_shows_counts():
     x, y = place = np.array([8, 4])
     tile = np.zeros((16, 16, 3))  # what does not show adds nothing to a row's mean
     tile[:6, :8] = shown.ground[y + 3 : y + 9, x + 4 : x + 12]
-    assert shown.compute_costs(place[None])[0] == pytest.approx((power(tile) - own(tile)) * 16 * 16 / (6 * 8))
+    assert shown.compute_costs(shown.crop_all(place[None]))[0] == pytest.approx(
+        (power(tile) - own(tile)) * 16 * 16 / (6 * 8)
+    )
 
 
 def test_pairs_are_charged_what_both_bring_back_but_for_their_own():
@@ -92,7 +94,7 @@ def test_a_strip_is_no_better_for_being_barer_than_the_ground():
 
 def test_the_mismatch_is_the_mean_of_the_least_differences_along_the_lines():
     rng = np.random.default_rng(4)
-    guide = patches.GuidanceMaps(rng.random((20, 20, 2)), np.zeros((20, 20)))
+    guide = patches.GuidanceMaps(rng.random((20, 20, 2)), np.zeros((20, 20)), np.zeros((20, 20)))
     zone, shown = rng.integers(0, 8, (2, 5, 3)), rng.integers(0, 20, (2, 5, 3))  # five lines of three cells
     found = patches.compute_mismatch(guide, (zone[0], zone[1]), (shown[0], shown[1]), np.array([[3, 4], [0, 12]]))
     for cost, (x, y) in zip(found, ((3, 4), (0, 12)), strict=True):
@@ -106,3 +108,37 @@ def test_ground_that_is_seen_beside_or_was_taken_comes_last():
     ranked = patches.rank_places(places, costs, (10, 10), beside, taken)
     assert ranked.tolist() == [[60, 0], [30, 0], [1, 0], [0, 0]]
     assert patches.find_fitting(np.array([1.0, 1.7, 1.9, 9.0])).tolist() == [0, 1]
+
+
+def test_a_landmark_is_what_stands_out_of_its_surroundings_not_a_shade_or_grain():
+    y, x = np.mgrid[:120, :120]
+    maps = np.random.default_rng(0).normal(0, 0.02, (120, 120, 2)) + 0.05 * np.sin(x / 40)[..., None]
+    maps[(x - 30) ** 2 + (y - 80) ** 2 < 20, 1] += 0.5
+    found = patches.find_landmarks(maps, 60)
+    spot = (x - 30) ** 2 + (y - 80) ** 2 < 300
+    assert found[80, 30] > 0 and (found[~spot] > 0).mean() < 0.01
+    assert found.mean() == pytest.approx(1)
+    assert not patches.find_landmarks(np.ones((120, 120, 2)), 60).any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_hardly_a_landmark_lies_in_what_all_tiles_share(seed):
+    rng, m = np.random.default_rng(seed), 160
+    colour = 0.5 + 0.05 * rng.normal(size=(m, m, 1)).repeat(3, 2)
+    spots = [(24 + 28 * (k % 5), 24 + 28 * (k // 5)) for k in range(25)]
+    y, x = np.mgrid[:m, :m]
+    for place in spots:
+        colour[(x - place[0]) ** 2 + (y - place[1]) ** 2 < 7] += 0.4
+    plan = layout.Layout(m, 1, 60, 6, 9)
+    flat = np.zeros((m, m))
+    guide = patches.make_guidance(colour, flat, flat, plan)
+    energy_of = energy.SeamEnergy("colour", 2.0, energy.make_colour_layer(colour), None)
+    problem = search.SearchProblem(plan, guide, energy_of, 300, 2)
+    found = search.search_patches(problem, 1, np.random.default_rng(seed))
+    labels, shifts = found.labels, [layout.label_shifts(plan, found.places, tile) for tile in range(16)]
+    shown = [guide.landmarks[layout.source_cells(*pair)] > 0 for pair in zip(labels, shifts, strict=True)]
+    frame, centre = (
+        np.mean([marks[pick(own)].mean() for marks, own in zip(shown, labels, strict=True)])
+        for pick in (lambda own: own > 0, lambda own: own == 0)
+    )
+    assert frame < 0.2 * centre

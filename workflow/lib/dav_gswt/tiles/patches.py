@@ -23,16 +23,22 @@ NEAR_SHARE = 0.25  # of a patch's shorter side: places that are nearer show near
 SAMPLES = 3000  # cells of a seam zone that are compared
 OVERLAY_SAMPLES = 64  # samples along a tile's side, of repetition
 LINE_WEIGHT = 4.0  # cost of lines over the cost of other repetition
+SPOTS = (1 / 80, 1 / 20), (1 / 24, 1 / 8)  # of a tile's side: two blurs each, whose difference shows landmarks
+OUTSTANDING = 10.0  # times the median squared difference of these: beyond it a cell belongs to a landmark
+LANDMARK_COST = 1.0  # of a strip with the exemplar's share of landmarks, where a median seam costs 1
 
 UsedPatch = tuple[Array, tuple[int, int]]  # a place (x, y) and a size (width, height)
 
 
 @dataclass(frozen=True)
 class GuidanceMaps:
-    """Features that patches are matched by, and uncertainty in [0, 1], per finest cell of the exemplar."""
+    """Per finest cell of the exemplar: features that patches are matched by, uncertainty in [0, 1], and landmarks
+    (`find_landmarks`).
+    """
 
     features: Float[Array, "m m k"]
     uncertainty: Float[Array, "m m"]
+    landmarks: Float[Array, "m m"]
 
 
 def make_guidance(
@@ -46,7 +52,21 @@ def make_guidance(
     spread = float(colour.std(axis=(0, 1)).mean())
     relief = height - gaussian_filter(height, layout.side / 3, mode="nearest")
     height = relief * (spread / (relief.std() or 1.0))
-    return GuidanceMaps(np.concatenate([colour, 2 * soft, height[..., None]], -1), uncertainty)
+    landmarks = find_landmarks(np.concatenate([colour, height[..., None]], -1), layout.side)
+    return GuidanceMaps(np.concatenate([colour, 2 * soft, height[..., None]], -1), uncertainty, landmarks)
+
+
+def find_landmarks(maps: Float[Array, "m m k"], side: int) -> Float[Array, "m m"]:
+    """Cells that stand out of their surroundings, each as 1 over the share of such cells; 0 for the others.
+
+    What repeats is seen from where a terrain is seen to repeat, so a landmark's size is a share of a tile's `side`.
+    """
+    found = np.zeros(maps.shape[:2], bool)
+    for blurs in SPOTS:
+        near, around = (gaussian_filter(maps, (b * side, b * side, 0), mode="nearest", truncate=2) for b in blurs)
+        away = ((near - around) ** 2).sum(-1)
+        found |= away > OUTSTANDING * safe_unit(float(np.median(away)))
+    return found / safe_unit(float(found.mean()))
 
 
 def list_places(layout: Layout, size: tuple[int, int]) -> Int[Array, "n 2"]:
@@ -122,7 +142,8 @@ def find_least_salient(guide: GuidanceMaps, layout: Layout) -> Int[Array, "2"]:
     """
     size = (2 * layout.corner, 2 * layout.corner)
     places = keep_certain(guide, list_places(layout, size), size)
-    return places[np.argmin(patch_means(compute_saliency(guide), places, size))]
+    saliency = compute_saliency(guide) + LANDMARK_COST * guide.landmarks
+    return places[np.argmin(patch_means(saliency, places, size))]
 
 
 def compute_mismatch(
@@ -239,8 +260,12 @@ class OverlaidPatches:
         patch = self.ground[y : y + h * s : s, x : x + w * s : s]
         return patch if self.cover is None else np.where(np.isnan(self.cover), patch, self.cover)
 
-    def compute_costs(self, places: Int[Array, "n 2"]) -> Float[Array, "n"]:
-        """Added repetition, per sample, of a patch at each place.
+    def crop_all(self, places: Int[Array, "n 2"]) -> Float[Array, "n h w c"]:
+        """The same at each place."""
+        return np.stack([self.crop(place) for place in places])
+
+    def compute_costs(self, crops: Float[Array, "n h w c"]) -> Float[Array, "n"]:
+        """Added repetition, per sample, of each patch.
 
         sum |total + B|^2 - |total|^2 - |B|^2 = 2 sum total B: a patch's own square is left out, or tiles would be
         plainer than the ground. The squares of the means over a tile's rows and columns, LINE_WEIGHT times, are charged
@@ -248,19 +273,17 @@ class OverlaidPatches:
         """
         across, along = self.total.sum(1) / self.side, self.total.sum(0) / self.side
 
-        def added_cost(b: Float[Array, "h w c"]) -> float:
-            rows, columns = b.sum(1) / self.side, b.sum(0) / self.side
-            lines = ((2 * across + rows) * rows).sum() + ((2 * along + columns) * columns).sum()
-            return float(((2 * self.total * b).sum() + LINE_WEIGHT * self.side * lines) / (b.size / b.shape[-1]))
-
-        return np.array([added_cost(self.crop(place)) for place in places])
+        rows, columns = crops.sum(2) / self.side, crops.sum(1) / self.side
+        lines = ((2 * across + rows) * rows).sum((1, 2)) + ((2 * along + columns) * columns).sum((1, 2))
+        products = np.einsum("nhwc,hwc->n", crops, self.total)  # no BLAS, whose sums may depend on its threads
+        return (2 * products + LINE_WEIGHT * self.side * lines) / (self.total.size / self.total.shape[-1])
 
     def compute_pair_costs(self, places: Int[Array, "n 2"]) -> Float[Array, "n n"]:
         """Repetition of patches at each two places together, without any other: 2 sum B B' and the lines of B + B'.
 
         Two patches chosen as a pair complement one another; chosen one after the other, the second takes what is left.
         """
-        crops = np.stack([self.crop(place) for place in places])
+        crops = self.crop_all(places)
         along, across = (crops.sum(axis) / self.side for axis in (1, 2))
         lines = _square_sums(along) + _square_sums(across)
         flat = crops.reshape(len(places), -1)

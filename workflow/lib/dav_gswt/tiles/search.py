@@ -131,7 +131,10 @@ def _search_strips(
     ends = np.where(along < n // 2, 1, 2)
     shown = problem.source_cells(ends, layout.strip_shifts(plan, np.zeros(2, int), corner, upright))
     drawn = problem.draw(size, np.array([b, 0] if upright else [0, b]) - corner - a, rng)
-    places, cost = _choose_strip_candidates(problem, shown, _end_lines(plan, upright), drawn, size)
+    margin = np.array([b - (plan.block + b) // 2, (a + b) // 2])[:: 1 if upright else -1]
+    inner = (size[0] - 2 * int(margin[0]), size[1] - 2 * int(margin[1]))  # about what centres and the corner leave
+    landmarks = patches.patch_means(problem.guide.landmarks, drawn + margin, inner)
+    places, cost = _choose_strip_candidates(problem, shown, _end_lines(plan, upright), drawn, size, landmarks)
     overlay = patches.start_overlay(problem.guide.features[..., :3], n, size, cover=(~straight, shown))
     pair_cost = REPETITION_COST * overlay.compute_pair_costs(places)
     pairs = patches.rank_pairs(places, cost, pair_cost, size, used)[: problem.tries]
@@ -142,16 +145,23 @@ def _search_strips(
 
 
 def _choose_strip_candidates(
-    problem: SearchProblem, shown: Cells, lines: Cells, places: Int[Array, "n 2"], size: tuple[int, int]
+    problem: SearchProblem,
+    shown: Cells,
+    lines: Cells,
+    places: Int[Array, "n 2"],
+    size: tuple[int, int],
+    landmarks: Float[Array, "n"],
 ) -> tuple[Int[Array, "k 2"], Float[Array, "k"]]:
     """At most MAX_PAIRED places that fit the corner patch and are inconspicuous, with their relative costs.
 
     shown: the exemplar's cells that the corner patch shows in the strip. lines: see `patches.compute_mismatch`.
+    landmarks: share of them in each place, over the exemplar's.
     """
     mismatch = patches.compute_mismatch(problem.guide, lines, (shown[0][lines], shown[1][lines]), places)
     saliency = patches.patch_saliency(problem.guide, places, size)
     fits = np.intersect1d(patches.find_fitting(mismatch), patches.find_fitting(saliency))
     cost = patches.divide_by_median(mismatch) + patches.divide_by_median(saliency)
+    cost = cost + patches.LANDMARK_COST * landmarks
     if len(fits) < MIN_FITTING * problem.tries:  # too few fit both ways: take the best of the sum
         fits = np.argsort(cost, kind="stable")[: MIN_FITTING * problem.tries]
     fits = fits[np.argsort(cost[fits], kind="stable")[:MAX_PAIRED]]
@@ -171,15 +181,13 @@ def _search_centres(
     size = (n, n)
     drawn = problem.draw(size, -places.corner - plan.corner, rng)
     overlay = patches.start_overlay(problem.guide.features[..., :3], n, size, (frame, frame))
+    crops, mismatch = overlay.crop_all(drawn), _compare_sides(problem, places, masks, drawn)
     centres: list[PlacedPatch] = []
     found = []
     for tile in progress(range(len(places.centres)), "cut tiles"):
-        frame_labels = layout.frame_labels(plan, masks[0], masks[1], tile)
-        shift = layout.label_shifts(plan, places, tile)
-        # a seam along the frame's inner rim is priced by what the strips would show beyond it
-        nearest = distance_transform_edt(frame_labels == CENTRE, return_distances=False, return_indices=True)
-        shown = problem.source_cells(frame_labels[tuple(nearest)], shift)
-        order = _rank_centres(problem, places, shown, drawn, overlay, centres)
+        frame_labels, shift, shown = _show_frame(problem, places, masks, tile)
+        cost = mismatch[layout.edge_colours(tile), range(4)].mean(0)
+        order = _rank_centres(problem, places, drawn, cost, overlay.compute_costs(crops), centres)
         placed = (problem.place(shown, place, size, overlap) for place in order[: problem.tries])
         centre = min(placed, key=lambda patch: patch.seam.energy)
         labels = np.where(centre.seam.labels, CENTRE, frame_labels).astype(np.uint8)
@@ -192,24 +200,47 @@ def _search_centres(
     return centres, np.stack(found)
 
 
+def _show_frame(
+    problem: SearchProblem, places: PatchPlaces, masks: list, tile: int
+) -> tuple[UInt8[Array, "n n"], Int[Array, "9 2"], Cells]:
+    """Labels of a tile's frame, shifts, and the exemplar's cells that it shows.
+
+    A seam along the frame's inner rim is priced by what the strips would show beyond it.
+    """
+    labels = layout.frame_labels(problem.plan, masks[0], masks[1], tile)
+    shift = layout.label_shifts(problem.plan, places, tile)
+    nearest = distance_transform_edt(labels == CENTRE, return_distances=False, return_indices=True)
+    return labels, shift, problem.source_cells(labels[tuple(nearest)], shift)
+
+
+def _compare_sides(
+    problem: SearchProblem, places: PatchPlaces, masks: list, drawn: Int[Array, "n 2"]
+) -> Float[Array, "2 4 n"]:
+    """What each place's centre would cost along the sides W, N, E and S of a frame, by the edge's colour."""
+    found = []
+    for tile in (0, EDGES - 1):  # all sides of colour 0, of colour 1
+        _, _, shown = _show_frame(problem, places, masks, tile)
+        sides = [(lines, (shown[0][lines], shown[1][lines])) for lines in _side_lines(problem.plan)]
+        found.append([patches.compute_mismatch(problem.guide, *side, drawn) for side in sides])
+    return np.array(found)
+
+
 def _rank_centres(
     problem: SearchProblem,
     places: PatchPlaces,
-    shown: Cells,
     drawn: Int[Array, "n 2"],
-    overlay: patches.OverlaidPatches,
+    mismatch: Float[Array, "n"],
+    repetition: Float[Array, "n"],
     centres: list[PlacedPatch],
 ) -> Int[Array, "k 2"]:
     """Candidate places of the next tile's centre from best to worst, without those of its other variants.
 
-    shown: the exemplar's cells that the tile's frame shows. centres: of the tiles that are cut already.
+    mismatch: along the tile's frame. repetition: see `OverlaidPatches`. centres: of the tiles that are cut already.
     """
     plan, tile = problem.plan, len(centres)
     n, b = plan.side, plan.strip
-    lines = _ring_lines(plan)
-    cost = patches.compute_mismatch(problem.guide, lines, (shown[0][lines], shown[1][lines]), drawn)
-    fits = patches.find_fitting(cost)
-    cost = patches.divide_by_median(cost[fits]) + REPETITION_COST * overlay.compute_costs(drawn[fits])
+    fits = patches.find_fitting(mismatch)
+    cost = patches.divide_by_median(mismatch[fits]) + REPETITION_COST * repetition[fits]
     west, north, east, south = layout.edge_colours(tile)
     adjacent = [(places.vertical[c], (2 * b, n)) for c in sorted({west, east})]
     adjacent += [(places.horizontal[c], (n, 2 * b)) for c in sorted({south, north})]
@@ -230,11 +261,11 @@ def _end_lines(plan: Layout, upright: bool) -> tuple[Array, Array]:
     return (along, across) if upright else (across, along)
 
 
-def _ring_lines(plan: Layout) -> tuple[Array, Array]:
-    """Cells [line, cell] where a centre may be cut: lines from the border inwards, one for each cell of every side."""
+def _side_lines(plan: Layout) -> list[tuple[Array, Array]]:
+    """Cells [line, cell] where a centre may be cut, for W, N, E and S: lines from the border inwards, one for each cell
+    of a side.
+    """
     n = plan.side
     depth = np.tile(np.arange(plan.block, plan.strip), (n, 1))
     along = np.broadcast_to(np.arange(n)[:, None], depth.shape)
-    y = np.concatenate([along, along, depth, n - 1 - depth])
-    x = np.concatenate([depth, n - 1 - depth, along, along])
-    return y, x
+    return [(along, depth), (n - 1 - depth, along), (along, n - 1 - depth), (depth, along)]
