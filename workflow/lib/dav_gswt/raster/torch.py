@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 from torch import Tensor
 
+from dav_gswt.arrays import convolve, count_up
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import interface, oracle
 from dav_gswt.raster.interface import (
@@ -194,9 +195,9 @@ def differentiate_loss(
 ) -> tuple[Float[Tensor, ""], Float[Tensor, "h w c"]]:
     """The loss of `backends.loss` and its gradient by the image, by autograd."""
     x, y, w = image.detach().requires_grad_(), target, weight[..., None]
-    n = _window_sums(w)
-    sums = _window_sums(w * torch.cat([x, y, x * x, y * y, x * y], 2)) / torch.where(n > 0, n, 1)
-    a, b, aa, bb, ab = sums.chunk(5, 2)
+    c = x.shape[2]
+    n, *sums = _window_sums(torch.cat([w, w * torch.cat([x, y, x * x, y * y, x * y], 2)], 2)).split([1] + 5 * [c], 2)
+    a, b, aa, bb, ab = (total / torch.where(n > 0, n, 1) for total in sums)
     vaa, vbb, vab = aa - a * a, bb - b * b, ab - a * b
     c1, c2 = 0.01**2, 0.03**2
     ssim = (2 * a * b + c1) * (2 * vab + c2) / ((a * a + b * b + c1) * (vaa + vbb + c2))
@@ -207,20 +208,38 @@ def differentiate_loss(
 
 def _window_sums(values: Float[Tensor, "h w c"]) -> Float[Tensor, "h w c"]:
     """Sums over each pixel's window of 11 x 11, weighted by a Gaussian of sigma 1.5."""
-    taps = torch.exp(-((torch.arange(11, dtype=torch.float64) - 5) ** 2) / (2 * 1.5**2)).to(values)
-    taps = taps / taps.sum()
-    planes = values.permute(2, 0, 1)[:, None]
-    planes = torch.nn.functional.conv2d(planes, taps.reshape(1, 1, 11, 1), padding=(5, 0))
-    return torch.nn.functional.conv2d(planes, taps.reshape(1, 1, 1, 11), padding=(0, 5))[:, 0].permute(1, 2, 0)
+    taps = torch.exp(-((count_up(11, values) - 5) ** 2) / (2 * 1.5**2))
+    taps = (taps / taps.sum()).to(values.dtype)
+    return convolve(values.permute(2, 0, 1)[None], taps, padding=5)[0].permute(1, 2, 0)
 
 
 def step_adam(s: AdamStep) -> None:
-    """See `backends.adam`; by NumPy."""
-    which = slice(None) if s.rows is None else np.flatnonzero(s.rows)
-    value, g, m, v = (a.reshape(len(a), -1)[which] for a in (s.values, s.gradient, s.first, s.second))
-    m = s.betas[0] * m + np.float32(1 - s.betas[0]) * g
-    v = s.betas[1] * v + np.float32(1 - s.betas[1]) * (g * g)
-    move = np.float32(1 / (1 - s.betas[0] ** s.step)) * m
-    move /= np.sqrt(np.float32(1 / (1 - s.betas[1] ** s.step)) * v) + np.float32(s.epsilon)
-    for array, new in ((s.values, value - s.rates * move), (s.first, m), (s.second, v)):
-        array.reshape(len(array), -1)[which] = new
+    """See `backends.adam`."""
+    rows = slice(None) if s.rows is None else np.flatnonzero(s.rows)
+    given = [torch.from_numpy(a.reshape(len(a), -1)[rows]) for a in (s.values, s.gradient, s.first, s.second)]
+    rates = torch.from_numpy(s.rates) if len(s.rates) > 1 else float(s.rates[0])
+    move_by_adam(*given, rates, s.step, s.betas, s.epsilon)
+    if s.rows is not None:
+        for array, new in ((s.values, given[0]), (s.first, given[2]), (s.second, given[3])):
+            array.reshape(len(array), -1)[rows] = new.numpy()
+
+
+def move_by_adam(
+    value: Float32[Tensor, "n c"],
+    gradient: Float32[Tensor, "n c"],
+    first: Float32[Tensor, "n c"],
+    second: Float32[Tensor, "n c"],
+    rates: float | Float32[Tensor, "c"],
+    step: int,
+    betas: tuple[float, float],
+    epsilon: float,
+    rows: Float32[Tensor, "n 1"] | None = None,
+) -> None:
+    """One step of Adam, in place (see `backends.adam`). rows: 1 for those that move, 0 for those that stay."""
+    shares = [torch.full_like(first[:, :1], 1 - beta) if rows is None else (1 - beta) * rows for beta in betas]
+    first.lerp_(gradient, shares[0])
+    second.lerp_(gradient * gradient, shares[1])
+    move = first / (1 - betas[0] ** step)
+    move /= (second / (1 - betas[1] ** step)).sqrt_().add_(epsilon)
+    move *= rates
+    value.sub_(move if rows is None else move * rows)
