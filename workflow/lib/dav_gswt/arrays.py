@@ -118,9 +118,10 @@ def find_lowest_around(values: Any, size: int) -> Any:
 def convolve(planes: Any, taps: Any, padding: int = 0) -> Any:
     """Planes (a tensor 1 c h w) under a window that is taps^T taps, with so many zeros around them.
 
-    As many groups as planes: so a GPU takes kernels in whole float32, not tensor cores, which round to 10 bits.
+    As many groups as planes, plane after plane: so a GPU takes kernels of whole float32, not tensor cores, which round
+    to 10 bits.
     """
-    torch, c = namespace(planes), planes.shape[1]
+    torch, c, planes = namespace(planes), planes.shape[1], planes.contiguous()
     column = taps.expand(c, 1, len(taps))
     planes = torch.nn.functional.conv2d(planes, column[..., None], padding=(padding, 0), groups=c)
     return torch.nn.functional.conv2d(planes, column[:, :, None], padding=(0, padding), groups=c)

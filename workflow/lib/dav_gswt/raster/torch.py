@@ -189,21 +189,27 @@ def compute_loss(
     return value.item(), np.ascontiguousarray(gradient.cpu().numpy(), np.float32)
 
 
-@torch.enable_grad()
 def differentiate_loss(
     image: Float[Tensor, "h w c"], target: Float[Tensor, "h w c"], weight: Float[Tensor, "h w"], structure: float
 ) -> tuple[Float[Tensor, ""], Float[Tensor, "h w c"]]:
-    """The loss of `backends.loss` and its gradient by the image, by autograd."""
-    x, y, w = image.detach().requires_grad_(), target, weight[..., None]
-    c = x.shape[2]
-    n, *sums = _window_sums(torch.cat([w, w * torch.cat([x, y, x * x, y * y, x * y], 2)], 2)).split([1] + 5 * [c], 2)
-    a, b, aa, bb, ab = (total / torch.where(n > 0, n, 1) for total in sums)
-    vaa, vbb, vab = aa - a * a, bb - b * b, ab - a * b
-    c1, c2 = 0.01**2, 0.03**2
-    ssim = (2 * a * b + c1) * (2 * vab + c2) / ((a * a + b * b + c1) * (vaa + vbb + c2))
-    value = (w * ((1 - structure) * (x - y).abs() + structure * (1 - ssim))).mean()
-    (gradient,) = torch.autograd.grad(value, x)
-    return value.detach(), gradient
+    """The loss of `backends.loss` and its gradient by the image: slopes of SSIM by the local means of x, xx and xy go
+    back to the pixels that these were taken of."""
+    x, y, w, c = image, target, weight[..., None], image.shape[2]
+    sums = _window_sums(w * torch.cat([torch.ones_like(w), x, y, x * x, y * y, x * y], 2))
+    per_n = torch.where(sums[..., :1] > 0, 1 / sums[..., :1], 0)
+    a, b, aa, bb, ab = (sums[..., 1:] * per_n).split(c, 2)
+    c1, c2, product = 0.01**2, 0.03**2, a * b
+    mean, cross = 2 * product + c1, 2 * (ab - product) + c2
+    per_mean = 1 / (a * a + b * b + c1)
+    per_spread = 1 / (aa - a * a + bb - b * b + c2)
+    per_both = per_mean * per_spread
+    ssim, apart = mean * cross * per_both, x - y
+    value = (w * ((1 - structure) * apart.abs() + structure * (1 - ssim))).mean()
+    by_x = 2 * (b * (cross - mean) * per_both - a * ssim * (per_mean - per_spread))
+    slopes = torch.cat([by_x, -ssim * per_spread, 2 * mean * per_both], 2) * (w * per_n)
+    by_x, by_xx, by_xy = _window_sums(slopes).split(c, 2)
+    by_structure = by_x + 2 * x * by_xx + y * by_xy
+    return value, w * ((1 - structure) * apart.sign() - structure * by_structure) / image.numel()
 
 
 def _window_sums(values: Float[Tensor, "h w c"]) -> Float[Tensor, "h w c"]:
