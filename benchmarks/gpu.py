@@ -1,8 +1,8 @@
 """A fit on an NVIDIA GPU, measured part by part, each within its seconds, on a machine without network.
 
 `PYTHONPATH=tests python benchmarks/gpu.py PHOTOS` with the folder results/copr_dunes/photos, made before on any machine
-(`snakemake --cores 2 results/copr_dunes/photos/ground.json`); --only PART ... for some parts, --dry-run to see what would be
-done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json and gpu.md have what was found so far.
+(`snakemake --cores 2 results/copr_dunes/photos/ground.json`); --only PART ... for some parts, --dry-run to see what
+would be done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json and gpu.md have what was found so far.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""What NumPy and PyTorch spell differently, so that a formula is written once, for arrays and for tensors on any device.
+"""What NumPy and PyTorch spell differently: a formula is written once, for arrays and for tensors on any device.
 
 Of tensors no value is read and no shape depends on one: steps of a fit on a GPU never wait for the host. PyTorch and
 SciPy take long to load: who needs neither does not wait for them.
@@ -74,7 +74,8 @@ def median(values: Any, mask: Any = None) -> Any:
         return (rising[(n - 1) // 2] + rising[n // 2]) / 2
     n = mask.sum().reshape(1)
     rising = torch.where(mask, values, torch.nan).sort().values  # NaN comes last
-    return (rising.gather(0, ((n - 1) // 2).clamp(min=0)) + rising.gather(0, (n // 2).clamp(max=len(values) - 1)))[0] / 2
+    low, high = ((n - 1) // 2).clamp(min=0), (n // 2).clamp(max=len(values) - 1)
+    return (rising.gather(0, low) + rising.gather(0, high))[0] / 2
 
 
 def measure_slopes(heights: Any, spacing: float) -> tuple[Any, Any]:

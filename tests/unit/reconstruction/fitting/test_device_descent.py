@@ -1,6 +1,6 @@
 """Steps on a GPU are those without one, and nothing in them waits for the host.
 
-Through a gsplat that is made up, on PyTorch's CPU and on its device without values, and on a real GPU where there is one.
+Through a gsplat that is made up, on PyTorch's CPU and on its device without values; and on a GPU where there is one.
 """
 
 import importlib

@@ -9,7 +9,8 @@ linearised, harmonics), but for:
 - sums are atomic: two runs differ in the last bits.
 Each call of the interface copies arrays to the GPU and back (`forward_each` copies Gaussians once), and `adam` runs on
 the CPU. A fit keeps its arrays on the GPU (`reconstruction.fitting.device_descent`): it calls `draw`, `differentiate`
-and `project_back`, which neither copy nor read. gsplat itself reads one number a picture: how long its list of tiles is.
+and `project_back`, which neither copy nor read. gsplat itself reads one number a picture, the length of its list of
+tiles.
 """
 
 from dataclasses import dataclass
@@ -101,7 +102,7 @@ class Rasterizer(interface.Rasterizer):
         return dict(zip(last.leaves, found, strict=True))
 
     def project_back(self, last: GsplatForward, values: Float32[Tensor, "h w"]) -> Float32[Tensor, "n"]:
-        """Values of pixels summed by blend weights: the gradient by a channel (depth) of a loss with these gradients."""
+        """Values of pixels summed by blend weights: they are the gradient by a channel, the depth, of such a loss."""
         by_picture = torch.nn.functional.pad(values[..., None], (last.picture.shape[-1] - 1, 0))[None]
         return torch.autograd.grad(last.picture, last.meta["depths"], by_picture, retain_graph=True)[0][0]
 

@@ -207,18 +207,19 @@ class Rasterizer(ABC):
 
 @dataclass(frozen=True)
 class AdamStep:
-    """The checked inputs of `backends.adam`. rates: one, or one a column."""
+    """The checked inputs of `backends.adam`, arrays, or tensors of columns. rates: one, or one a column. rows: of
+    tensors 1 for those that move and 0 for those that stay."""
 
-    values: Float32[Array, "n ..."]
-    gradient: Float32[Array, "n ..."]
-    first: Float32[Array, "n ..."]
-    second: Float32[Array, "n ..."]
-    rates: Float32[Array, "columns"]
+    values: Float32[Any, "n ..."]
+    gradient: Float32[Any, "n ..."]
+    first: Float32[Any, "n ..."]
+    second: Float32[Any, "n ..."]
+    rates: float | Float32[Any, "columns"]
     step: int
     betas: tuple[float, float]
     epsilon: float
-    rows: Bool[Array, "n"] | None
-    threads: int | None
+    rows: Bool[Array, "n"] | Float32[Any, "n 1"] | None
+    threads: int | None = None
 
 
 def check(array, name: str, shape: tuple[int, ...], dtype: type[np.generic] = np.float32) -> None:

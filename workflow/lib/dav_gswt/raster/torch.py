@@ -222,30 +222,20 @@ def _window_sums(values: Float[Tensor, "h w c"]) -> Float[Tensor, "h w c"]:
 def step_adam(s: AdamStep) -> None:
     """See `backends.adam`."""
     rows = slice(None) if s.rows is None else np.flatnonzero(s.rows)
-    given = [torch.from_numpy(a.reshape(len(a), -1)[rows]) for a in (s.values, s.gradient, s.first, s.second)]
-    rates = torch.from_numpy(s.rates) if len(s.rates) > 1 else float(s.rates[0])
-    move_by_adam(*given, rates, s.step, s.betas, s.epsilon)
+    arrays = s.values, s.gradient, s.first, s.second
+    value, g, m, v = (torch.from_numpy(a.reshape(len(a), -1)[rows]) for a in arrays)
+    move_by_adam(AdamStep(value, g, m, v, torch.as_tensor(s.rates), s.step, s.betas, s.epsilon, None))
     if s.rows is not None:
-        for array, new in ((s.values, given[0]), (s.first, given[2]), (s.second, given[3])):
+        for array, new in ((s.values, value), (s.first, m), (s.second, v)):
             array.reshape(len(array), -1)[rows] = new.numpy()
 
 
-def move_by_adam(
-    value: Float32[Tensor, "n c"],
-    gradient: Float32[Tensor, "n c"],
-    first: Float32[Tensor, "n c"],
-    second: Float32[Tensor, "n c"],
-    rates: float | Float32[Tensor, "c"],
-    step: int,
-    betas: tuple[float, float],
-    epsilon: float,
-    rows: Float32[Tensor, "n 1"] | None = None,
-) -> None:
-    """One step of Adam, in place (see `backends.adam`). rows: 1 for those that move, 0 for those that stay."""
-    shares = [torch.full_like(first[:, :1], 1 - beta) if rows is None else (1 - beta) * rows for beta in betas]
-    first.lerp_(gradient, shares[0])
-    second.lerp_(gradient * gradient, shares[1])
-    move = first / (1 - betas[0] ** step)
-    move /= (second / (1 - betas[1] ** step)).sqrt_().add_(epsilon)
-    move *= rates
-    value.sub_(move if rows is None else move * rows)
+def move_by_adam(s: AdamStep) -> None:
+    """See `backends.adam`: the step of tensors, on any device."""
+    shares = [torch.full_like(s.first[:, :1], 1 - beta) if s.rows is None else (1 - beta) * s.rows for beta in s.betas]
+    s.first.lerp_(s.gradient, shares[0])
+    s.second.lerp_(s.gradient * s.gradient, shares[1])
+    move = s.first / (1 - s.betas[0] ** s.step)
+    move /= (s.second / (1 - s.betas[1] ** s.step)).sqrt_().add_(s.epsilon)
+    move *= s.rates
+    s.values.sub_(move if s.rows is None else move * s.rows)

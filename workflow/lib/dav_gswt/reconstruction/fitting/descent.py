@@ -1,6 +1,6 @@
-"""A step of a fit: forward, exposure, loss, backward and Adam on one photo; with the backends `cpu` and `torch` on arrays.
+"""A step of a fit: forward, exposure, loss, backward and Adam on one photo; here on arrays.
 
-`device_descent` has a subclass for a GPU.
+For the backends `cpu` and `torch`; `device_descent` has a subclass for a GPU.
 """
 
 from dataclasses import dataclass, field

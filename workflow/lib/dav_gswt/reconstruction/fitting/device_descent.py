@@ -17,7 +17,7 @@ from torch import Tensor
 
 from dav_gswt.arrays import on_host
 from dav_gswt.raster import cuda
-from dav_gswt.raster.interface import GaussianArrays
+from dav_gswt.raster.interface import AdamStep, GaussianArrays
 from dav_gswt.raster.torch import differentiate_loss, move_by_adam
 from dav_gswt.reconstruction.fitting.densification import move_loose
 from dav_gswt.reconstruction.fitting.descent import BETAS, STRUCTURE, Descent, TrainingState, TrainingTask, perturbation
@@ -116,7 +116,8 @@ class DeviceDescent(Descent):
 
     def _find_photo(self, task: TrainingTask, index: int) -> Photo:
         packed = self._packed.get(index) or self._pack(task, index)
-        return Photo(self._cameras[index], **{"behind": None} | {name: each.unpack() for name, each in packed.items()})
+        behind = packed["behind"].unpack() if "behind" in packed else None
+        return Photo(self._cameras[index], packed["image"].unpack(), packed["weight"].unpack(), behind)
 
     def _bring(self, numbers: Float32[Array, "c"]) -> Float32[Tensor, "c"]:
         """A few numbers, as arguments of kernels: a copy would wait for all that is under way."""
@@ -143,5 +144,5 @@ class DeviceDescent(Descent):
         rows = cuda.find_visible(self._last)[:, None].float()
         for name, value in run.state.values.items():
             four = value, gradients[name], run.state.first[name], run.state.second[name]
-            flat = (tensor.reshape(len(tensor), -1) for tensor in four)
-            move_by_adam(*flat, rates[name], run.step + 1, BETAS, EPSILON, rows)
+            value, g, m, v = (tensor.reshape(len(tensor), -1) for tensor in four)
+            move_by_adam(AdamStep(value, g, m, v, rates[name], run.step + 1, BETAS, EPSILON, rows))
