@@ -13,6 +13,7 @@ import statistics
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -154,11 +155,9 @@ def measure_start(photos, settings: FitSettings) -> dict:
 
     given = StartViews(photos.frame, photos.train, photos.model.points, photos.model.colours, photos.margin)
     profile, begun = cProfile.Profile(), time.perf_counter()
-    try:
-        with profile:
-            fit_coarse_field(given, settings, np.random.default_rng(0), trainer.FitOptions(callback=stop))
-    except FirstStepDone:
-        seconds = time.perf_counter() - begun
+    with suppress(FirstStepDone), profile:
+        fit_coarse_field(given, settings, np.random.default_rng(0), trainer.FitOptions(callback=stop))
+    seconds = time.perf_counter() - begun
     stats = pstats.Stats(profile).stats  # pyright: ignore[reportAttributeAccessIssue]
     own = {f"{Path(at[0]).stem}.{at[2]}": round(row[3], 2) for at, row in stats.items() if "dav_gswt" in at[0]}
     longest = dict(sorted(own.items(), key=lambda item: -item[1])[:20])
