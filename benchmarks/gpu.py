@@ -1,102 +1,228 @@
-"""The rasterizer on an NVIDIA GPU beside the core on all cores: a call with its copies, and gsplat's kernels alone.
+"""A fit on an NVIDIA GPU, measured part by part, each within its seconds, on a machine without network.
 
-Needs the extra `cuda`; without a GPU it says so. Prints a table, asserts nothing.
+`PYTHONPATH=tests python benchmarks/gpu.py PHOTOS` with the folder results/copr_dunes/photos, made before on any machine
+(`snakemake --cores 2 results/copr_dunes/photos/ground.json`); --only PART ... for some parts, --dry-run to see what
+would be done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json and gpu.md have what was found so far.
 """
 
+import argparse
+import json
 import os
+import re
 import statistics
+import subprocess
+import sys
 import time
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from raster import Scene, made
-from record import report_figures
+from raster import made
 
-from dav_gswt.raster import adam, backends, loss
+from dav_gswt.field import GaussianField, concatenate_fields
+from dav_gswt.files import write_json
+from dav_gswt.raster import backends
+from dav_gswt.reconstruction import discs, ground
+from dav_gswt.reconstruction.fitting import exposure, state, trainer
+from dav_gswt.reconstruction.fitting.descent import TrainingState, TrainingTask
+from dav_gswt.reconstruction.fitting.plan import FitPlan, FitSettings, Schedule
+from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 
-SCENES = [
-    Scene("512_100k", 512, 512, 100_000),
-    Scene("1024_500k", 1024, 768, 500_000),
-    Scene("1080p_1m", 1920, 1080, 1_000_000),
-    Scene("1080p_3m", 1920, 1080, 3_000_000),
-]
-WARM_UP, REPEATS = 2, 5
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT / "study"))
+TESTS = "tests/unit/raster", "tests/unit/test_arrays.py", "tests/unit/reconstruction/fitting/test_device_descent.py"
+DUNES = FitSettings(fit_size=768, spacing=1.5, max_gaussians=500_000, steps=300, steps_per_photo=20)
+HUNDRED = replace(DUNES, fit_size=1024)
+DECIBELS = 34, 35
+RIVAL_STEPS, LOOKS = 4000, 20  # of gsplat's trainer; steps from look to look of ours, of it five times as many
+
+
+@dataclass(frozen=True)
+class Part:
+    """seconds: after which it is stopped. targets: upper bounds of some of its figures."""
+
+    what: str
+    seconds: int
+    targets: dict[str, float]
+
+
+PARTS = {
+    "tests": Part("tests of the backend", 150, {"failed": 0}),
+    "step": Part("a step of a fit against its kernels", 60, {"step_over_kernels": 1.5}),
+    "dunes": Part("copr_dunes to 34 and 35 dB beside gsplat's trainer", 180, {f"share_{d}": 0.5 for d in DECIBELS}),
+    "start": Part("what precedes the first step", 60, {"seconds": 8}),
+    "hundred": Part("a fit to 100 photos of 1024 pixels", 120, {"seconds": 60}),
+}
+
+
+def measure_tests() -> dict:
+    """How many tests pass, fail and are left out."""
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *TESTS]
+    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
+    print(said[-3000:], file=sys.stderr)
+    counts = {word: re.search(rf"(\d+) {word}", said) for word in ("passed", "failed", "skipped")}
+    return {word: int(found[1]) if found else 0 for word, found in counts.items()}
+
+
+def measure_step(
+    device: str = "cuda", cells: int = 512, free: int = 170_000, size: tuple[int, int] = (1024, 768), steps: int = 100
+) -> dict:
+    """Milliseconds of a step on ground with things over it, and of gsplat's forward and backward pass in it alone."""
+    import torch
+
+    from dav_gswt.photos.training_views import TrainingView
+    from dav_gswt.raster import cuda
+    from dav_gswt.reconstruction.fitting.device_descent import DeviceDescent
+
+    def wait() -> None:
+        if device == "cuda":
+            torch.cuda.synchronize()
+
+    (width, height), span = size, 4.0
+    grid = ground.Ground(-2.0, -2.0, span / cells, 0, 0, cells, np.zeros((cells, cells)), np.ones((cells, cells), bool))
+    layer = discs.make_ground_discs(grid, np.full((cells**2, 3), 0.5))
+    arrays, camera = made(width, height, free, (1, 3))
+    arrays["means"][:, 2] -= 4
+    camera = replace(camera, rotation=np.diag([1.0, -1.0, -1.0]), translation=np.array([0.0, 0.0, 4.4]))
+    quats = arrays["quats"] / np.linalg.norm(arrays["quats"], axis=1, keepdims=True)
+    things = GaussianField(
+        np.clip(arrays["means"], -1.9, 1.9) * np.float32([1, 1, 0.1]), arrays["log_scales"], quats,
+        arrays["opacity_logits"], arrays["colours"], np.zeros(free, np.float32), np.zeros(free, bool),
+    )  # fmt: skip
+    start = concatenate_fields([layer, discs.make_underlay(grid, layer), things])
+    image = np.random.default_rng(0).uniform(0, 1, (height, width, 3)).astype(np.float32)
+    views = [TrainingView("", camera, image, np.ones((height, width), np.float32))]
+    begin, plan = state.from_field(start), FitPlan(10**6, 1, 1)
+    begin.resize_sh(1)
+    run = TrainingState(begin, np.random.default_rng(0), exposure.ExposureTracker(1))
+    drawn = cuda.Rasterizer(device=device)
+    task = TrainingTask(views, plan, Schedule(plan, len(start)), GroundConstraints(grid, np.ones(grid.shape)), drawn)
+    descent = DeviceDescent(drawn)
+    descent.start(run, task)
+    for _ in range(max(1, steps // 10)):
+        trainer._advance(run, task, descent)
+    wait()
+    begun = time.perf_counter()
+    for _ in range(steps):
+        trainer._advance(run, task, descent)
+    wait()
+    step, kernels = 1e3 * (time.perf_counter() - begun) / steps, []
+    gradient = torch.ones(height, width, 3, device=device)
+    for _ in range(max(3, steps // 10)):
+        wait()
+        begun = time.perf_counter()
+        last = drawn.draw(run.state.values, descent._cameras[0])
+        drawn.differentiate(last, gradient, gradient[..., 0])
+        wait()
+        kernels.append(1e3 * (time.perf_counter() - begun))
+    found = {"gaussians": len(start), "step_ms": step, "kernels_ms": statistics.median(kernels)}
+    if device == "cuda":
+        found["memory_gb"] = torch.cuda.max_memory_allocated() / 1e9
+    return found | {"step_over_kernels": step / found["kernels_ms"]}
+
+
+def measure_fit(photos, settings: FitSettings, rival: bool = False) -> dict:
+    """Seconds of a fit and how good it gets, and when it reaches DECIBELS. rival: beside gsplat's trainer."""
+    from dav_gswt_study import fit_profile
+
+    curves = {"ours": fit_profile.profile_fit(photos, settings, every=LOOKS).curve}
+    if rival:
+        from dav_gswt_study.gsplat_fit import profile_gsplat
+
+        curves["gsplat"] = profile_gsplat(photos, RIVAL_STEPS, 5 * LOOKS)
+    found: dict = {"curves": curves, "seconds": curves["ours"][-1]["seconds"], "photos": len(photos.train)}
+    for decibel in DECIBELS:
+        times = {name: fit_profile.find_time_to(curve, decibel) for name, curve in curves.items()}
+        found |= {f"{name}_to_{decibel}": seconds for name, seconds in times.items()}
+        ours, theirs = times["ours"], times.get("gsplat")
+        found[f"share_{decibel}"] = ours / theirs if ours is not None and theirs else None
+    return found
+
+
+def measure_start(photos, settings: FitSettings) -> dict:
+    """Seconds until the first step is done, and the functions that take most of them."""
+    import cProfile
+    import pstats
+
+    from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
+
+    class FirstStepDone(Exception):
+        pass
+
+    def stop(step: int, now: state.State) -> None:
+        raise FirstStepDone
+
+    given = StartViews(photos.frame, photos.train, photos.model.points, photos.model.colours, photos.margin)
+    profile, begun = cProfile.Profile(), time.perf_counter()
+    with suppress(FirstStepDone), profile:
+        fit_coarse_field(given, settings, np.random.default_rng(0), trainer.FitOptions(callback=stop))
+    seconds = time.perf_counter() - begun
+    stats = pstats.Stats(profile).stats  # pyright: ignore[reportAttributeAccessIssue]
+    own = {f"{Path(at[0]).stem}.{at[2]}": round(row[3], 2) for at, row in stats.items() if "dav_gswt" in at[0]}
+    longest = dict(sorted(own.items(), key=lambda item: -item[1])[:20])
+    return {"seconds": seconds, "photos": len(photos.train), "longest": longest}
+
+
+def measure(name: str, folder: Path | None) -> dict:
+    """Do a part here."""
+    if name == "tests":
+        return measure_tests()
+    if name == "step":
+        return measure_step()
+    from dav_gswt_study.fit_profile import read_photo_set
+
+    if folder is None:
+        raise SystemExit(f"{name}: give the folder of photos")
+    photos = read_photo_set(folder, 1024 if name == "hundred" else 768)
+    if name == "hundred":  # each about three times: what a fit costs does not depend on what they show
+        return measure_fit(replace(photos, train=(3 * photos.train)[:100]), HUNDRED)
+    return measure_start(photos, DUNES) if name == "start" else measure_fit(photos, DUNES, rival=True)
+
+
+def run_part(name: str, folder: Path | None) -> dict:
+    """Do a part in a process of its own, which is stopped when its time is over."""
+    command = [sys.executable, __file__, *([str(folder)] if folder else []), "--part", name]
+    try:
+        done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=PARTS[name].seconds)
+    except subprocess.TimeoutExpired:
+        return {"stopped_after": PARTS[name].seconds}
+    return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else {"failed": done.returncode}
+
+
+def write_table(found: dict[str, dict], path: Path) -> None:
+    """What was found, beside its targets, as Markdown."""
+    lines = ["| part | figure | found | target |", "|---|---|---|---|"]
+    for name, figures in found.items():
+        for key, value in figures.items():
+            if not isinstance(value, dict):
+                shown = f"{value:.4g}" if isinstance(value, int | float) else value
+                lines.append(f"| {PARTS[name].what} | {key} | {shown} | {PARTS[name].targets.get(key, '')} |")
+    path.write_text("\n".join(lines) + "\n")
 
 
 def main() -> None:
-    if why := backends.explain_unavailable("cuda"):
-        print(f"gpu: nothing measured: {why}")
-        return
-    import torch
-
-    print(f"{torch.cuda.get_device_name()}, {os.cpu_count()} cores")
-    figures: dict[str, float | None] = {}
-    print("| scene | kernels forward | backward | cuda forward | backward | loss | Adam | cpu forward | backward |")
-    print("|---" * 9 + "|")
-    for scene in SCENES:
-        values = [*time_kernels(scene), *time_backend("cuda", scene)]
-        values += time_backend("cpu", scene)[:2] if not backends.explain_unavailable("cpu") else [float("nan")] * 2
-        print(f"| {scene.name} | " + " | ".join(f"{value:.2f}" for value in values) + " |", flush=True)
-        figures[f"cuda_{scene.name}_ms"] = sum(values[2:4])
-        figures[f"cuda_{scene.name}_over_cpu"] = sum(values[2:4]) / sum(values[6:8])
-    report_figures(figures, {})
-
-
-def time_backend(name: str, scene: Scene) -> list[float]:
-    """Milliseconds of forward, backward, loss, and Adam's step for all parameters, arrays copied to and fro."""
-    backend = backends.load_backend(name)
-    arrays, camera = made(scene.width, scene.height, scene.gaussians, (4, 3))
-    drawn = backend.Rasterizer()
-    seen = drawn.forward(**arrays, camera=camera)
-    gradient = np.random.default_rng(1).normal(size=seen.colour.shape).astype(np.float32)
-    found = vars(drawn.backward(gradient))
-    moments = {key: (np.zeros_like(a), np.zeros_like(a)) for key, a in arrays.items()}
-    target = np.clip(seen.colour + 0.05 * gradient, 0, 1)
-
-    def step() -> None:
-        for key, values in arrays.items():
-            adam(values, found[key], *moments[key], rate=1e-9, step=1, rows=drawn.visible, backend=name)
-
-    calls = [
-        lambda: drawn.forward(**arrays, camera=camera),
-        lambda: drawn.backward(gradient),
-        lambda: loss(seen.colour, target, backend=name),
-        step,
-    ]
-    return [milliseconds(call) for call in calls]
-
-
-def time_kernels(scene: Scene) -> list[float]:
-    """Milliseconds of gsplat's own forward and backward passes, everything on the GPU."""
-    import torch
-
-    arrays, camera = made(scene.width, scene.height, scene.gaussians, (4, 3))
-    drawn = backends.load_backend("cuda").Rasterizer()
-    leaves = {key: torch.tensor(a, device="cuda").requires_grad_() for key, a in arrays.items()}
-    view = torch.eye(4, device="cuda").requires_grad_()
-
-    def forward() -> torch.Tensor:
-        picture = drawn._call_gsplat(leaves, view, camera)[0]
-        torch.cuda.synchronize()
-        return picture
-
-    shown = forward()
-    gradient = torch.randn_like(shown)
-
-    def backward() -> None:
-        torch.autograd.grad(shown, (*leaves.values(), view), gradient, retain_graph=True)
-        torch.cuda.synchronize()
-
-    return [milliseconds(forward), milliseconds(backward)]
-
-
-def milliseconds(call) -> float:
-    """The median of some calls after a few."""
-    times = []
-    for _ in range(WARM_UP + REPEATS):
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return 1e3 * statistics.median(times[WARM_UP:])
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("photos", nargs="?", type=Path)
+    asked.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
+    asked.add_argument("--dry-run", action="store_true")
+    asked.add_argument("--part", choices=PARTS)
+    given = asked.parse_args()
+    why = backends.explain_unavailable("cuda")
+    if given.part:
+        os.environ[backends.VARIABLE] = "cuda"
+        print(json.dumps(measure(given.part, given.photos)))
+    elif given.dry_run or why:
+        print(f"gpu: nothing measured: {why or 'a dry run'}")
+        for name in given.only:
+            print(f"{name}: {PARTS[name].what}, at most {PARTS[name].seconds} s, targets {PARTS[name].targets}")
+    else:
+        found: dict[str, dict] = {}
+        for name in given.only:
+            found[name] = run_part(name, given.photos)
+            write_json(ROOT / "results/gpu.json", found)
+            write_table(found, ROOT / "results/gpu.md")
+        print((ROOT / "results/gpu.md").read_text())
 
 
 if __name__ == "__main__":

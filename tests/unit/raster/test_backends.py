@@ -107,6 +107,23 @@ def test_what_has_no_pixel_is_not_drawn_and_all_else_is(backend, name, scene):
         assert not getattr(gradients, parameter)[~drawn].any(), parameter
 
 
+def test_one_camera_after_the_other_sees_the_same_gaussians_as_each_alone(backend, kind, monkeypatch):
+    raster, arrays = backend(), SCENES["a cloud"].arrays
+    alone = [raster.forward(**arrays, camera=camera).colour for camera in CAMERAS.values()]
+    if kind == FAKED:
+        brought, load = [], type(raster)._load
+        monkeypatch.setattr(type(raster), "_load", lambda self, given: brought.append(given) or load(self, given))
+    found = []
+    for seen in raster.forward_each(arrays, CAMERAS.values()):
+        found.append(seen.colour)
+        assert raster.contributions().total.sum() == pytest.approx(seen.alpha.sum(), rel=1e-3)
+    for one, other in zip(found, alone, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-6 if kind == "cuda" else 0)
+    assert kind != FAKED or len(brought) == 1
+    arrays = arrays | {"means": arrays["means"] + np.float32(0.1)}
+    assert np.abs(raster.forward(**arrays, camera=CAMERAS["pinhole"]).colour - found[0]).max() > 0.01
+
+
 def test_what_lies_before_the_near_plane_or_behind_is_left_out(backend):
     camera = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 8.0, 16, 16)
     arrays = taken(gaussians(6), np.arange(6)) | {"opacity_logits": np.full(6, 2, np.float32)}

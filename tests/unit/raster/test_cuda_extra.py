@@ -7,7 +7,7 @@ import pytest
 from fixtures import fake_gsplat
 
 gsplat = pytest.importorskip("gsplat", reason="gsplat is not installed: .ci/run tests it in a folder of its own")
-CALLED = "rasterization", "rasterize_to_indices_in_range"
+CALLED = "rasterization", "spherical_harmonics", "rasterize_to_indices_in_range"
 
 
 @pytest.mark.parametrize("name", CALLED)

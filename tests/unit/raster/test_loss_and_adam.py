@@ -1,5 +1,5 @@
 """L1 + D-SSIM against a plain float64 twin with autograd's gradient, and Adam against PyTorch's: by the core in every
-instruction set, and by PyTorch's backend."""
+instruction set, by PyTorch's backend, and on a GPU where there is one."""
 
 from functools import partial
 from types import SimpleNamespace
@@ -13,9 +13,11 @@ from dav_gswt.raster import adam, backends, loss
 ISAS = [] if backends.explain_unavailable("cpu") else backends.load_backend("cpu").instruction_sets()
 
 
-@pytest.fixture(params=[*ISAS, "torch"])
+@pytest.fixture(params=[*ISAS, "torch", "cuda"])
 def backend(request, monkeypatch):
-    name = "torch" if request.param == "torch" else "cpu"
+    name = "cpu" if request.param in ISAS else request.param
+    if why := backends.explain_unavailable(name):
+        pytest.skip(f"{name}: {why}")
     if name == "cpu":
         monkeypatch.setenv("DAV_GSWT_ISA", request.param)
     return SimpleNamespace(loss=partial(loss, backend=name), adam=partial(adam, backend=name))

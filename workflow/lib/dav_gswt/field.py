@@ -4,13 +4,14 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64
 from numpy import ndarray as Array
 from plyfile import PlyData, PlyElement, PlyParseError
 
+from dav_gswt.arrays import to_single
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import UNREADABLE, atomic_file
 from dav_gswt.packed_ply import COLUMNS as PACKED
@@ -110,9 +111,9 @@ def mean_scale(parts: list[GaussianField]) -> float:
     return float(np.mean(np.concatenate([np.exp(p.log_scales.astype(float)).mean(1) for p in parts])))
 
 
-def rgb_to_sh(colours: Float[Array, "n 3"]) -> Float32[Array, "n 1 3"]:
+def rgb_to_sh(colours: Float[Any, "n 3"]) -> Float32[Any, "n 1 3"]:
     """Degree-0 coefficients of colours that do not depend on the view."""
-    return ((colours - 0.5) / SH0).astype(np.float32)[:, None]
+    return to_single((colours - 0.5) / SH0)[:, None]
 
 
 def _columns(k: int) -> dict[str, list[str]]:

@@ -103,9 +103,10 @@ def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[Trainin
     """
     field = replace(field, sh=field.sh[:, :1])
     rasterizer, views = raster.make_rasterizer(), []
-    for number, camera in enumerate(_neighbour_cameras(coarse)):
-        fine = camera.resized(2 * camera.width, 2 * camera.height)
-        render = rasterizer.forward(**to_raster_arrays(field), camera=fine)
+    neighbours = _neighbour_cameras(coarse)
+    fine = [camera.resized(2 * camera.width, 2 * camera.height) for camera in neighbours]
+    renders = rasterizer.forward_each(to_raster_arrays(field), fine)
+    for number, (camera, render) in enumerate(zip(neighbours, renders, strict=True)):
         colour = render.colour / np.maximum(render.alpha, 0.5)[..., None]  # without the background
         size = camera.width, camera.height
         image = image_files.shrink_image(np.clip(colour, 0, 1).astype(np.float32), *size)

@@ -13,7 +13,7 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior.interface import Condition
-from dav_gswt.raster import make_rasterizer, to_raster_arrays
+from dav_gswt.raster import Rendering, make_rasterizer, to_raster_arrays
 
 SUPERSAMPLING = 2  # renders are this many times larger and averaged: edges are soft, as in a photo made smaller
 LEAST_ALPHA = 0.05  # a pixel of less opacity has no depth
@@ -52,7 +52,7 @@ def build_condition(
     field: GaussianField, poses: list[tuple[Pose, Camera]], known: ReferencePhotos, flying_height: float, size: int
 ) -> Condition:
     """The condition of every pose, at size x size pixels of the centre square of its picture."""
-    renders = [render_view(field, crop_camera(camera).resized(size, size), flying_height) for _, camera in poses]
+    renders = render_views(field, [crop_camera(camera).resized(size, size) for _, camera in poses], flying_height)
     at = [find_nearest(pose, known.poses) for pose, _ in poses]
     relative = [relative_pose(known.poses[i], pose, flying_height) for i, (pose, _) in zip(at, poses, strict=True)]
     return Condition(
@@ -65,9 +65,18 @@ def build_condition(
 
 
 def render_view(field: GaussianField, camera: Camera, flying_height: float) -> RenderedView:
-    """Render the field's part of a Condition. Everything that queries a prior renders fields by this function."""
-    large = camera.resized(SUPERSAMPLING * camera.width, SUPERSAMPLING * camera.height)
-    render = make_rasterizer().forward(**to_raster_arrays(field), camera=large)
+    """Render the field's part of a Condition."""
+    return render_views(field, [camera], flying_height)[0]
+
+
+def render_views(field: GaussianField, cameras: list[Camera], flying_height: float) -> list[RenderedView]:
+    """Render the field's part of Conditions. Everything that queries a prior renders fields by this function."""
+    large = [camera.resized(SUPERSAMPLING * camera.width, SUPERSAMPLING * camera.height) for camera in cameras]
+    renders = make_rasterizer().forward_each(to_raster_arrays(field), large)
+    return [_shrink_render(render, flying_height) for render in renders]
+
+
+def _shrink_render(render: Rendering, flying_height: float) -> RenderedView:
     colour, alpha, depth = (_downsample(a) for a in (render.colour, render.alpha, render.depth))
     solid = alpha > LEAST_ALPHA
     inverse = np.where(solid, flying_height * alpha / np.where(solid, depth, 1), 0)

@@ -7,8 +7,10 @@ linearised, harmonics), but for:
 - covariances are inverted by differences of large numbers in float32: of splats a thousand times as long as wide many
   are drawn wrong or not at all (fits allow a factor of 10); standard deviations beyond 1e18 pixels or units are lost.
 - sums are atomic: two runs differ in the last bits.
-Each call of the interface copies arrays to the GPU and back, and `adam` runs on the CPU. A fit keeps its arrays on the
-GPU (`reconstruction.fitting.device_descent`): it calls `draw`, `differentiate` and `contribute`.
+Each call of the interface copies arrays to the GPU and back (`forward_each` copies Gaussians once), and `adam` runs on
+the CPU. A fit keeps its arrays on the GPU (`reconstruction.fitting.device_descent`): it calls `draw`, `differentiate`
+and `project_back`, which neither copy nor read. gsplat itself reads one number a picture, the length of its list of
+tiles.
 """
 
 from dataclasses import dataclass
@@ -18,12 +20,13 @@ from typing import Any
 import gsplat  # pyright: ignore[reportMissingImports]  an extra
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Float32, Float64, Int
 from numpy import ndarray as Array
 from torch import Tensor
 
+from dav_gswt.arrays import on_host
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.raster import interface, oracle
+from dav_gswt.raster import interface
 from dav_gswt.raster import torch as plain
 from dav_gswt.raster.interface import Contributions, Forward, GaussianArrays, Gradients, PictureGradients, Rendering
 from dav_gswt.raster.torch import join_gradients, step_adam
@@ -32,6 +35,27 @@ __all__ = ["Rasterizer", "compute_loss", "step_adam"]
 
 ALPHA_MAX = 0.999  # gsplat's
 ANY_DEPTH = 1e-37, 3e38  # near and far plane that keep all before the camera: the limits of float32
+
+
+@dataclass(frozen=True)
+class DeviceCamera:
+    """A camera's numbers on a device, for Gaussians relative to its centre."""
+
+    width: int
+    height: int
+    orthographic: bool
+    centre: Float64[Tensor, "3"]
+    view: Float32[Tensor, "4 4"]
+    inner: Float32[Tensor, "3 3"]
+
+
+def upload_camera(camera: Camera, device: torch.device) -> DeviceCamera:
+    """The camera on a device."""
+    view = torch.eye(4)
+    view[:3, :3] = torch.as_tensor(np.asarray(camera.rotation))
+    inner = [[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]]
+    numbers = torch.as_tensor(np.asarray(camera.centre, float)), view, torch.tensor(inner, dtype=torch.float32)
+    return DeviceCamera(camera.width, camera.height, camera.orthographic, *(t.to(device) for t in numbers))
 
 
 @dataclass(frozen=True)
@@ -50,16 +74,14 @@ class Rasterizer(interface.Rasterizer):
     def __init__(self, device: str = "cuda", **options: Any):
         super().__init__(**options)
         self.device = torch.device(device)
+        self._loaded: tuple[GaussianArrays | None, dict[str, Tensor]] = (None, {})
 
-    def draw(self, given: dict[str, Tensor], camera: Camera) -> GsplatForward:
+    def draw(self, given: dict[str, Tensor], camera: DeviceCamera) -> GsplatForward:
         """The forward pass of Gaussians on the device; given: `GaussianArrays` by name, world coordinates."""
-        centre = torch.as_tensor(np.asarray(camera.centre)).to(self.device)
-        given = given | {"means": (given["means"].double() - centre).float()}  # R m + t cancels far out
-        view = torch.eye(4, device=self.device)
-        view[:3, :3] = torch.as_tensor(np.asarray(camera.rotation))
+        given = given | {"means": (given["means"].double() - camera.centre).float()}  # R m + t cancels far out
         with torch.enable_grad():
             leaves = {name: tensor.detach().requires_grad_() for name, tensor in given.items()}
-            picture, alpha, meta = self._call_gsplat(leaves, view, camera)
+            picture, alpha, meta = self._call_gsplat(leaves, camera)
         return GsplatForward(leaves, picture, alpha, meta)
 
     def differentiate(
@@ -79,6 +101,11 @@ class Rasterizer(interface.Rasterizer):
         )
         return dict(zip(last.leaves, found, strict=True))
 
+    def project_back(self, last: GsplatForward, values: Float32[Tensor, "h w"]) -> Float32[Tensor, "n"]:
+        """Values of pixels summed by blend weights: they are the gradient by a channel, the depth, of such a loss."""
+        by_picture = torch.nn.functional.pad(values[..., None], (last.picture.shape[-1] - 1, 0))[None]
+        return torch.autograd.grad(last.picture, last.meta["depths"], by_picture, retain_graph=True)[0][0]
+
     def contribute(
         self, last: GsplatForward, maps: Float32[Tensor, "h w c"]
     ) -> tuple[Float32[Tensor, "n"], Float32[Tensor, "n"], Float32[Tensor, "n c"]]:
@@ -94,53 +121,59 @@ class Rasterizer(interface.Rasterizer):
         return total, maximum, torch.stack(mapped, 1) if mapped else zero[:, None][:, :0]
 
     def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Any]:
-        given = {name: upload(array, self.device) for name, array in vars(gaussians).items()}
+        if self._loaded[0] is not gaussians:
+            self._loaded = gaussians, self._load(gaussians)
+        last = self.draw(self._loaded[1], upload_camera(camera, self.device))
+        picture = last.picture.detach()[0]
+        images = picture[..., :-1], last.alpha.detach()[0, ..., 0], picture[..., -1]
+        return Rendering(*(on_host(image) for image in images)), last
+
+    def _load(self, gaussians: GaussianArrays) -> dict[str, Tensor]:
+        """Gaussians on the device. Raises: ValueError: see `GaussianArrays.check_values`."""
+        given = {name: torch.tensor(array, device=self.device) for name, array in vars(gaussians).items()}
         if not all(bool(tensor.isfinite().all()) for tensor in given.values()) or (
             len(gaussians.means) and bool((given["quats"].abs().amax(1) < interface.TINY).any())
         ):
             gaussians.check_values()
-        last = self.draw(given, camera)
-        picture = last.picture.detach()[0]
-        images = picture[..., :-1], last.alpha.detach()[0, ..., 0], picture[..., -1]
-        return Rendering(*(download(image) for image in images)), last
+        return given
 
     def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
         by_channel = join_gradients(last.rendering, given).to(self.device)
         by_picture = torch.cat([by_channel[..., :-2], by_channel[..., -1:]], 2)
         found = self.differentiate(last.state, by_picture, by_channel[..., -2])
-        return Gradients(**{name: download(gradient) for name, gradient in found.items()})
+        return Gradients(**{name: on_host(gradient) for name, gradient in found.items()})
 
     def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
-        return Contributions(*(download(t) for t in self.contribute(last.state, upload(weights, self.device))))
+        maps = torch.tensor(weights, device=self.device)
+        return Contributions(*(on_host(t) for t in self.contribute(last.state, maps)))
 
     def _visible(self, last: Forward) -> Bool[Array, "n"]:
-        return download(find_visible(last.state))
+        return on_host(find_visible(last.state))
 
-    def _call_gsplat(self, leaves: dict[str, Tensor], view: Float32[Tensor, "4 4"], camera: Camera):
-        """gsplat's picture (colours, depth), alpha and intermediate results."""
-        colours, degree = leaves["colours"], None
+    def _call_gsplat(self, leaves: dict[str, Tensor], camera: DeviceCamera):
+        """gsplat's picture (colours, depth), alpha and intermediate results.
+
+        It is given colours, not harmonics: for these it would invert the view, for which the host waits.
+        """
+        means, quats, colours = leaves["means"], leaves["quats"], leaves["colours"]
         if colours.ndim == 3:
-            if not camera.orthographic:
-                degree = int(colours.shape[1] ** 0.5) - 1
-            else:  # gsplat would see an orthographic picture from one point
-                colours = oracle.seen_from(colours, leaves["means"], camera, (view[:3, :3], view[:3, 3]))
-        quats = leaves["quats"]
+            towards = camera.view[2, :3].expand(len(means), 3) if camera.orthographic else means
+            degree, there = int(colours.shape[1] ** 0.5) - 1, (towards.detach() != 0).any(1)
+            colours = (gsplat.spherical_harmonics(degree, towards, colours, masks=there) + 0.5).clamp(min=0)
         near, far = ANY_DEPTH
-        inner = [[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]]
         return gsplat.rasterization(
-            leaves["means"],
+            means,
             quats / quats.detach().abs().amax(1, keepdim=True),  # gsplat squares them: 1e30 would be too much
             leaves["log_scales"].exp(),
             torch.sigmoid(leaves["opacity_logits"]),
             colours,
-            view[None],
-            torch.tensor(inner, dtype=torch.float32, device=view.device)[None],  # NumPy's numbers would make doubles
+            camera.view[None],
+            camera.inner[None],
             camera.width,
             camera.height,
             near_plane=near if camera.orthographic else self.near,
             far_plane=far,
             eps2d=self.dilation,
-            sh_degree=degree,
             packed=False,
             render_mode="RGB+D",
             rasterize_mode="antialiased" if self.antialiased else "classic",
@@ -151,17 +184,6 @@ class Rasterizer(interface.Rasterizer):
 def find_visible(last: GsplatForward) -> Bool[Tensor, "n"]:
     """Which Gaussians may have a pixel."""
     return (last.meta["radii"][0] > 0).all(-1)
-
-
-def upload(array: Array, device: torch.device) -> Tensor:
-    """An array on the device."""
-    return torch.tensor(array).to(device)
-
-
-def download(tensor: Tensor) -> Array:
-    """A tensor as an array, through memory that the device writes to by itself."""
-    on_host = torch.empty(tensor.shape, dtype=tensor.dtype, pin_memory=tensor.is_cuda)
-    return on_host.copy_(tensor.detach()).numpy()
 
 
 def list_pairs(

@@ -6,6 +6,7 @@ tests/unit/raster/test_backends.py.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -134,15 +135,25 @@ class Rasterizer(ABC):
         colours: channels, or spherical harmonics (k = 1, 4, 9, 16; see `harmonics`) seen from the camera.
         Raises: ValueError: an array's type, shape or layout, a value that is not finite, a zero quaternion (index).
         """
-        check_camera(camera)
-        gaussians = GaussianArrays(means, log_scales, quats, opacity_logits, colours)
-        gaussians.check_shapes()
-        self._last = None
-        rendering, state = self._render(gaussians, camera)
-        for image in vars(rendering).values():
-            image.flags.writeable = False  # the backward pass reads them
-        self._last = Forward(gaussians, camera, rendering, state)
-        return rendering
+        return next(self._forward_each(GaussianArrays(means, log_scales, quats, opacity_logits, colours), [camera]))
+
+    def forward_each(self, arrays: Mapping[str, Array], cameras: Iterable[Camera]) -> Iterator[Rendering]:
+        """`forward` of the same Gaussians for one camera after the other; they must not change in between.
+
+        A GPU is given them once, not for each picture.
+        """
+        return self._forward_each(GaussianArrays(**arrays), cameras)
+
+    def _forward_each(self, gaussians: GaussianArrays, cameras: Iterable[Camera]) -> Iterator[Rendering]:
+        for camera in cameras:
+            check_camera(camera)
+            gaussians.check_shapes()
+            self._last = None
+            rendering, state = self._render(gaussians, camera)
+            for image in vars(rendering).values():
+                image.flags.writeable = False  # the backward pass reads them
+            self._last = Forward(gaussians, camera, rendering, state)
+            yield rendering
 
     def backward(
         self,
@@ -196,18 +207,19 @@ class Rasterizer(ABC):
 
 @dataclass(frozen=True)
 class AdamStep:
-    """The checked inputs of `backends.adam`. rates: one, or one a column."""
+    """The checked inputs of `backends.adam`, arrays, or tensors of columns. rates: one, or one a column. rows: of
+    tensors 1 for those that move and 0 for those that stay."""
 
-    values: Float32[Array, "n ..."]
-    gradient: Float32[Array, "n ..."]
-    first: Float32[Array, "n ..."]
-    second: Float32[Array, "n ..."]
-    rates: Float32[Array, "columns"]
+    values: Float32[Any, "n ..."]
+    gradient: Float32[Any, "n ..."]
+    first: Float32[Any, "n ..."]
+    second: Float32[Any, "n ..."]
+    rates: float | Float32[Any, "columns"]
     step: int
     betas: tuple[float, float]
     epsilon: float
-    rows: Bool[Array, "n"] | None
-    threads: int | None
+    rows: Bool[Array, "n"] | Float32[Any, "n 1"] | None
+    threads: int | None = None
 
 
 def check(array, name: str, shape: tuple[int, ...], dtype: type[np.generic] = np.float32) -> None:

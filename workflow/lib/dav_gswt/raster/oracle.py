@@ -105,7 +105,7 @@ def seen_from(sh: Float[Tensor, "m k 3"], means: Float[Tensor, "m 3"], camera: C
 def basis(towards: Float[Tensor, "m 3"], k: int) -> Float[Tensor, "m k"]:
     """The first k real spherical harmonics of 3DGS in directions of any length; that of length 0 counts as +z."""
     length = towards.norm(dim=1, keepdim=True)
-    up = torch.tensor([0.0, 0.0, 1.0]).to(towards)
+    up = torch.eye(3, dtype=towards.dtype, device=towards.device)[2]
     x, y, z = torch.where(length > 0, towards / torch.where(length > 0, length, 1), up).unbind(1)
     return torch.stack(harmonics.list_terms(x, y, z, 3)[:k], 1)
 

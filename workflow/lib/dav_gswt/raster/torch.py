@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 from torch import Tensor
 
+from dav_gswt.arrays import convolve, count_up
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import interface, oracle
 from dav_gswt.raster.interface import (
@@ -188,39 +189,53 @@ def compute_loss(
     return value.item(), np.ascontiguousarray(gradient.cpu().numpy(), np.float32)
 
 
-@torch.enable_grad()
 def differentiate_loss(
     image: Float[Tensor, "h w c"], target: Float[Tensor, "h w c"], weight: Float[Tensor, "h w"], structure: float
 ) -> tuple[Float[Tensor, ""], Float[Tensor, "h w c"]]:
-    """The loss of `backends.loss` and its gradient by the image, by autograd."""
-    x, y, w = image.detach().requires_grad_(), target, weight[..., None]
-    n = _window_sums(w)
-    sums = _window_sums(w * torch.cat([x, y, x * x, y * y, x * y], 2)) / torch.where(n > 0, n, 1)
-    a, b, aa, bb, ab = sums.chunk(5, 2)
-    vaa, vbb, vab = aa - a * a, bb - b * b, ab - a * b
-    c1, c2 = 0.01**2, 0.03**2
-    ssim = (2 * a * b + c1) * (2 * vab + c2) / ((a * a + b * b + c1) * (vaa + vbb + c2))
-    value = (w * ((1 - structure) * (x - y).abs() + structure * (1 - ssim))).mean()
-    (gradient,) = torch.autograd.grad(value, x)
-    return value.detach(), gradient
+    """The loss of `backends.loss` and its gradient by the image: slopes of SSIM by the local means of x, xx and xy go
+    back to the pixels that these were taken of."""
+    x, y, w, c = image, target, weight[..., None], image.shape[2]
+    sums = _window_sums(w * torch.cat([torch.ones_like(w), x, y, x * x, y * y, x * y], 2))
+    per_n = torch.where(sums[..., :1] > 0, 1 / sums[..., :1], 0)
+    a, b, aa, bb, ab = (sums[..., 1:] * per_n).split(c, 2)
+    c1, c2, product = 0.01**2, 0.03**2, a * b
+    mean, cross = 2 * product + c1, 2 * (ab - product) + c2
+    per_mean = 1 / (a * a + b * b + c1)
+    per_spread = 1 / (aa - a * a + bb - b * b + c2)
+    per_both = per_mean * per_spread
+    ssim, apart = mean * cross * per_both, x - y
+    value = (w * ((1 - structure) * apart.abs() + structure * (1 - ssim))).mean()
+    by_x = 2 * (b * (cross - mean) * per_both - a * ssim * (per_mean - per_spread))
+    slopes = torch.cat([by_x, -ssim * per_spread, 2 * mean * per_both], 2) * (w * per_n)
+    by_x, by_xx, by_xy = _window_sums(slopes).split(c, 2)
+    by_structure = by_x + 2 * x * by_xx + y * by_xy
+    return value, w * ((1 - structure) * apart.sign() - structure * by_structure) / image.numel()
 
 
 def _window_sums(values: Float[Tensor, "h w c"]) -> Float[Tensor, "h w c"]:
     """Sums over each pixel's window of 11 x 11, weighted by a Gaussian of sigma 1.5."""
-    taps = torch.exp(-((torch.arange(11, dtype=torch.float64) - 5) ** 2) / (2 * 1.5**2)).to(values)
-    taps = taps / taps.sum()
-    planes = values.permute(2, 0, 1)[:, None]
-    planes = torch.nn.functional.conv2d(planes, taps.reshape(1, 1, 11, 1), padding=(5, 0))
-    return torch.nn.functional.conv2d(planes, taps.reshape(1, 1, 1, 11), padding=(0, 5))[:, 0].permute(1, 2, 0)
+    taps = torch.exp(-((count_up(11, values) - 5) ** 2) / (2 * 1.5**2))
+    taps = (taps / taps.sum()).to(values.dtype)
+    return convolve(values.permute(2, 0, 1)[None], taps, padding=5)[0].permute(1, 2, 0)
 
 
 def step_adam(s: AdamStep) -> None:
-    """See `backends.adam`; by NumPy."""
-    which = slice(None) if s.rows is None else np.flatnonzero(s.rows)
-    value, g, m, v = (a.reshape(len(a), -1)[which] for a in (s.values, s.gradient, s.first, s.second))
-    m = s.betas[0] * m + np.float32(1 - s.betas[0]) * g
-    v = s.betas[1] * v + np.float32(1 - s.betas[1]) * (g * g)
-    move = np.float32(1 / (1 - s.betas[0] ** s.step)) * m
-    move /= np.sqrt(np.float32(1 / (1 - s.betas[1] ** s.step)) * v) + np.float32(s.epsilon)
-    for array, new in ((s.values, value - s.rates * move), (s.first, m), (s.second, v)):
-        array.reshape(len(array), -1)[which] = new
+    """See `backends.adam`."""
+    rows = slice(None) if s.rows is None else np.flatnonzero(s.rows)
+    arrays = s.values, s.gradient, s.first, s.second
+    value, g, m, v = (torch.from_numpy(a.reshape(len(a), -1)[rows]) for a in arrays)
+    move_by_adam(AdamStep(value, g, m, v, torch.as_tensor(s.rates), s.step, s.betas, s.epsilon, None))
+    if s.rows is not None:
+        for array, new in ((s.values, value), (s.first, m), (s.second, v)):
+            array.reshape(len(array), -1)[rows] = new.numpy()
+
+
+def move_by_adam(s: AdamStep) -> None:
+    """See `backends.adam`: the step of tensors, on any device."""
+    shares = [torch.full_like(s.first[:, :1], 1 - beta) if s.rows is None else (1 - beta) * s.rows for beta in s.betas]
+    s.first.lerp_(s.gradient, shares[0])
+    s.second.lerp_(s.gradient * s.gradient, shares[1])
+    move = s.first / (1 - s.betas[0] ** s.step)
+    move /= (s.second / (1 - s.betas[1] ** s.step)).sqrt_().add_(s.epsilon)
+    move *= s.rates
+    s.values.sub_(move if s.rows is None else move * s.rows)

@@ -107,8 +107,8 @@ def estimate_uncertainty(field: GaussianField, views: list[TrainingView]) -> Gau
     """
     known = np.zeros(len(field), np.float32)
     raster = make_rasterizer()
-    for view in one_by_one(views):
-        seen = raster.forward(**to_raster_arrays(field), camera=view.camera)
+    pictures = raster.forward_each(to_raster_arrays(field), [view.camera for view in views])
+    for view, seen in zip(one_by_one(views), pictures, strict=True):
         maps = np.stack([view.weight * seen.alpha, view.weight], -1).astype(np.float32)
         opaque, weight = raster.contributions(maps).mapped.T
         share = np.where(weight > MIN_WEIGHT, opaque / np.maximum(weight, MIN_WEIGHT), 0)

@@ -6,12 +6,14 @@ around. It lies below the lowest disc around, follows the discs, and gets no gra
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
-from scipy.ndimage import distance_transform_edt, gaussian_filter, minimum_filter, uniform_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter, uniform_filter
 
+from dav_gswt import arrays
 from dav_gswt.field import SH0, GaussianField, rgb_to_sh
 from dav_gswt.reconstruction.ground import Ground
 
@@ -25,15 +27,14 @@ DEPTH = 1.0  # spacings of the underlay under the lowest disc around
 SOLID = 6.0  # opacity logit of the underlay
 
 
-def slopes_to_quaternions(east: Float[Array, "n"], north: Float[Array, "n"]) -> Float32[Array, "n 4"]:
+def slopes_to_quaternions(east: Float[Any, "n"], north: Float[Any, "n"]) -> Float32[Any, "n 4"]:
     """The shortest rotation (w x y z) from +z to the normal of a surface with these slopes."""
-    length = np.sqrt(east * east + north * north + 1)  # of the normal (-east, -north, 1)
+    xp = arrays.namespace(east)
+    length = xp.sqrt(east * east + north * north + 1)  # of the normal (-east, -north, 1)
     # half-way quaternion: (1 + z.n, z x n); column after column, as NumPy is slow along an axis of 3
     w, x, y = 1 + 1 / length, north / length, -east / length
-    size = np.sqrt(w * w + x * x + y * y)
-    out = np.zeros((len(east), 4), np.float32)
-    out[:, 0], out[:, 1], out[:, 2] = w / size, x / size, y / size
-    return out
+    size = xp.sqrt(w * w + x * x + y * y)
+    return arrays.to_single(xp.stack([w / size, x / size, y / size, xp.zeros_like(w)], 1))
 
 
 def make_ground_discs(grid: Ground, colours: Float[Array, "n 3"]) -> GaussianField:
@@ -102,9 +103,12 @@ def make_underlay(grid: Ground, layer: GaussianField) -> GaussianField:
     n, s = count_underlay(grid), grid.spacing
     scales = np.full((n, 3), np.log(UNDERLAY_WIDTH * STRIDE * s), np.float32)
     scales[:, 2] = np.log(THICKNESS * s)
-    means, quats, colours = place_underlay(
-        grid, layer.means[: grid.heights.size, 2], layer.base_colours[: grid.heights.size]
-    )
+    above = slice(0, grid.heights.size)
+    heights, quats, colours = place_underlay(grid, layer.means[above, 2], layer.base_colours[above])
+    rows, columns = np.meshgrid(*(np.arange(0, n, STRIDE) for n in grid.shape), indexing="ij")
+    half = 0.5 * STRIDE
+    x, y = grid.west + (columns + half) * s, grid.south + (rows + half) * s
+    means = np.stack([x.ravel(), y.ravel(), heights], 1).astype(np.float32)
     sh = np.zeros((n, *layer.sh.shape[1:]), np.float32)
     sh[:, :1] = rgb_to_sh(colours)
     return GaussianField(
@@ -112,26 +116,26 @@ def make_underlay(grid: Ground, layer: GaussianField) -> GaussianField:
     )
 
 
-def update_underlay(grid: Ground, values: dict[str, Array]) -> None:
+def update_underlay(grid: Ground, values: dict[str, Any]) -> None:
     """Update the underlay, the rows after the discs, to the discs' current heights and colours, in place."""
     first, last = grid.heights.size, grid.heights.size + count_underlay(grid)
-    base = 0.5 + np.float32(SH0) * values["colours"][:first, 0]
-    values["means"][first:last], values["quats"][first:last], colours = place_underlay(
-        grid, values["means"][:first, 2], base
-    )
+    base = values["colours"][:first, 0] * np.float32(SH0) + 0.5
+    heights, values["quats"][first:last], colours = place_underlay(grid, values["means"][:first, 2], base)
+    values["means"][first:last, 2] = arrays.to_single(heights)
     values["colours"][first:last, :1] = rgb_to_sh(colours)
 
 
-def place_underlay(grid: Ground, heights: Float[Array, "n"], colours: Float[Array, "n 3"]):
-    """Means, quaternions and colours of the underlay of discs with these heights and colours."""
-    z = heights.reshape(grid.shape).astype(float)
+def place_underlay(grid: Ground, heights: Float[Any, "n"], colours: Float[Any, "n 3"]):
+    """Heights, quaternions and colours of the underlay of discs with these heights and colours."""
+    z = arrays.to_double(heights.reshape(grid.shape))
     pick = np.s_[0::STRIDE, 0::STRIDE]
-    north, east = (g[pick] for g in np.gradient(uniform_filter(z, 2 * STRIDE + 1, mode="nearest"), grid.spacing))
-    rows, columns = np.meshgrid(*(np.arange(0, n, STRIDE) for n in grid.shape), indexing="ij")
-    low = minimum_filter(z, STRIDE + 1, mode="nearest")[pick] - DEPTH * grid.spacing
-    half = 0.5 * STRIDE
-    x, y = grid.west + (columns + half) * grid.spacing, grid.south + (rows + half) * grid.spacing
-    means = np.stack([x.ravel(), y.ravel(), low.ravel()], 1).astype(np.float32)
+    smoothed = arrays.average_around(z, 2 * STRIDE + 1)
+    east, north = (g[pick].reshape(-1) for g in arrays.measure_slopes(smoothed, grid.spacing))
+    low = arrays.find_lowest_around(z, STRIDE + 1)[pick] - DEPTH * grid.spacing
     image = colours.reshape(*grid.shape, 3)
-    soft = np.stack([uniform_filter(image[..., c], STRIDE + 1, mode="nearest")[pick] for c in range(3)], -1)
-    return means, slopes_to_quaternions(east.ravel(), north.ravel()), soft.reshape(-1, 3)
+    soft = [arrays.average_around(image[..., c], STRIDE + 1)[pick] for c in range(3)]
+    return (
+        low.reshape(-1),
+        slopes_to_quaternions(east, north),
+        arrays.namespace(image).stack(soft, -1).reshape(-1, 3),
+    )

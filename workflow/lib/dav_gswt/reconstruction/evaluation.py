@@ -11,7 +11,7 @@ from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
 from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.raster import render
+from dav_gswt.raster import make_rasterizer, to_raster_arrays
 
 MEASURES = ("psnr", "psnr_colour_corrected", "ssim", "lpips")
 WORST = 0.1  # of the views, at least one
@@ -29,7 +29,9 @@ def evaluate_field(
     null. `worst_decile`: the mean of the worst tenth.
     A value is null without test views, and PSNR is where pictures are equal.
     """
-    rows = [_evaluate_view(field, view, weights) for view in tests if view.weight.any()]
+    tests = [view for view in tests if view.weight.any()]
+    pictures = make_rasterizer().forward_each(to_raster_arrays(field), [view.camera for view in tests])
+    rows = [_evaluate_view(seen.colour, view, weights) for seen, view in zip(pictures, tests, strict=True)]
     named = {row["view"]: row for row in rows}
     parts = {group: [named[name] for name in names if name in named] for group, names in (groups or {}).items()}
     return _summarize(rows) | {"groups": {group: _summarize(part) for group, part in parts.items()}, "test_views": rows}
@@ -46,8 +48,8 @@ def _summarize(rows: list[dict]) -> dict:
     return means | {"worst_decile": worst}
 
 
-def _evaluate_view(field: GaussianField, view: TrainingView, weights: Weights | None) -> dict:
-    seen = np.clip(render(field, view.camera).colour, 0, 1)
+def _evaluate_view(colour: Float32[Array, "h w 3"], view: TrainingView, weights: Weights | None) -> dict:
+    seen = np.clip(colour, 0, 1)
     level = np.clip(metrics.correct_colours(seen, view.image, view.weight), 0, 1).astype(np.float32)
     return {
         "view": view.name,

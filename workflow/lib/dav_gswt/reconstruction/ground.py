@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import map_coordinates
 from scipy.sparse import coo_matrix, diags, identity, kron
 from scipy.sparse.linalg import spsolve
 
+from dav_gswt.arrays import measure_slopes
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
@@ -80,8 +81,7 @@ class Ground:
 
     def slopes(self) -> tuple[Float[Array, "rows columns"], Float[Array, "rows columns"]]:
         """Rise of the surface to the east and to the north, by central differences."""
-        north, east = np.gradient(self.heights, self.spacing)
-        return east, north
+        return measure_slopes(self.heights, self.spacing)
 
     def height_at(self, points: Float[Array, "n d"]) -> Float[Array, "n"]:
         """Height of the surface under points, bilinear; beyond the grid the border's height goes on."""
@@ -159,11 +159,6 @@ def fit_surface(grid: Ground, points: Float[Array, "n 3"]) -> Float[Array, "rows
     row = (np.arange(rows) + 0.5) / rows * (ny - 1)
     column = (np.arange(columns) + 0.5) / columns * (nx - 1)
     return map_coordinates(knots.reshape(ny, nx), np.meshgrid(row, column, indexing="ij"), order=1, mode="nearest")
-
-
-def smooth(values: Float[Array, "rows columns"], cells: float) -> Float[Array, "rows columns"]:
-    """Gaussian blur over the grid; borders repeat."""
-    return gaussian_filter(values, cells, mode="nearest")
 
 
 def _bilinear(v, u, ny: int, nx: int):

@@ -6,11 +6,13 @@ above which the photos see through.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
+from dav_gswt import arrays
 from dav_gswt.reconstruction.discs import THICKNESS, count_underlay, slopes_to_quaternions, update_underlay
 from dav_gswt.reconstruction.ground import Ground
 
@@ -45,20 +47,24 @@ class GroundConstraints:
         self.shape: tuple[int, int] = grid.shape
         self.smoothing = smoothing
         self.grid, self.ceiling = grid, replace(grid, heights=ceiling)
-        self.centres = grid.centres[:, :2].astype(np.float32)
 
-    def project_parameters(self, values: dict[str, Array]) -> None:
+    def project_parameters(self, values: dict[str, Any]) -> None:
         """Discs onto their cells, tangents and sizes; the underlay below them; objects onto their sizes."""
-        n, s = self.discs, self.grid.spacing
+        n, s, (rows, columns) = self.discs, self.grid.spacing, self.shape
         means, scales, logits = values["means"], values["log_scales"], values["opacity_logits"]
-        np.clip(means[:n, :2], self.centres - MAX_OFFSET * s, self.centres + MAX_OFFSET * s, out=means[:n, :2])
-        values["quats"][:n] = slopes_to_quaternions(*(g.ravel() for g in self.surface(values).slopes()))
-        np.clip(scales[:n, :2], *np.log(np.multiply(DISC_SIZES, s)), out=scales[:n, :2])
-        scales[:n, 2] = np.log(THICKNESS * s)
-        np.clip(logits[:n], *DISC_LOGITS, out=logits[:n])
+        xp, cells = arrays.namespace(means), means[:n].reshape(rows, columns, 3)
+        east = arrays.to_single(self.grid.west + (arrays.count_up(columns, means) + 0.5) * s)
+        north = arrays.to_single(self.grid.south + (arrays.count_up(rows, means) + 0.5) * s)[:, None]
+        for axis, centre in enumerate((east, north)):
+            cells[..., axis] = xp.clip(cells[..., axis], centre - MAX_OFFSET * s, centre + MAX_OFFSET * s)
+        slopes = arrays.measure_slopes(arrays.to_double(cells[..., 2]), s)
+        values["quats"][:n] = slopes_to_quaternions(*(slope.reshape(-1) for slope in slopes))
+        scales[:n, :2] = xp.clip(scales[:n, :2], *np.log(np.multiply(DISC_SIZES, s)))
+        arrays.fill(scales[:n, 2], np.log(THICKNESS * s))
+        logits[:n] = xp.clip(logits[:n], *DISC_LOGITS)
         update_underlay(self.grid, values)
         clip_sizes(scales[self.fixed :], *np.multiply(OBJECT_SIZES, s))
-        np.clip(logits[self.fixed :], *LOGITS, out=logits[self.fixed :])
+        logits[self.fixed :] = xp.clip(logits[self.fixed :], *LOGITS)
 
     def find_misplaced(self, values: dict[str, Array]) -> Bool[Array, "n"]:
         """Objects under the ground, above the ceiling, or off the grid."""
@@ -75,16 +81,15 @@ class GroundConstraints:
         return replace(self.grid, heights=heights.astype(float))
 
 
-def clip_sizes(log_scales: Array, least: float, most: float) -> None:
+def clip_sizes(log_scales: Any, least: float, most: float) -> None:
     """Clip sizes in place and thicken needles: no axis is shorter than the longest by more than the factor of FLAT, the
     middle one (of equal ones the later) by no more than that of NEEDLE."""
-    np.clip(log_scales, np.log(least), np.log(most), out=log_scales)
-    a, b, c = (np.ascontiguousarray(log_scales[:, k]) for k in range(3))  # far faster than along an axis of 3
-    longest = np.maximum(np.maximum(a, b), c)
-    for axis in (a, b, c):
-        np.maximum(axis, (longest - FLAT).astype(axis.dtype), out=axis)
-    middle = np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
-    raised = np.maximum(middle, (longest - NEEDLE).astype(middle.dtype))
+    xp, bounds = arrays.namespace(log_scales), (np.log(least), np.log(most))
+    columns = [arrays.to_single(xp.clip(log_scales[:, k], *bounds)) for k in range(3)]  # far faster than an axis of 3
+    longest = xp.maximum(xp.maximum(columns[0], columns[1]), columns[2])
+    a, b, c = (xp.maximum(column, arrays.to_single(longest - FLAT)) for column in columns)
+    middle = xp.maximum(xp.minimum(a, b), xp.minimum(xp.maximum(a, b), c))
+    raised = xp.maximum(middle, arrays.to_single(longest - NEEDLE))
     b_a, c_a, c_b = b < a, c < a, c < b
     for k, (axis, is_middle) in enumerate(((a, b_a != c_a), (b, b_a == c_b), (c, c_a != c_b))):
-        log_scales[:, k] = np.where(is_middle, raised, axis)
+        log_scales[:, k] = xp.where(is_middle, raised, axis)

@@ -93,8 +93,8 @@ def ground_colours(
     """Median colours of the ground's cells, and which cells a photo sees that no object hides."""
     if len(occluders):
         rasterizer = raster.make_rasterizer()
-        arrays = raster.to_raster_arrays(occluders)
-        clear = (rasterizer.forward(**arrays, camera=view.camera).alpha < 0.5 for view in views)
+        pictures = rasterizer.forward_each(raster.to_raster_arrays(occluders), [view.camera for view in views])
+        clear = (seen.alpha < 0.5 for seen in pictures)
         views = [view.with_pixels(weight=view.weight * c) for view, c in zip(one_by_one(views), clear, strict=True)]
     colour, known = median_colours(grid.centres, views)
     return colour, known.reshape(grid.shape)

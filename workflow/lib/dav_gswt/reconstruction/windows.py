@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
+from dav_gswt.arrays import blur
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry.scene_frame import SceneFrame, Square
@@ -24,7 +25,7 @@ from dav_gswt.reconstruction.coarse import BLOCK, Reconstruction, finish_field
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import FitPlan, FitReport, FitSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions
-from dav_gswt.reconstruction.ground import Ground, smooth
+from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.plane_sweep import sweep_heights
 
 _log = logging.getLogger(__name__)
@@ -127,7 +128,7 @@ def make_grid(ground: Ground, window: FitWindow, spacing: float) -> Ground:
     shape = below + cells + above, left + cells + right
     corner = west - left * spacing, south - below * spacing
     grid = Ground(*corner, spacing, below, left, cells, np.zeros(shape), np.zeros(shape, bool))
-    rough = replace(ground, heights=smooth(ground.heights, DRAFT_RELIEF))
+    rough = replace(ground, heights=blur(ground.heights, DRAFT_RELIEF))
     return replace(grid, heights=rough.height_at(grid.centres).reshape(shape))
 
 

@@ -68,8 +68,7 @@ class GroundCells:
     def view(self, cameras: list[Camera]) -> CellViews:
         """Render the field for each camera and count the pixels that show each cell."""
         raster, arrays, pixels = make_rasterizer(), to_raster_arrays(self.field), []
-        for camera in cameras:
-            raster.forward(**arrays, camera=camera)
+        for _ in raster.forward_each(arrays, cameras):
             pixels.append(self.count_pixels(raster))
         return self.gather_views(cameras, pixels)
 
@@ -93,8 +92,8 @@ def measure_cell_errors(
     """
     raster, arrays = make_rasterizer(), to_raster_arrays(cells.field)
     wrong, pixels = np.zeros((2, len(cells)))
-    for view in views:
-        seen = np.clip(raster.forward(**arrays, camera=view.camera).colour, 0, 1)
+    for view, picture in zip(views, raster.forward_each(arrays, [view.camera for view in views]), strict=True):
+        seen = np.clip(picture.colour, 0, 1)
         if corrected and view.weight.any():
             seen = np.clip(metrics.correct_colours(seen, view.image, view.weight), 0, 1)
         squares = view.weight * ((seen - view.image) ** 2).mean(-1)

@@ -106,8 +106,8 @@ def _render_candidates(field: GaussianField, grid: Ground, candidates: Candidate
     raster, cells = make_rasterizer(), GroundCells(field, grid)
     cameras = [scoring_camera(camera) for _, camera in candidates]
     maps, pixels = [], []
-    for camera in progress(cameras, "score poses"):
-        seen = raster.forward(**to_raster_arrays(field, field.uncertainty[:, None]), camera=camera)
+    arrays = to_raster_arrays(field, field.uncertainty[:, None])
+    for seen in raster.forward_each(arrays, progress(cameras, "score poses")):
         maps.append(np.clip(seen.colour[..., 0] + 1 - seen.alpha, 0, 1))  # nothing is known where light passes
         pixels.append(cells.count_pixels(raster))
     masks = [ground_mask(grid, camera) for camera in cameras]
@@ -151,8 +151,8 @@ def backproject_maps(
     """
     raster = make_rasterizer()
     total = np.zeros((2, len(field)))
-    for camera, u in zip(cameras, maps, strict=True):
-        raster.forward(**to_raster_arrays(field), camera=camera.resized(SIDE, SIDE))
+    small = [camera.resized(SIDE, SIDE) for camera in cameras]
+    for u, _ in zip(maps, raster.forward_each(to_raster_arrays(field), small), strict=True):
         found = raster.contributions(enlarge_map(u, SIDE, SIDE)[..., None])
         total += found.mapped[:, 0], found.total
     weighted, weight = total

@@ -6,12 +6,14 @@ back onto them, not by opacity: detail is added only where it lacks.
 """
 
 from math import comb
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 
-from dav_gswt.reconstruction.fitting.state import NAMES, State
+from dav_gswt import arrays
+from dav_gswt.reconstruction.fitting.state import State
 
 DEAD = 0.005  # opacity below which a Gaussian is relocated
 MAX_COPIES = 8  # of one source in one event
@@ -21,9 +23,9 @@ MAX_PERTURBED = DEAD + np.log(99) / 100  # opacity above which the perturbation'
 LOOSE_LOGIT = float(np.log(MAX_PERTURBED / (1 - MAX_PERTURBED)))
 
 
-def to_opacity(logits: Float[Array, "n"]) -> Float[Array, "n"]:
+def to_opacity(logits: Float[Any, "n"]) -> Float[Any, "n"]:
     """The peak opacity."""
-    return 1 / (1 + np.exp(-np.asarray(logits, float)))
+    return 1 / (1 + arrays.namespace(logits).exp(-arrays.to_double(logits)))
 
 
 def grow(
@@ -38,7 +40,7 @@ def grow(
 
     errors: squared error projected back onto each Gaussian. Returns the number relocated or added; 0 without error.
     """
-    dead = (to_opacity(state.values["opacity_logits"]) < DEAD) | misplaced
+    dead = (to_opacity(arrays.on_host(state.values["opacity_logits"])) < DEAD) | misplaced
     dead[:fixed] = False
     weight = np.where(dead, 0, errors).astype(float)
     places = np.flatnonzero(dead)
@@ -61,19 +63,26 @@ def perturb(values: dict[str, Array], fixed: int, strength: float, rng: np.rando
     rows = fixed + np.flatnonzero(values["opacity_logits"][fixed:] < LOOSE_LOGIT)
     if not len(rows):
         return
-    loose = 1 / (1 + np.exp(100 * (to_opacity(values["opacity_logits"][rows]) - DEAD)))
-    noise = rng.standard_normal((len(rows), 3), np.float32) * (strength * loose[:, None]).astype(np.float32)
-    values["means"][rows] += rotate_steps(values, rows, noise)
+    move_loose(values, rows, strength, rng.standard_normal((len(rows), 3), np.float32))
 
 
-def rotate_steps(values: dict[str, Array], rows: Int[Array, "m"], steps: Float[Array, "m 3"]) -> Float32[Array, "m 3"]:
-    """World vectors of steps given in standard deviations along each Gaussian's axes."""
+def move_loose(values: dict[str, Any], rows: Any, strength: float, noise: Float32[Any, "m 3"]) -> None:
+    """Move those of some Gaussians (indices or a slice) that are nearly transparent. noise: standard normal."""
+    logits = values["opacity_logits"][rows]
+    loose = 1 / (1 + arrays.namespace(logits).exp(100 * (to_opacity(logits) - DEAD)))
+    share = arrays.to_single(strength * loose) * (logits < LOOSE_LOGIT)
+    values["means"][rows] += rotate_steps(values, rows, noise * share[:, None])
+
+
+def rotate_steps(values: dict[str, Any], rows: Any, steps: Float[Any, "m 3"]) -> Float32[Any, "m 3"]:
+    """World vectors of steps given in standard deviations along the axes of some Gaussians (indices or a slice)."""
     quats = values["quats"][rows]
-    w, x, y, z = (quats / np.sqrt(np.einsum("mi,mi->m", quats, quats))[:, None]).T
-    a, b, c = (steps * np.exp(values["log_scales"][rows])).T
+    xp = arrays.namespace(quats)
+    w, x, y, z = (quats / xp.sqrt(xp.einsum("mi,mi->m", quats, quats))[:, None]).T
+    a, b, c = (steps * xp.exp(values["log_scales"][rows])).T
     p, q, r = y * c - z * b + w * a, z * a - x * c + w * b, x * b - y * a + w * c  # u x s + w s; then s + 2 u x that
     moved = [a + 2 * (y * r - z * q), b + 2 * (z * p - x * r), c + 2 * (x * q - y * p)]
-    return np.stack(moved, 1).astype(np.float32)
+    return arrays.to_single(xp.stack(moved, 1))
 
 
 def split_opacity(opacity: Float[Array, "n"], parts: Int[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n"]]:
@@ -93,18 +102,14 @@ def split_opacity(opacity: Float[Array, "n"], parts: Int[Array, "n"]) -> tuple[F
 
 def _make_copies(state: State, sources: Array, copies: Array, fixed: int, rng: np.random.Generator) -> dict[str, Array]:
     """The new rows; a free source becomes one of its copies."""
-    values = state.values
-    free = sources >= fixed
-    rows, parts = sources[free], copies[free] + 1
-    each, size = split_opacity(to_opacity(values["opacity_logits"][rows]), parts)
-    values["opacity_logits"][rows] = np.log(each / (1 - each))
-    values["log_scales"][rows] += np.log(size)[:, None].astype(np.float32)
-    for part in (state.first, state.second):
-        for name in NAMES:
-            part[name][rows] = 0
-    repeated = np.repeat(sources, copies)
-    copied = {name: values[name][repeated].copy() for name in NAMES}
-    of_ground = repeated < fixed
+    values, free = state.read(sources), sources >= fixed
+    each, size = split_opacity(to_opacity(values["opacity_logits"][free]), copies[free] + 1)
+    values["opacity_logits"][free] = np.log(each / (1 - each))
+    values["log_scales"][free] += np.log(size)[:, None].astype(np.float32)
+    state.overwrite(sources[free], {name: values[name][free] for name in ("opacity_logits", "log_scales")})
+    repeated = np.repeat(np.arange(len(sources)), copies)
+    copied = {name: value[repeated] for name, value in values.items()}
+    of_ground = sources[repeated] < fixed
     copied["log_scales"][of_ground, :2] += np.float32(DETAIL_SIZE)
     copied["opacity_logits"][of_ground] = 0
     spread = rng.uniform(-0.7, 0.7, (len(repeated), 3)) * [1, 1, 0]

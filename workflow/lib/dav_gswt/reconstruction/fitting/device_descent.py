@@ -1,127 +1,148 @@
-"""The steps of a fit on a GPU, where parameters, Adam's moments and photos stay: the backend `cuda`.
+"""The steps of a fit on a GPU, where parameters, Adam's moments, exposures and photos stay: the backend `cuda`.
 
-Only what rarely happens (growth, projection, pruning) and what is small (heights of the ground, pixels that tell the
-exposure) is done by the same functions as without a GPU, on copies. Two runs differ in the last bits: see raster/cuda.
+Between growth events nothing is read but one number every `trainer.CHECK_EVERY` steps and what gsplat reads itself; a
+growth event reads positions, opacities and errors, and the rows that it copies. Two runs differ in the last bits: see
+raster/cuda.
 """
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float32
-from kornia.filters import gaussian_blur2d
+from jaxtyping import Float32, UInt8
+from numpy import ndarray as Array
 from torch import Tensor
 
-from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.arrays import on_host
 from dav_gswt.raster import cuda
-from dav_gswt.raster.torch import differentiate_loss
-from dav_gswt.reconstruction.fitting import densification, exposure
-from dav_gswt.reconstruction.fitting.descent import (
-    BACKDROP,
-    BETAS,
-    PARTS,
-    STRUCTURE,
-    Descent,
-    Parts,
-    TrainingState,
-    TrainingTask,
-    hold_ground,
-    perturbation,
-)
+from dav_gswt.raster.interface import AdamStep, GaussianArrays
+from dav_gswt.raster.torch import differentiate_loss, move_by_adam
+from dav_gswt.reconstruction.fitting.densification import move_loose
+from dav_gswt.reconstruction.fitting.descent import BETAS, STRUCTURE, Descent, TrainingState, TrainingTask, perturbation
 
-EPSILON = 1e-15  # of Adam, as in `interface.Adam`
-CACHE = 150e6  # pixels of photos kept on the device, of 28 bytes at most; others are copied at every step
-USED_BY_PERTURB = "means", "log_scales", "quats", "opacity_logits"
+EPSILON = 1e-15  # of Adam, as in `backends.adam`
+CACHE = 500e6  # pixels of photos kept on the device, of 4 bytes, 7 with a sky; others are copied at every step
+
+
+@dataclass(frozen=True)
+class PackedImage:
+    """Values low + step x byte, between 0 and 1, or their extremes if these are beyond; byte 0 is NaN if any is."""
+
+    bytes: UInt8[Tensor, "h w *c"]
+    low: float
+    step: float
+    has_unknown: bool
+
+    def unpack(self) -> Float32[Tensor, "h w *c"]:
+        """The values."""
+        values = self.bytes.float() * self.step + self.low
+        return torch.where(self.bytes == 0, torch.nan, values) if self.has_unknown else values
+
+
+def pack_image(values: Float32[Array, "h w *c"], device: torch.device) -> PackedImage:
+    """Round values to bytes on the device."""
+    known = ~np.isnan(values)
+    unknown = not known.all()
+    low, high = (float(f(values, initial=edge, where=known)) for f, edge in ((np.min, 0.0), (np.max, 1.0)))
+    step = (high - low) / (255 - unknown)
+    levels = np.where(known, np.rint((np.where(known, values, low) - low) / step) + unknown, 0)
+    return PackedImage(torch.as_tensor(levels.astype(np.uint8)).to(device), low - step * unknown, step, unknown)
 
 
 @dataclass(frozen=True)
 class Photo:
-    """A view's arrays on the device, and the pixels of it that tell the exposure."""
+    """A view's values on the device."""
 
+    camera: cuda.DeviceCamera
     image: Float32[Tensor, "h w 3"]
     weight: Float32[Tensor, "h w"]
     behind: Float32[Tensor, "h w 3"] | None
-    sample: exposure.Sample
 
 
 class DeviceDescent(Descent):
-    """Between `push` and `pull` the parameters are on the device."""
+    """From `start` on the state and the exposures are tensors on the device."""
 
     def __init__(self, rasterizer: cuda.Rasterizer):
         self.raster, self.device = rasterizer, rasterizer.device
-        self.values: dict[str, Tensor] = {}
-        self.first: dict[str, Tensor] = {}
-        self.second: dict[str, Tensor] = {}
-        self._photos: dict[int, Photo] = {}
+        self._cameras: list[cuda.DeviceCamera] = []
+        self._packed: dict[int, dict[str, PackedImage]] = {}
 
-    def pull(self, run: TrainingState, parts: Parts = PARTS) -> None:
-        """See `Descent.pull`."""
-        for part in parts:
-            getattr(run.state, part).update({k: cuda.download(t) for k, t in getattr(self, part).items()})
-
-    def push(self, run: TrainingState, parts: Parts = PARTS) -> None:
-        """See `Descent.push`."""
-        for part in parts:
-            tensors = {k: cuda.upload(a, self.device).clone() for k, a in getattr(run.state, part).items()}
-            setattr(self, part, tensors)
-
-    def descend(self, run: TrainingState, task: TrainingTask, index: int) -> None:
-        """See `Descent.descend`."""
-        view, photo = task.views[index], self._find_photo(task.views[index], index)
-        last = self.raster.draw(self.values, view.camera)
-        picture, alpha = last.picture.detach()[0, ..., :3], last.alpha.detach()[0]
-        colour = torch.tensor(run.rng.uniform(0, 1, 3).astype(np.float32), device=self.device)
-        behind = colour if photo.behind is None else torch.where(photo.behind.isnan(), colour, photo.behind)
-        image = picture + (1 - alpha) * behind
-        run.exposures.learn(index, cuda.download(exposure.thin(image, view.weight.size)), photo.sample)
-        gain, offset = (torch.tensor(v, device=self.device) for v in run.exposures.gain_and_offset(index))
-        exposed = gain * image + offset
-        if task.collects_errors(run.step):
-            squared = (exposed - photo.image).square().mean(2) * photo.weight
-            run.add_errors(cuda.download(self.raster.contribute(last, squared[..., None])[2][:, 0]))
-        _, gradient = differentiate_loss(exposed, photo.image, photo.weight, STRUCTURE)
-        gradient = gain * gradient
-        gradients = self.raster.differentiate(last, gradient, -BACKDROP * (gradient * behind).sum(2))
-        hold_ground(gradients, task.constraints, smooth)
-        self._step_adam_on_device(run, task, gradients, cuda.find_visible(last))
-        view.release()
+    def start(self, run: TrainingState, task: TrainingTask) -> None:
+        """See `Descent.start`."""
+        run.state = run.state.convert(lambda array: torch.tensor(array, device=self.device))
+        run.exposures.gains, run.exposures.offsets = (
+            torch.tensor(array, device=self.device) for array in (run.exposures.gains, run.exposures.offsets)
+        )
+        seed = int(run.rng.spawn(1)[0].integers(1 << 62))  # the stream that growth and backgrounds read goes on
+        self._generator: torch.Generator | None = torch.Generator(self.device).manual_seed(seed)
+        self._cameras = [cuda.upload_camera(view.camera, self.device) for view in task.views]
+        room = CACHE
+        for index, view in enumerate(task.views):
+            room -= view.weight.size
+            if room >= 0:
+                self._packed[index] = self._pack(task, index)
 
     def perturb(self, run: TrainingState, task: TrainingTask) -> None:
-        """See `Descent.perturb`: of the few that are nearly transparent, on a copy."""
-        fixed = task.constraints.fixed
-        rows = fixed + torch.nonzero(self.values["opacity_logits"][fixed:] < densification.LOOSE_LOGIT)[:, 0]
-        loose = {name: cuda.download(self.values[name][rows]) for name in USED_BY_PERTURB}
-        densification.perturb(loose, 0, perturbation(run, task), run.rng)
-        self.values["means"][rows] = cuda.upload(loose["means"], self.device)
+        """See `Descent.perturb`."""
+        free = slice(task.constraints.fixed, None)
+        shape = len(run.state) - task.constraints.fixed, 3
+        noise = torch.randn(shape, device=self.device, generator=self._generator)
+        move_loose(run.state.values, free, perturbation(run, task), noise)
 
-    def _step_adam_on_device(
-        self, run: TrainingState, task: TrainingTask, gradients: dict[str, Tensor], rows: Bool[Tensor, "n"]
-    ) -> None:
-        """As `Descent._step_adam`."""
-        rates = task.rates(run.step, self.values["colours"].shape[1])
-        unbiased = [1 - beta ** (run.step + 1) for beta in BETAS]
-        for name, value in self.values.items():
-            four = value, gradients[name], self.first[name], self.second[name]
-            value, g, m, v = (t.flatten(1) if t.ndim > 1 else t[:, None] for t in four)
-            which = rows[:, None]
-            m.copy_(torch.where(which, m.lerp(g, 1 - BETAS[0]), m))
-            v.copy_(torch.where(which, v.lerp(g * g, 1 - BETAS[1]), v))
-            move = m / unbiased[0] / ((v / unbiased[1]).sqrt() + EPSILON)
-            rate = torch.tensor(np.asarray(rates[name], np.float32), device=self.device)
-            value.sub_(torch.where(which, rate * move, 0))
+    def check(self, run: TrainingState) -> None:
+        """See `Descent.check`."""
+        values = run.state.values
+        if not math.isfinite(torch.stack([run.loss, *(value.sum() for value in values.values())]).sum().item()):
+            GaussianArrays(**run.state.convert(on_host).values).check_values()
+            raise ValueError("the loss of a fit is not finite")
 
-    def _find_photo(self, view: TrainingView, index: int) -> Photo:
-        """A view on the device; kept there while there is room."""
-        if (photo := self._photos.get(index)) is None:
-            image, weight = (cuda.upload(np.ascontiguousarray(a), self.device) for a in (view.image, view.weight))
-            behind = None if view.behind is None else cuda.upload(np.ascontiguousarray(view.behind), self.device)
-            photo = Photo(image, weight, behind, exposure.sample_photo(view.image, view.weight))
-            if sum(each.weight.nelement() for each in self._photos.values()) + view.weight.size <= CACHE:
-                self._photos[index] = photo
-        return photo
+    def measure_peaks(self, run: TrainingState, task: TrainingTask) -> Float32[Array, "n"]:
+        """See `Descent.measure_peaks`."""
+        peak = torch.zeros(len(run.state), device=self.device)
+        for camera in self._cameras:
+            last = self.raster.draw(run.state.values, camera)
+            nothing = torch.empty(camera.height, camera.width, 0, device=self.device)
+            peak = torch.maximum(peak, self.raster.contribute(last, nothing)[1])
+        return on_host(peak)
 
+    def _pack(self, task: TrainingTask, index: int) -> dict[str, Any]:
+        view = task.views[index]
+        images = {"image": view.image, "weight": view.weight, "behind": view.behind}
+        packed = {name: pack_image(a, self.device) for name, a in images.items() if a is not None}
+        view.release()
+        return packed
 
-def smooth(values: Float32[Tensor, "rows columns"], cells: float) -> Float32[Tensor, "rows columns"]:
-    """As `ground.smooth`: Gaussian blur over the grid; borders repeat."""
-    width = 2 * int(4 * cells + 0.5) + 1  # as SciPy's
-    return gaussian_blur2d(values[None, None], (width, width), (cells, cells), "replicate")[0, 0]
+    def _find_photo(self, task: TrainingTask, index: int) -> Photo:
+        packed = self._packed.get(index) or self._pack(task, index)
+        behind = packed["behind"].unpack() if "behind" in packed else None
+        return Photo(self._cameras[index], packed["image"].unpack(), packed["weight"].unpack(), behind)
+
+    def _bring(self, numbers: Float32[Array, "c"]) -> Float32[Tensor, "c"]:
+        """A few numbers, as arguments of kernels: a copy would wait for all that is under way."""
+        out = torch.empty(len(numbers), device=self.device)
+        for i, number in enumerate(numbers):
+            out[i : i + 1].fill_(float(number))
+        return out
+
+    def _draw(self, run: TrainingState, task: TrainingTask, camera: cuda.DeviceCamera) -> tuple[Tensor, Tensor]:
+        self._last = self.raster.draw(run.state.values, camera)
+        return self._last.picture.detach()[0, ..., :3], self._last.alpha.detach()[0, ..., 0]
+
+    def _project_back(self, task: TrainingTask, errors: Float32[Tensor, "h w"]) -> Float32[Tensor, "n"]:
+        return self.raster.project_back(self._last, errors)
+
+    def _differentiate_loss(self, image: Float32[Tensor, "h w 3"], photo: Photo) -> tuple[Tensor, Tensor]:
+        return differentiate_loss(image, photo.image, photo.weight, STRUCTURE)
+
+    def _differentiate(self, task: TrainingTask, by_colour: Tensor, by_alpha: Tensor) -> dict[str, Any]:
+        return self.raster.differentiate(self._last, by_colour, by_alpha)
+
+    def _step_adam(self, run: TrainingState, task: TrainingTask, gradients: dict[str, Tensor]) -> None:
+        rates = task.rates(run.step, run.state.values["colours"])
+        rows = cuda.find_visible(self._last)[:, None].float()
+        for name, value in run.state.values.items():
+            four = value, gradients[name], run.state.first[name], run.state.second[name]
+            value, g, m, v = (tensor.reshape(len(tensor), -1) for tensor in four)
+            move_by_adam(AdamStep(value, g, m, v, rates[name], run.step + 1, BETAS, EPSILON, rows))

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
+from dav_gswt import arrays
 from dav_gswt.images import channels
 from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.reconstruction.photo_colours import nan_median, sample_colours
@@ -103,18 +104,13 @@ def _average_cells(
     return mean
 
 
-Sample = tuple[Float32[Array, "r c 3"], Float32[Array, "r c"]]  # pixels of a photo, with their weights
+Sample = tuple[Float32[Any, "r c 3"], Float32[Any, "r c"]]  # pixels of a photo, with their weights
 
 
-def thin(picture: Any, size: int) -> Any:
-    """At most about MAX_PIXELS of a picture's `size` pixels, evenly; of an array or a tensor."""
-    stride = max(1, int(np.sqrt(size / MAX_PIXELS)))
+def thin(picture: Any) -> Any:
+    """At most about MAX_PIXELS of a picture's pixels, evenly."""
+    stride = max(1, int(np.sqrt(picture.shape[0] * picture.shape[1] / MAX_PIXELS)))
     return picture[::stride, ::stride]
-
-
-def sample_photo(image: Float32[Array, "h w 3"], weight: Float32[Array, "h w"]) -> Sample:
-    """The pixels of a photo that `thin` leaves."""
-    return thin(image, weight.size), thin(weight, weight.size)
 
 
 class ExposureTracker:
@@ -127,38 +123,43 @@ class ExposureTracker:
     """
 
     def __init__(self, views: int):
-        self.gains, self.offsets = np.ones((views, 3), np.float32), np.zeros((views, 3), np.float32)
+        self.gains: Any = np.ones((views, 3), np.float32)
+        self.offsets: Any = np.zeros((views, 3), np.float32)
 
-    def learn(self, index: int, picture: Float32[Array, "r c 3"], photo: Sample) -> None:
+    def learn(
+        self, index: int, picture: Float32[Any, "r c 3"], image: Float32[Any, "r c 3"], weight: Float32[Any, "r c"]
+    ) -> None:
         """Update a photo's values from the thinned picture of the field (`thin`)."""
-        a, b = update_gain_and_offset(picture, photo, (self.gains[index], self.offsets[index]))
-        self.gains[index] += LEARNING_RATE * (a - self.gains[index])
-        self.offsets[index] += LEARNING_RATE * (b - self.offsets[index])
+        a, b = update_gain_and_offset(picture, (image, weight), (self.gains[index], self.offsets[index]))
+        self.gains[index] += (a - self.gains[index]) * LEARNING_RATE
+        self.offsets[index] += (b - self.offsets[index]) * LEARNING_RATE
 
-    def gain_and_offset(self, index: int) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
+    def gain_and_offset(self, index: int) -> tuple[Float32[Any, "3"], Float32[Any, "3"]]:
         """Gain a and offset b that bring the picture x to the photo: a x + b; 1 and 0 before the first step."""
-        a = self.gains[index] / np.median(self.gains, 0)
-        return a, self.offsets[index] - a * np.median(self.offsets, 0)
+        a = self.gains[index] / arrays.median(self.gains)
+        return a, self.offsets[index] - a * arrays.median(self.offsets)
 
 
 def update_gain_and_offset(
-    picture: Float32[Array, "r c 3"], photo: Sample, before: tuple[Float32[Array, "3"], Float32[Array, "3"]]
-) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
+    picture: Float32[Any, "r c 3"], photo: Sample, before: tuple[Float32[Any, "3"], Float32[Any, "3"]]
+) -> tuple[Float32[Any, "3"], Float32[Any, "3"]]:
     """Gain a and offset b that bring a picture to its photo, least squares over the pixels that count and agree.
 
     before: the photo's a and b at its last step; pixels that differ by more than TRIM medians under them (moving
     objects, objects that the field lacks) are ignored. a is held within 1 / MAX_STEP_GAIN .. MAX_STEP_GAIN by a prior
     and by clipping. If no pixel counts they stay unchanged.
     """
-    image, weight = photo
-    counts = weight > 0
-    if not counts.any():
-        return before
-    apart = np.abs(channels.scale_channels(picture, *before) - image).max(axis=2)
-    agrees = counts & (apart <= TRIM * np.median(apart[counts]))
-    w = weight[agrees][:, None].astype(float)
-    u, v, total = picture[agrees].astype(float), image[agrees].astype(float), float(w.sum()) + 1e-9
+    xp = arrays.namespace(picture)
+    apart = abs(channels.scale_channels(picture, *before) - photo[0])
+    apart = xp.maximum(xp.maximum(apart[..., 0], apart[..., 1]), apart[..., 2]).reshape(-1)
+    weight = photo[1].reshape(-1)
+    agrees = (weight > 0) & (apart <= TRIM * arrays.median(apart, weight > 0))
+    w = arrays.to_double(weight * agrees)[:, None]
+    u, v = (arrays.to_double(image.reshape(-1, 3)) for image in (picture, photo[0]))
+    total = w.sum() + 1e-9
     x, y = (w * u).sum(0) / total, (w * v).sum(0) / total
     xx, xy = (w * u * u).sum(0) / total - x * x, (w * u * v).sum(0) / total - x * y
-    a = np.clip((xy + PRIOR) / (np.maximum(xx, 0) + PRIOR), 1 / MAX_STEP_GAIN, MAX_STEP_GAIN)
-    return a.astype(np.float32), (y - a * x).astype(np.float32)
+    a = xp.clip((xy + PRIOR) / (xp.clip(xx, 0, None) + PRIOR), 1 / MAX_STEP_GAIN, MAX_STEP_GAIN)
+    known = (weight > 0).any()
+    new = arrays.to_single(a), arrays.to_single(y - a * x)
+    return xp.where(known, new[0], before[0]), xp.where(known, new[1], before[1])

@@ -1,11 +1,17 @@
-"""The state of a fit: the parameters, by the rasterizer's names, and Adam's two moments of each."""
+"""The state of a fit: the parameters, by the rasterizer's names, and Adam's two moments of each.
 
+Arrays, or tensors on a device; what is added to them and which of them are kept is said by arrays.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 from numpy import ndarray as Array
 
+from dav_gswt import arrays
 from dav_gswt.field import GaussianField
 
 NAMES = ("means", "log_scales", "quats", "opacity_logits", "colours")  # colours: spherical harmonics, n k 3
@@ -13,11 +19,11 @@ NAMES = ("means", "log_scales", "quats", "opacity_logits", "colours")  # colours
 
 @dataclass
 class State:
-    """n Gaussians in training; every array has n rows."""
+    """n Gaussians in training; every array or tensor has n rows."""
 
-    values: dict[str, Array]
-    first: dict[str, Array]
-    second: dict[str, Array]
+    values: dict[str, Any]
+    first: dict[str, Any]
+    second: dict[str, Any]
 
     def __len__(self) -> int:
         return len(self.values["means"])
@@ -27,31 +33,44 @@ class State:
         """Degree of the spherical harmonics."""
         return int(np.sqrt(self.values["colours"].shape[1])) - 1
 
-    def select(self, rows: Array) -> None:
-        """Keep these rows (mask or indices), in that order."""
+    def convert(self, change: Callable[[Any], Any]) -> "State":
+        """The state of other arrays or tensors, each made of one of these."""
+        return State(*({name: change(a) for name, a in part.items()} for part in vars(self).values()))
+
+    def read(self, rows: Int[Array, "m"]) -> dict[str, Array]:
+        """The parameters of rows (indices), as arrays of their own."""
+        at = arrays.put_beside(rows, self.values["means"])
+        return {name: arrays.on_host(a[at]) for name, a in self.values.items()}
+
+    def select(self, rows: Int[Array, "m"]) -> None:
+        """Keep these rows (indices), in that order."""
+        at = arrays.put_beside(rows, self.values["means"])
         for part in vars(self).values():
             for name in NAMES:
-                part[name] = np.ascontiguousarray(part[name][rows])
+                part[name] = part[name][at]
 
     def append(self, values: dict[str, Array]) -> None:
         """Add rows; their moments start at zero."""
-        for name in NAMES:
-            self.values[name] = np.concatenate([self.values[name], values[name]])
+        for name, before in self.values.items():
+            new, join = arrays.put_beside(values[name], before), arrays.namespace(before).concatenate
+            self.values[name] = join([before, new])
             for part in (self.first, self.second):
-                part[name] = np.concatenate([part[name], np.zeros_like(values[name])])
+                part[name] = join([part[name], arrays.zeros(new.shape, before)])
 
-    def overwrite(self, rows: Array, values: dict[str, Array]) -> None:
-        """Overwrite rows; their moments start again at zero."""
+    def overwrite(self, rows: Int[Array, "m"], values: dict[str, Array]) -> None:
+        """Overwrite some parameters of rows; all moments of theirs start again at zero."""
+        at = arrays.put_beside(rows, self.values["means"])
         for name in NAMES:
-            self.values[name][rows] = values[name]
-            self.first[name][rows] = self.second[name][rows] = 0
+            if name in values:
+                self.values[name][at] = arrays.put_beside(values[name], self.values[name])
+            self.first[name][at] = self.second[name][at] = 0
 
     def resize_sh(self, degree: int) -> None:
         """Change the degree of the spherical harmonics: higher coefficients are dropped, new ones are zero."""
         k = (degree + 1) ** 2
         for part in vars(self).values():
             old = part["colours"]
-            part["colours"] = np.zeros((len(old), k, 3), np.float32)
+            part["colours"] = arrays.zeros((len(old), k, 3), old)
             kept = min(k, old.shape[1])
             part["colours"][:, :kept] = old[:, :kept]
 

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool
 from numpy import ndarray as Array
 
-from dav_gswt import raster
+from dav_gswt import arrays, raster
 from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView, one_by_one
@@ -24,6 +24,7 @@ from dav_gswt.reconstruction.fitting.plan import FitPlan, FitReport, Schedule
 from dav_gswt.reconstruction.fitting.state import State
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 
+CHECK_EVERY = 50  # steps: whether all values are finite, all that is read of a GPU between growth events
 PROJECT_EVERY = 10  # steps: the constraints' projection of the parameters
 MIN_OPACITY = 0.02  # of a free Gaussian at the end of the fit
 MIN_PEAK = 0.03  # largest blend weight in any photo, below which a Gaussian is pruned
@@ -78,13 +79,14 @@ def fit_field(
     run = TrainingState(begin, rng, exposure.ExposureTracker(len(views)))
     task = TrainingTask(views, plan, Schedule(plan, len(field)), constraints, raster.make_rasterizer())
     descent = _choose_descent(task)
-    descent.push(run)
+    descent.start(run, task)
     for _ in progress(range(plan.steps), options.name):
         _advance(run, task, descent)
+        if run.step % CHECK_EVERY == 0 or run.step == plan.steps:
+            descent.check(run)
         if options.callback and run.step % options.every == 0:
-            descent.pull(run)
-            options.callback(run.step, run.state)
-    descent.pull(run)
+            options.callback(run.step, run.state.convert(arrays.on_host))
+    run.state = run.state.convert(arrays.on_host)
     return _finish(run, task)
 
 
@@ -101,46 +103,40 @@ def _advance(run: TrainingState, task: TrainingTask, descent: Descent) -> None:
     """One step, and what is due after it."""
     if not run.turn:
         run.turn = list(map(int, run.rng.permutation(len(task.views))))
-    _raise_sh_degree(run, task, descent)
+    _raise_sh_degree(run, task)
     descent.descend(run, task, run.turn.pop())
     run.step += 1
     if run.step % PROJECT_EVERY == 0 or run.step == task.plan.steps:
-        with descent.on_host(run, ("values",)):
-            task.constraints.project_parameters(run.state.values)
+        task.constraints.project_parameters(run.state.values)
     descent.perturb(run, task)
-    grows, prunes = task.schedule.to_growth(run.step) == 0, task.schedule.prunes(run.step)
-    if grows or prunes:
-        with descent.on_host(run):
-            if grows:
-                _grow(run, task)
-            if prunes:
-                _prune(run, task)
-            run.errors = None
+    if task.schedule.to_growth(run.step) == 0:
+        _grow(run, task)
+        run.errors = None
+    if task.schedule.prunes(run.step):
+        _prune(run, task, descent)
+        run.errors = None
 
 
-def _raise_sh_degree(run: TrainingState, task: TrainingTask, descent: Descent) -> None:
+def _raise_sh_degree(run: TrainingState, task: TrainingTask) -> None:
     """The spherical harmonics come one degree after the other, in the first half."""
     due = int(task.plan.sh_degree * min(1.0, 2 * run.step / max(1, task.plan.steps)))
     if due > run.state.sh_degree:
-        with descent.on_host(run):
-            run.state.resize_sh(due)
+        run.state.resize_sh(due)
 
 
 def _grow(run: TrainingState, task: TrainingTask) -> None:
     """A growth event: new and relocated Gaussians go where the errors of the last photos are."""
-    misplaced = task.constraints.find_misplaced(run.state.values)
+    misplaced = task.constraints.find_misplaced({"means": arrays.on_host(run.state.values["means"])})
     allowed = task.schedule.max_gaussians(run.step, len(run.state))
     assert run.errors is not None  # noted in the steps before
-    run.errors[task.constraints.frozen] = 0
-    densification.grow(run.state, task.constraints.fixed, misplaced, run.errors, allowed, run.rng)
+    errors = arrays.on_host(run.errors)
+    errors[task.constraints.frozen] = 0
+    densification.grow(run.state, task.constraints.fixed, misplaced, errors, allowed, run.rng)
 
 
-def _prune(run: TrainingState, task: TrainingTask) -> None:
+def _prune(run: TrainingState, task: TrainingTask, descent: Descent) -> None:
     """Remove free Gaussians that are hardly visible in any photo: they are a haze that fits each photo's noise."""
-    peak = np.zeros(len(run.state), np.float32)
-    for view in task.views:
-        task.raster.forward(**run.state.values, camera=view.camera)
-        peak = np.maximum(peak, task.raster.contributions().maximum)
+    peak = descent.measure_peaks(run, task)
     peak[: task.constraints.fixed] = 1
     run.state.select(np.flatnonzero(peak > MIN_PEAK))
 
