@@ -146,3 +146,4 @@ class DeviceDescent(Descent):
             four = value, gradients[name], run.state.first[name], run.state.second[name]
             value, g, m, v = (tensor.reshape(len(tensor), -1) for tensor in four)
             move_by_adam(AdamStep(value, g, m, v, rates[name], run.step + 1, BETAS, EPSILON, rows))
+        del self._last  # its graph has been used, and the next one needs the room
