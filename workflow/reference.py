@@ -21,15 +21,13 @@ without a default may be left out."""
 POLICIES_HEAD = """# Policies
 
 The config's `policy` chooses the next views. The default, `auto`, uses `farthest` if a scene
-chooses from given photos (`agent: replay`), else `coverage-error`; see [what each
-gains](../active-views.md). `make reference` writes this page from
-`workflow/lib/dav_gswt/views/policies.py`; [Architecture](../architecture.md#a-policy) shows how to
-add a policy.
+chooses from given photos (`agent: replay`), else `coverage-error` ([why](../active-views.md)).
+`make reference` writes this page; [Architecture](../architecture.md#a-policy) shows how to add a
+policy.
 
 Every policy knows the poses of the candidates and of the photos so far. The column `reads` lists
-what else it reads: the scores by a prior, the field, or the photos so far. `prior`, `p_drop` and
-`lam` matter only to policies that read a prior; settings after "not" have no effect. k is the
-config's `k`.
+what else it reads. `prior`, `p_drop` and `lam` matter only to policies that read a prior; settings
+after "not" have no effect. k is the config's `k`.
 """
 
 
