@@ -20,14 +20,13 @@ each `config/scenes/<name>.yaml` is one scene. Lay single keys over them on the 
 without a default may be left out."""
 POLICIES_HEAD = """# Policies
 
-How the next views are chosen: the config's `policy`. `auto`, the default, takes `farthest` where a scene chooses from
-given photos (`agent: replay`), else `coverage-error`; [what each is worth](../active-views.md). Made from
-`workflow/lib/dav_gswt/views/policies.py` by `make reference`;
-[architecture](../architecture.md#a-policy) says how to add one.
+The config's `policy` chooses the next views. The default, `auto`, uses `farthest` if a scene
+chooses from given photos (`agent: replay`), else `coverage-error` ([why](../active-views.md)).
+`make reference` writes this page; [Architecture](../architecture.md#a-policy) shows how to add a
+policy.
 
-Every policy knows where the candidates and the photos so far are; the column `reads` says what it reads besides:
-the scores by a prior, the field itself, the photos so far, or what candidates truly show, which is known for
-`agent: render` and `replay` only. `prior`, `p_drop` and `lam` matter to policies that read a prior; settings
+Every policy knows the poses of the candidates and of the photos so far. The column `reads` lists
+what else it reads. `prior`, `p_drop` and `lam` matter only to policies that read a prior; settings
 after "not" have no effect. k is the config's `k`.
 """
 
