@@ -1,11 +1,11 @@
-"""How far borders stray: of straight, wavy, soft and hidden borders."""
+"""How far borders stray at each width: of straight, wavy, frayed and hidden borders."""
 
 import numpy as np
 import pytest
 
-from dav_gswt.materials.borders import measure_bend, measure_fray
+from dav_gswt.materials.borders import FINEST, WIDTHS, measure_share, measure_strays
 
-CELLS, TILE = 160, 60.0
+CELLS, TILE = 240, 120.0
 EVERY = np.ones((CELLS, CELLS), bool)
 AWAY = np.broadcast_to(np.arange(CELLS) - CELLS / 2 + 0.5, (CELLS, CELLS))  # from the middle column
 
@@ -15,39 +15,46 @@ def paint(share):
     return share[..., None] * np.array([10.0, 0.0, 5.0]) + (1 - share[..., None]) * np.array([-10.0, 3.0, 0.0])
 
 
-def test_a_frayed_border_strays_as_far_as_it_was_moved_and_a_soft_one_counts_as_frayed():
-    moved = np.random.default_rng(0).uniform(-6, 6, (CELLS, CELLS))  # a mean distance of 3
-    for share, mean in (((moved < AWAY).astype(float), 3), (np.clip(AWAY / 16 + 0.5, 0, 1), 4)):
-        assert measure_fray(paint(share), AWAY > 0, EVERY, TILE) == pytest.approx(mean, rel=0.2)
-
-
-def test_neither_texture_nor_slow_bends_count():
-    bend = 15 * np.sin(np.arange(CELLS) / CELLS * 2 * np.pi)[:, None]
-    for most, own in ((1, AWAY > 0), (1.2, bend < AWAY)):
-        rough = paint(own.astype(float)) + np.random.default_rng(1).normal(0, 10, (CELLS, CELLS, 3))
-        assert measure_fray(rough, own, EVERY, TILE) < most
-
-
-def test_without_a_border_that_is_seen_nothing_is_known_but_equal_colours_give_a_number():
-    own = AWAY > 0
-    colours = paint(own.astype(float))
-    assert measure_fray(colours, own, np.abs(AWAY) > 30, TILE) is None
-    assert measure_fray(colours, EVERY, EVERY, TILE) is measure_fray(colours, ~EVERY, EVERY, TILE) is None
-    assert measure_bend(EVERY, EVERY, TILE) is None
-    assert np.isfinite(measure_fray(paint(np.ones((CELLS, CELLS))), own, EVERY, TILE))
-
-
 def wave(height, length):
     return height * np.sin(np.arange(CELLS) / length * 2 * np.pi)[:, None] < AWAY
 
 
-@pytest.mark.parametrize("height", [0.0, 3.0, 6.0])
-def test_a_wave_bends_by_the_mean_of_its_height(height):
-    # of which the finer filter leaves exp(-2 pi² s² / l²) = .89, the smoother one .17
-    assert measure_bend(wave(height, 40.0), EVERY, TILE) == pytest.approx(0.72 * 2 / np.pi * height, rel=0.25)
+def strays_of(own, counted=EVERY, tile=TILE):
+    return measure_strays(own.astype(float), counted, tile)
 
 
-def test_a_narrow_gap_hides_no_bend_but_a_wide_one_does():
-    gap = np.abs(AWAY) > 3
-    assert measure_bend(wave(3.0, 40.0), gap, TILE) == measure_bend(wave(3.0, 40.0), EVERY, TILE)
-    assert measure_bend(wave(3.0, 40.0), np.abs(AWAY) > 40, TILE) is None
+@pytest.mark.parametrize("height, length", [(0.0, 80.0), (4.0, 120.0), (4.0, 80.0), (2.0, 40.0)])
+def test_a_wave_strays_at_each_width_by_what_that_and_the_next_filter_leave_of_it(height, length):
+    left = [np.exp(-2 * (np.pi * width * TILE / length) ** 2) for width in (2 * WIDTHS[0], *WIDTHS)]
+    expected = 2 / np.pi * height * np.diff(left)[:3]  # the narrowest width is not resolved
+    # a line at no angle to the grid is shorter than pi / 4 of its crossings say
+    assert np.array(strays_of(wave(height, length))) * np.pi / 4 == pytest.approx(expected, rel=0.25, abs=0.25)
+
+
+def test_widths_that_cells_do_not_resolve_have_no_value():
+    for tile in (30.0, 60.0, 120.0, 240.0):
+        assert len(strays_of(wave(3.0, 40.0), tile=tile)) == sum(width * tile >= FINEST for width in WIDTHS)
+
+
+def test_a_narrow_gap_hides_no_stray_but_a_wide_one_does():
+    gap = np.abs(AWAY) > 6
+    assert strays_of(wave(6.0, 80.0), gap) == strays_of(wave(6.0, 80.0))
+    assert strays_of(wave(6.0, 80.0), np.abs(AWAY) > 60) is None
+    assert strays_of(EVERY) is None
+
+
+def test_colours_show_the_fray_that_smooth_labels_hide_but_no_texture():
+    smooth, fringe = AWAY > 0, wave(6.0, 20.0)
+    texture = np.random.default_rng(1).normal(0, 6, (CELLS, CELLS, 3))
+    seen, none = (measure_share(paint(own.astype(float)) + texture, smooth, EVERY, TILE) for own in (fringe, smooth))
+    true = strays_of(fringe)[2]
+    assert measure_strays(seen, EVERY, TILE)[2] == pytest.approx(true, rel=0.2)
+    assert measure_strays(none, EVERY, TILE)[2] < 0.2 * true
+
+
+@pytest.mark.parametrize("hidden", [True, False])
+def test_labels_count_where_colours_do_not_tell(hidden):
+    own, nothing = wave(6.0, 20.0), np.zeros((CELLS, CELLS, 3))
+    colours = paint(own.astype(float)) if hidden else nothing + np.random.default_rng(2).normal(0, 1, nothing.shape)
+    counted = np.abs(AWAY) > 20 if hidden else EVERY
+    assert (measure_share(colours, own, counted, TILE) == own).all()

@@ -8,6 +8,7 @@ from fixtures.land_covers import SIDE, cover_content, shrub
 
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.bundle.land_cover import ObjectEntry
+from dav_gswt.materials.borders import measure_strays
 from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.terrain import fit_cover as fits
 from dav_gswt.terrain.classes import Classes
@@ -15,9 +16,9 @@ from dav_gswt.terrain.fit_cover import fit_cover
 from dav_gswt.terrain.scatter import Scatter
 
 
-def content_of(*materials, fray=None, bend=None):
-    tiles = cover_content().tiles
-    named = [MaterialInfo(str(k), share, scale, [0.5] * 3, fray, bend) for k, (share, scale) in enumerate(materials)]
+def content_of(*materials, strays=None):
+    tiles = [replace(each, spacing=SIDE / 200) for each in cover_content().tiles]  # jitter of every octave is drawn
+    named = [MaterialInfo(str(k), share, scale, [0.5] * 3, strays) for k, (share, scale) in enumerate(materials)]
     return BundleContent([tiles[k % 2] for k in range(len(named))], named)
 
 
@@ -42,30 +43,43 @@ def test_stretches_have_the_wanted_length_in_the_mean(fitted):
     assert abs(ratio @ [m.share for m in content.materials]) < 0.1
 
 
-def measure_movement(classes):
-    """How far jitter moves a border in the mean, in tile sides."""
-    u, v = np.random.default_rng(0).random((2, 5000))
-    jitter = classes.jitter_at(3, 4, u, v)
-    _, steepness = fits.measure_lines(classes, 8)
-    return np.abs(jitter[:, 0] - jitter[:, 1]).mean() / steepness
+def measure_terrain(entry, cells=80, tiles=5):
+    """How far borders of two materials stray at `borders.WIDTHS`, jitter included, in tile sides."""
+    classes, found = Classes(entry, 2, SIDE), []
+    u, v = (w.ravel() for w in np.meshgrid(*[(np.arange(cells) + 0.5) / cells] * 2))
+    for first in range(0, 1800, 300):
+        own = np.block([
+            [classes.frayed_scores(first + i, j, u, v).argmax(1).reshape(cells, cells) for i in range(tiles)]
+            for j in range(tiles)
+        ])  # fmt: skip
+        found.append(measure_strays(own.astype(float), np.ones(own.shape, bool), float(cells)))
+    return np.mean([each for each in found if each], 0) / cells
 
 
-@pytest.mark.parametrize("fray", [None, 0.12])
-def test_jitter_moves_a_border_as_far_as_photographed_ones_stray(fray):
-    content = content_of((0.6, 12.0), (0.4, 12.0), fray=fray and fray * SIDE)
-    moved = measure_movement(Classes(fits.fit_classes(content, 7), 2, SIDE))
-    assert moved == pytest.approx(fray or fits.FRAY, rel=0.2)
+@pytest.mark.parametrize("strays", [[0.026, 0.014, 0.008], [0.016, 0.008, 0.004]], ids=["rough", "even"])
+def test_borders_stray_as_photographed_ones_do_at_every_width(strays):
+    content = content_of((0.6, 12.0), (0.4, 12.0), strays=[stray * SIDE for stray in strays])
+    found = measure_terrain(fits.fit_classes(content, 7))
+    assert np.log(found[:3] / strays) == pytest.approx(np.zeros(3), abs=0.35)
 
 
-def test_borders_bend_as_photographed_ones_do(monkeypatch):
-    for name, few in (("SAMPLES", 5000), ("LINES", 8), ("PASSES", 1), ("WINDOWS", 2), ("WINDOW", 6)):
-        monkeypatch.setattr(fits, name, few)
-    found = []
-    for bend in (0.0, 1.0):
-        content = content_of((0.6, 24.0), (0.4, 24.0), bend=bend * SIDE)
-        entry = fits.fit_classes(content, 7)
-        found.append((max(entry.rule[0].octaves), fits.measure_bends(Classes(entry, 2, SIDE), 7)))
-    assert found[0][0] == 1 < found[1][0] and found[0][1] < found[1][1]
+def test_straight_borders_have_no_jitter_and_no_octaves_finer_than_their_patches():
+    entry = fits.fit_classes(content_of((0.6, 20.0), (0.4, 20.0), strays=[0.0, 0.0, 0.0]), 7)
+    assert entry.jitter.amplitude == 0 and all(len(each) == len(fits.WIDER) + 1 for each in entry.rule[0].gains)
+
+
+def test_below_the_widths_that_were_seen_strays_fall_as_they_did():
+    found = fits._find_strays(content_of((0.6, 20.0), (0.4, 20.0), strays=[0.04 * SIDE, 0.02 * SIDE]))
+    assert found == pytest.approx(0.04 * 0.5 ** np.arange(6))
+
+
+def test_patches_have_many_sizes():
+    """On lines, stretches vary more than those of noise of one octave, whose deviation is about .8 of their mean."""
+    entry = fits.fit_classes(content_of((0.6, 12.0), (0.4, 12.0)), 7)
+    i, j = np.meshgrid(np.arange(20_000), np.arange(0, 16_000, 1000))
+    best = Classes(entry, 2, SIDE).lattice_scores(i.ravel(), j.ravel()).argmax(1).reshape(i.shape)
+    stretches = np.concatenate([np.diff(np.flatnonzero(np.diff(row))) for row in best])
+    assert stretches.std() / stretches.mean() > 0.85
 
 
 def test_the_relief_of_the_ground_itself_does_not_count_as_height():

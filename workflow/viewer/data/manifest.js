@@ -61,7 +61,7 @@ const KEYS = new Set(`format version unit tile_side salt eye_floor ground_colour
   parts part first composition side cell exemplars
   wavelength octaves radius cells rows columns width materials name share first_tile classes
   rule weight wavelengths biases material low high soft jitter amplitude rise slope most ground
-  clearance painted objects density probability scatter turn size variation colours`.split(/\s+/));
+  clearance painted objects density probability scatter turn size variation colours gains`.split(/\s+/));
 
 /**
  * What each part of a manifest must be, given the whole; the parts before it are sound.
@@ -253,16 +253,19 @@ function areClasses(classes, count) {
   if (painted !== undefined && findRunFault(painted, count)) return false;
   if (!isSalt(salt) || !isFilled(rule) || rule.length > MAX_TERMS) return false;
   if (!rule.every((/** @type {any} */ term) => isSize(term?.weight) && isTerm(term, count))) return false;
-  return isWhole(jitter?.cells, 1, MAX_WAVES) && isWhole(jitter.octaves, 1, MAX_JITTER)
+  return isWhole(jitter?.cells, 1, MAX_WAVES) && areGains(jitter.gains)
     && isSize(jitter.amplitude) && isSize(rise?.slope) && isSize(rise.most)
     && isList(rise.ground, count, isCoordinate) && isList(rise.clearance, count, isSize);
 }
+
+/** Of the octaves of a noise. @param {any} gains */
+const areGains = (gains) => isFilled(gains) && gains.length <= MAX_JITTER && gains.every(isShare) && gains.some(Boolean);
 
 /** @param {any} term @param {number} count of materials */
 function isTerm(term, count) {
   if (term.kind === "noise") {
     return isList(term.wavelengths, count, isLength) && isList(term.biases, count, isCoordinate)
-      && isList(term.octaves, count, (octaves) => isWhole(octaves, 1, MAX_JITTER));
+      && isList(term.gains, count, areGains);
   }
   /** @param {any} bound */
   const isBound = (bound) => bound === null || isCoordinate(bound);

@@ -6,17 +6,17 @@ import {
   decideSquares, findMaterials, GOES, LATTICE, LOW, measureShares, POINTS, squareOf, SURE, UNDECIDED,
 } from "./class_squares.js";
 import { createNoise, SHIFT } from "./heights.js";
-import { createJitter, MAX_OCTAVES, octaveGains } from "./jitter.js";
+import { createJitter, MAX_OCTAVES } from "./jitter.js";
 import { applyPaint, createPainted } from "./painted.js";
 
 /**
  * Terms of the rule in the manifest's `classes`.
  *
- * @typedef {{ kind: "noise", weight: number, wavelengths: number[], octaves: number[], biases: number[] }} NoiseTerm
+ * @typedef {{ kind: "noise", weight: number, wavelengths: number[], gains: number[][], biases: number[] }} NoiseTerm
  * @typedef {{ kind: "height" | "slope", weight: number, material: number, low: number | null, high: number | null,
  *   soft: number }} RangeTerm
  * @typedef {NoiseTerm | RangeTerm} Term
- * @typedef {{ salt: number, rule: Term[], jitter: { cells: number, octaves: number, amplitude: number },
+ * @typedef {{ salt: number, rule: Term[], jitter: { cells: number, gains: number[], amplitude: number },
  *   rise: { slope: number, most: number, ground: number[], clearance: number[] }, painted?: number[][] }} ClassesEntry
  *
  * @typedef {import("./heights.js").HeightField} HeightField
@@ -226,7 +226,7 @@ function isHighest(scores, moved, material, bonus) {
 function createTerm(term, { materials, side, heights, salt }) {
   const { weight } = term, step = side / LATTICE;
   if (term.kind === "noise") {
-    const noises = term.wavelengths.map((wavelength, m) => createClassNoise(wavelength, term.octaves[m], m, salt));
+    const noises = term.wavelengths.map((wavelength, m) => createClassNoise(wavelength, term.gains[m], m, salt));
     return (i, j, out, at) => {
       for (let m = 0; m < materials; m++) out[at + m] += weight * (noises[m](i, j) + term.biases[m]);
     };
@@ -243,15 +243,15 @@ function createTerm(term, { materials, side, heights, salt }) {
 /**
  * Gradient noise of a material at lattice points, in [-1, 1].
  *
- * @param {number} wavelength @param {number} octaves @param {number} material @param {number} salt
+ * @param {number} wavelength @param {number[]} gains of the octaves @param {number} material @param {number} salt
  */
-function createClassNoise(wavelength, octaves, material, salt) {
-  const step = 1 / (wavelength * LATTICE), { gains, total } = octaveGains(octaves);
+function createClassNoise(wavelength, gains, material, salt) {
+  const step = 1 / (wavelength * LATTICE), total = gains.reduce((a, b) => a + b, 0);
   const noises = gains.map((_, k) => createNoise(NOISE + MAX_OCTAVES * material + k, salt));
   /** @param {number} i @param {number} j */
   return (i, j) => {
     let x = i * step, y = j * step, noise = 0;
-    for (let k = 0; k < octaves; k++) {
+    for (let k = 0; k < gains.length; k++) {
       const east = TURN[0] * x - TURN[1] * y, north = TURN[1] * x + TURN[0] * y;
       noise += gains[k] * noises[k](east + k * SHIFT[0], north + k * SHIFT[1]);
       x = 2 * east;

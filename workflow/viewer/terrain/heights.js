@@ -5,7 +5,7 @@ import { hashCell } from "./choice.js";
 import { createSphere } from "./sphere.js";
 
 const HILLS = 3; // axis of the hash of octave 0, after west, south and centre; octave k uses HILLS + k
-export const GAIN = 0.4; // height of an octave over that of the one twice as wide
+const GAIN = 0.4; // height of an octave over that of the one twice as wide
 export const SHIFT = [0.37, 0.71]; // of each octave against the last, in its own cells
 const STEEPEST = 2.75; // upper bound of the slope of the noise, per cell
 export const MAX_OCTAVES = 12;

@@ -1,26 +1,20 @@
 // Jitter of the classes: fine noise that frays the borders of materials. See classes.js.
 
 import { hashCell } from "./choice.js";
-import { fade, GAIN, SHIFT } from "./heights.js";
+import { fade, SHIFT } from "./heights.js";
 
 export const MAX_OCTAVES = 8;
 const JITTER = 80; // octave k uses JITTER + k for the first four materials, JITTER + MAX_OCTAVES + k for the others
 const CONTRAST = 3; // the jitter is its noise times this, cut at -1 and 1
 const MAX_TABLE = 64; // cells of the finest jitter along a tile's side whose gradients are kept for a cell
 
-/** Heights of octaves, and their sum. @param {number} octaves */
-export function octaveGains(octaves) {
-  const gains = Array.from({ length: octaves }, (_, k) => GAIN ** k);
-  return { gains, total: gains.reduce((a, b) => a + b, 0) };
-}
-
 /**
  * The jitter of a rule: fine noise at places of a cell, counted from the cell's own corner.
  *
  * @param {import("./classes.js").ClassesEntry} entry @param {number} materials
  */
-export function createJitter({ jitter: { cells: coarse, octaves, amplitude }, salt }, materials) {
-  const { gains, total } = octaveGains(octaves);
+export function createJitter({ jitter: { cells: coarse, gains, amplitude }, salt }, materials) {
+  const octaves = gains.length, total = gains.reduce((a, b) => a + b, 0);
   const sizes = gains.map((_, k) => coarse * 2 ** k), dense = sizes[octaves - 1] <= MAX_TABLE;
   const tables = sizes.map((cells) => new Float64Array(dense ? 2 * materials * (cells + 2) ** 2 : 0));
   const corners = new Float64Array(8 * materials);
@@ -74,7 +68,7 @@ export function createJitter({ jitter: { cells: coarse, octaves, amplitude }, sa
       }
     }
     for (let m = 0; m < materials; m++) {
-      out[m] = amplitude * Math.min(Math.max((CONTRAST * out[m]) / total, -1), 1);
+      out[m] = amplitude * Math.min(Math.max(CONTRAST * (out[m] / total), -1), 1);
     }
     return out;
   };

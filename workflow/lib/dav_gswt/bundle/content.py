@@ -36,7 +36,7 @@ class BundleContent:
     def of_one_material(cls, tiles: TileSet) -> "BundleContent":
         """One tile set, without objects."""
         colour = compute_ground_colour(tiles.fields[-1])
-        return cls([tiles], [MaterialInfo(ONLY_MATERIAL, 1.0, tiles.side, colour, None, None)])
+        return cls([tiles], [MaterialInfo(ONLY_MATERIAL, 1.0, tiles.side, colour, None)])
 
     @property
     def side(self) -> float:

@@ -16,7 +16,7 @@ from dav_gswt.bundle.parts import ChunkEntry
 MAX_PAINTED = 2**18  # points
 MAX_COORDINATE = 2**23  # of a painted point
 
-Octaves = Annotated[int, Field(ge=1, le=8)]
+Gains = Annotated[list[Share], Field(min_length=1, max_length=8)]
 Pixels = Annotated[int, Field(ge=1, le=4096)]
 Salt = Annotated[int, Field(ge=0, lt=2**32)]
 Name = Annotated[str, Field(min_length=1, max_length=80)]
@@ -25,12 +25,15 @@ Change = Annotated[list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=
 
 @dataclass(frozen=True)
 class NoiseTerm:
-    """A term of the rule of classes: gradient noise whose classes have the materials' shares."""
+    """A term of the rule of classes: gradient noise whose classes have the materials' shares.
+
+    A material's noise has its wavelength and gains of its octaves, the widest first.
+    """
 
     kind: Literal["noise"]
     weight: Size
     wavelengths: list[Length]
-    octaves: list[Octaves]
+    gains: list[Gains]
     biases: list[float]
 
 
@@ -49,11 +52,11 @@ class RangeTerm:
 @dataclass(frozen=True)
 class JitterEntry(Entry):
     """Fine noise that frays the borders of classes: its widest octave has `cells` cells along a tile's side, each next
-    one twice as many; scores change by `amplitude` at most.
+    one twice as many, and they count by their gains; scores change by `amplitude` at most.
     """
 
     cells: Pixels
-    octaves: Octaves
+    gains: Gains
     amplitude: Size
 
 
@@ -82,12 +85,15 @@ class ClassesEntry(Entry):
 
     def find_faults(self, materials: int) -> Iterator[str]:
         """What does not fit a number of materials."""
-        lists = [self.rise.ground, self.rise.clearance]
+        lists, gains = [self.rise.ground, self.rise.clearance], [self.jitter.gains]
         for term in self.rule:
             if isinstance(term, NoiseTerm):
-                lists += [term.wavelengths, term.octaves, term.biases]
+                lists += [term.wavelengths, term.gains, term.biases]
+                gains += term.gains
             elif isinstance(term, RangeTerm) and term.material >= materials:
                 yield "a term is of a material that is not there"
+        if not all(sum(each) for each in gains):
+            yield "all gains of a noise are 0"
         if any(len(values) != materials for values in lists):
             yield f"a list does not have one value for each of {materials} materials"
         if fault := find_run_fault(self.painted, materials):

@@ -1,8 +1,8 @@
-"""How the borders of a material run: how far they stray from their smooth course, and how that bends.
+"""How the borders of a material run: how far they stray from their smooth course, octave by octave.
 
-Over the signed distance d from the smooth course, the colour of the ground changes from one side's to the other's. If
-P(d) is the share of the material's own colour there, and H(d) is 1 inside and 0 outside, the mean distance of the real
-border from the smooth one is the integral of |H - P|. Blur counts as well: soft borders are drawn as frayed ones.
+The share of the material's own colour at each place, smoothed, has a course along which it is one half. The mean
+distance between that course and the one of twice the width says how much the border strays at that width: 0 for
+straight borders, and the narrowest widths see its fray.
 """
 
 import numpy as np
@@ -10,54 +10,52 @@ from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-SMOOTH = 0.05  # tile sides: standard deviation of the filter that gives the smooth course
-SMOOTHER = 0.2  # the same of the filter against whose course bends are measured
-REACH = 0.35  # tile sides: half-width of the band that is looked at
-GAP = 0.07  # tile sides: half-width of a gap of what is counted, through which bends are measured
-BAND = 0.5  # cells to either side of a distance that are averaged
-FEW = 10  # cells, with fewer of which nothing is known of a distance
+WIDTHS = (0.1, 0.05, 0.025, 0.0125)  # tile sides: standard deviations of the filters that give the courses
+FINEST = 2.0  # cells: the narrowest width that labels and their colours resolve
+BAND = 0.1  # tile sides: half-width of the band in which colours tell where the border is; its outer half has the two
+GAP = 0.07  # tile sides: half-width of a gap of what is counted, through which strays are measured
+FEW = 10  # cells, with fewer of which nothing is known
 
 
-def measure_fray(
-    features: Float[Array, "m m k"], own: Bool[Array, "m m"], counted: Bool[Array, "m m"], tile_side: float
-) -> float | None:
-    """Mean distance in cells of a material's borders from their smooth course; None where none is seen.
+def measure_strays(share: Float[Array, "m m"], counted: Bool[Array, "m m"], tile_side: float) -> list[float] | None:
+    """Mean distances in cells between the border's courses of each of WIDTHS and of twice that width, widest first.
 
-    own: cells of the material. counted: cells that are neither excluded nor of an object. tile_side: in cells.
-    """
-    smooth = gaussian_filter(own.astype(float), SMOOTH * tile_side, mode="nearest") > 0.5
-    if smooth.all() or not smooth.any():
-        return None
-    away = np.where(smooth, distance_transform_edt(smooth) - 0.5, 0.5 - distance_transform_edt(~smooth))
-    reach = int(REACH * tile_side)
-    band = counted & (np.abs(away) <= reach)
-    far = band & (np.abs(away) > reach / 2)
-    inside, outside = features[far & smooth], features[far & ~smooth]
-    if min(len(inside), len(outside)) < FEW:
-        return None
-    axis = inside.mean(0) - outside.mean(0)
-    share = (features - outside.mean(0)) @ axis / max(float(axis @ axis), 1e-12)
-    strayed = 0.0
-    for distance in np.arange(-reach + 0.5, reach).tolist():
-        here = band & (np.abs(away - distance) <= BAND)
-        if here.sum() >= FEW:
-            strayed += abs((distance > 0) - float(np.clip(share[here].mean(), 0, 1)))  # the mean: texture averages out
-    return strayed
+    It is the area between the two over the length of the wider one. Widths below FINEST have none. Narrow gaps of what
+    is counted, as kerbs are, do not hide it. None where fewer than FEW cells of border are seen.
 
-
-def measure_bend(own: Bool[Array, "m m"], counted: Bool[Array, "m m"], tile_side: float) -> float | None:
-    """Mean distance in cells between the smooth course of borders and a still smoother one: 0 for straight ones.
-
-    It is the area between the two over the length of the border. Narrow gaps of what is counted, as kerbs are, do not
-    hide it. None where fewer than FEW cells of border are seen.
+    Args:
+        share: of the material. counted: cells that are neither excluded nor of an object. tile_side: in cells.
     """
     counted = distance_transform_edt(~counted) <= GAP * tile_side
-    fine, coarse = (
-        gaussian_filter(own.astype(float), share * tile_side, mode="nearest") > 0.5 for share in (SMOOTH, SMOOTHER)
-    )
-    crossings = sum(
-        int((np.diff(fine, axis=axis) & np.delete(counted, 0, axis) & np.delete(counted, -1, axis)).sum())
-        for axis in (0, 1)
-    )
-    length = np.pi / 4 * crossings  # of a line at a random angle to the grid
-    return float(((fine != coarse) & counted).sum()) / length if length >= FEW else None
+    widths = [width * tile_side for width in (2 * WIDTHS[0], *WIDTHS) if width * tile_side >= FINEST]
+    courses = [gaussian_filter(share, width, mode="nearest") > 0.5 for width in widths]
+    strays = []
+    for wide, narrow in zip(courses, courses[1:], strict=False):
+        crossings = sum(
+            int((np.diff(wide, axis=axis) & np.delete(counted, 0, axis) & np.delete(counted, -1, axis)).sum())
+            for axis in (0, 1)
+        )
+        length = np.pi / 4 * crossings  # of a line at a random angle to the grid
+        if length < FEW:
+            return None
+        strays.append(float(((wide != narrow) & counted).sum()) / length)
+    return strays or None
+
+
+def measure_share(
+    features: Float[Array, "m m k"], own: Bool[Array, "m m"], counted: Bool[Array, "m m"], tile_side: float
+) -> Float[Array, "m m"]:
+    """Share of a material's colour in the cells beside its borders; elsewhere, and where colours do not tell, 1 or 0.
+
+    Args:   own: cells of the material.
+    """
+    away = np.maximum(distance_transform_edt(own), distance_transform_edt(~own)) - 0.5
+    band = counted & (away <= BAND * tile_side)
+    far = band & (away > BAND * tile_side / 2)
+    inside, outside = features[far & own], features[far & ~own]
+    if min(len(inside), len(outside)) < FEW:
+        return own.astype(float)
+    axis = inside.mean(0) - outside.mean(0)
+    share = (features - outside.mean(0)) @ axis / max(float(axis @ axis), 1e-12)
+    # not cut at 0 and 1: texture averages out
+    return np.where(band & (np.abs(share - own)[far].mean() < 0.5), share, own)

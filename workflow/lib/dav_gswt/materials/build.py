@@ -14,7 +14,7 @@ from scipy.ndimage import distance_transform_edt
 from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
 from dav_gswt.materials import extraction, left_out, outlines, segmentation
-from dav_gswt.materials.borders import measure_bend, measure_fray
+from dav_gswt.materials.borders import measure_share, measure_strays
 from dav_gswt.materials.classes import GroundClasses, classify_ground
 from dav_gswt.materials.filling import fill_cells
 from dav_gswt.materials.left_out import LeftOut
@@ -256,7 +256,7 @@ def _keep_whole(field: GaussianField, grid: Ground, plan: GroundPlan, focused: F
     """All of the ground as one material: as it is, or its window."""
     maps, side = plan.maps, None
     colour = [float(value) for value in maps.colour.mean((0, 1))]
-    info = MaterialInfo("material0", 1.0, maps.cells * maps.exemplar.spacing, colour, None, None)
+    info = MaterialInfo("material0", 1.0, maps.cells * maps.exemplar.spacing, colour, None)
     judged = judge_material(info.name, (maps.cells / plan.tile_side) ** 2, 0.0)
     if focused is not None:
         field, grid = focused.windows[0]
@@ -328,10 +328,10 @@ def _make_material(
     counted = plan.maps.known & ~plan.classes.excluded & ~plan.classes.occupied
     whole = plan.classes.materials == number  # with the excluded ground in it: shade of a tree parts no material
     patch_scale = _measure_patches(whole) * spacing
-    fray = measure_fray(features, whole, counted, plan.tile_side)
-    bend = measure_bend(whole, counted, plan.tile_side)
-    fray, bend = (None if value is None else value * spacing for value in (fray, bend))
-    info = MaterialInfo(name, float(plan.classes.shares[number]), patch_scale, colour, fray, bend)
+    share = measure_share(features, whole, counted, plan.tile_side)
+    strays = measure_strays(share, counted, plan.tile_side)
+    strays = strays and [stray * spacing for stray in strays]
+    info = MaterialInfo(name, float(plan.classes.shares[number]), patch_scale, colour, strays)
     judged = judge_material(info.name, float(own.sum()) / plan.tile_side**2, filled)
     return Material(info, made, made_grid, filled, judged)
 

@@ -18,17 +18,15 @@ class MaterialInfo:
         share: of the ground, in (0, 1]; the shares of all materials sum to 1.
         patch_scale: mean length, in world units, of the pieces of the material on a straight line.
         colour: mean sRGB colour, in [0, 1].
-        fray: mean distance, in world units, of its borders from their smooth course; None if no
-            border was seen.
-        bend: the same between the smooth course and a still smoother one (see `borders`).
+        strays: how far its borders stray, in world units, at each of `borders.WIDTHS`, as far as they were resolved;
+            None if no border was seen.
     """
 
     name: str
     share: float
     patch_scale: float
     colour: list[float]
-    fray: float | None
-    bend: float | None
+    strays: list[float] | None
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.land_cover import MAX_COORDINATE, ClassesEntry, NoiseTerm, RangeTerm
 from dav_gswt.terrain.choice import Floats, Ints, hash_cell
-from dav_gswt.terrain.heights import GAIN, SHIFT, FlatSurface, HeightField, gradient_noise, smoothstep
+from dav_gswt.terrain.heights import SHIFT, FlatSurface, HeightField, gradient_noise, smoothstep
 
 LATTICE = 8  # points of the lattice of scores along a tile's side
 MAX_OCTAVES = 8
@@ -124,8 +124,8 @@ class Classes:
         half for the way north. Beyond the cell its last square goes on.
         """
         jitter, which = self.entry.jitter, np.arange(self.materials)
-        total = np.zeros((len(u), self.materials))
-        for octave in range(jitter.octaves):
+        total, gains = np.zeros((len(u), self.materials)), 0.0
+        for octave, gain in enumerate(jitter.gains):
             cells, noise = jitter.cells * 2**octave, np.zeros_like(total)
             x, y = cells * u + octave * SHIFT[0], cells * v + octave * SHIFT[1]
             column, row = (np.clip(np.floor(p), 0, cells).astype(np.int64) for p in (x, y))
@@ -138,9 +138,14 @@ class Classes:
                 bits = words[:, which // 4] >> (8 * (which % 4))
                 plane = ((bits & 15) / 7.5 - 1) * (s - a) + ((bits >> 4 & 15) / 7.5 - 1) * (t - b)
                 noise += (across if a else 1 - across) * (along if b else 1 - along) * plane
-            total += GAIN**octave * noise
-        total /= sum(GAIN**k for k in range(jitter.octaves))
-        return jitter.amplitude * np.clip(CONTRAST * total, -1, 1)
+            total, gains = total + gain * noise, gains + gain
+        return jitter.amplitude * np.clip(CONTRAST * (total / gains), -1, 1)
+
+    def frayed_scores(self, i: int, j: int, u: Floats, v: Floats) -> Float[Array, "n m"]:
+        """Scores at places of one cell, with jitter."""
+        lattice, (a, b, s, t) = self.cell_lattices(np.array([i]), np.array([j]))[0], _find_square(u, v)
+        corners = [lattice[b + k // 2, a + k % 2] for k in range(4)]
+        return _interpolate(corners, s[:, None], t[:, None]) + self.jitter_at(i, j, u, v)
 
     def materials_in(self, i: Ints, j: Ints) -> Ints:
         """Which materials may have a Gaussian in cells: bit m for material m.
@@ -167,11 +172,8 @@ class Classes:
 
         Args:   means: from the cell's corner. material: of each Gaussian's tile.
         """
-        lattice, rise = self.cell_lattices(np.array([i]), np.array([j]))[0], self.entry.rise
-        u, v = means[:, 0].astype(float) / self.side, means[:, 1].astype(float) / self.side
-        a, b, s, t = _find_square(u, v)
-        corners = [lattice[b + k // 2, a + k % 2] for k in range(4)]
-        scores = _interpolate(corners, s[:, None], t[:, None]) + self.jitter_at(i, j, u, v)
+        scores = self.frayed_scores(i, j, means[:, 0].astype(float) / self.side, means[:, 1].astype(float) / self.side)
+        rise = self.entry.rise
         away = np.abs(means[:, 2].astype(float) - np.array(rise.ground)[material]) - np.array(rise.clearance)[material]
         bonus, rows = np.minimum(rise.slope * np.maximum(away, 0), rise.most), np.arange(len(means))
         mine = scores[rows, material] + bonus
@@ -192,15 +194,15 @@ class Classes:
 
     def _class_noise(self, term: NoiseTerm, material: int, i: Ints, j: Ints) -> Floats:
         """Gradient noise of a material at lattice points, in [-1, 1], and its bias."""
-        octaves, noise = term.octaves[material], np.zeros(len(i))
+        noise, gains = np.zeros(len(i)), 0.0
         step = 1 / (term.wavelengths[material] * LATTICE)
         x, y = i * step, j * step
-        for octave in range(octaves):
+        for octave, gain in enumerate(term.gains[material]):
             x, y = TURN[0] * x - TURN[1] * y, TURN[1] * x + TURN[0] * y
             axis, place = NOISE + MAX_OCTAVES * material + octave, (x + octave * SHIFT[0], y + octave * SHIFT[1])
-            noise += GAIN**octave * gradient_noise(*place, axis, self.entry.salt)[0]
-            x, y = 2 * x, 2 * y
-        return noise / sum(GAIN**k for k in range(octaves)) + term.biases[material]
+            noise += gain * gradient_noise(*place, axis, self.entry.salt)[0]
+            x, y, gains = 2 * x, 2 * y, gains + gain
+        return noise / gains + term.biases[material]
 
 
 def _find_square(u: Floats, v: Floats):

@@ -1,7 +1,7 @@
 """Fit what a bundle says of its materials and objects: the rule of classes, and the scatter of objects.
 
 The rule gives every material its measured share of the ground and, as far as possible, its patch scale, and borders
-that fray and bend as the photographed ones do. The scatter gives every object its measured density.
+that stray as the photographed ones do. The scatter gives every object its measured density.
 """
 
 from dataclasses import replace
@@ -10,28 +10,32 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
+from scipy.ndimage import map_coordinates
 
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.bundle.land_cover import ClassesEntry, JitterEntry, NoiseTerm, ObjectEntry, RiseEntry, ScatterEntry
 from dav_gswt.errors import InputError
-from dav_gswt.materials.borders import measure_bend
+from dav_gswt.materials.borders import measure_strays
 from dav_gswt.materials.store import read_objects, read_report
-from dav_gswt.terrain.classes import LATTICE, Classes
+from dav_gswt.terrain.classes import CONTRAST, LATTICE, Classes
 from dav_gswt.terrain.fit_variation import fit_variation
+from dav_gswt.terrain.heights import GAIN
 from dav_gswt.terrain.scatter import Scatter
 from dav_gswt.tiles.build import TileSet
 
 SHORTEST, WIDEST = 4.0, 4096.0  # lattice steps: wavelengths of noise that the lattice shows
-MAX_OCTAVES = 5
+WIDER = (1.0,)  # gains of octaves wider than the one that patches follow: patches of many sizes
+MAX_OCTAVES = 5  # from that on
+LEAST_GAIN, MOST_GAIN = 0.03, 0.7  # octaves that count; ratio of one to the last
 SAMPLES, LINES, LINE = 60_000, 48, 2048  # lattice points; lines of them, and points of a line
-PASSES, STEPS = 3, 150
-WINDOWS, WINDOW, FINE = 6, 10, 24  # places in which bends are measured; their sides in tile sides; cells of one
-TYPICAL = 0.6  # mean difference of two jitters, in amplitudes
+PASSES, STEPS = 5, 150
+LONGEST = 1.4  # stretches over measured ones, for borders that were photographed straighter than those of noise
+WINDOWS, WINDOW, FINE = 6, 6, 80.0  # places in which borders are measured; their sides in tile sides; cells of one
 
-FRAY = 0.06  # tile sides: how far the jitter typically moves a border, where no border was seen
-LEAST_FRAY = 1.0  # ground cells: finer jitter is not drawn
-WAVES = 3.0  # wavelength of the widest jitter, as a multiple of that
+STRAY, FALL, FALLS = 0.025, 0.6, (0.25, 0.75)  # at the widest width, where none was seen; of each width over the last
+JITTER, MAX_JITTER = 3, 5  # cells of the widest jitter along a tile's side; octaves
 FINEST = 3.0  # ground cells: wavelength of the finest jitter
+TYPICAL = 0.09  # how far jitter of one octave makes a border stray at its width, in heights of its noise
 LEAN = 1.0  # how far something reaches over a border, as a multiple of its height above the ground
 MOST_LEAN = 0.04  # tile sides
 CLEARANCE = 2.0  # standard deviations of the ground's own relief
@@ -73,60 +77,82 @@ def fit_cover(content: BundleContent, salt: int) -> BundleContent:
 
 
 def fit_classes(content: BundleContent, salt: int) -> ClassesEntry:
-    """The rule that gives every material its share of the ground and, as far as possible, its patch scale.
-
-    Where borders were seen, the noise has as many octaves as make its borders bend most nearly as much.
+    """The rule that gives every material its share of the ground, as far as possible its patch scale, and borders that
+    stray as photographed ones do: bends by the noise's finer octaves, the rest by jitter.
     """
-    side, seen = content.side, [each.bend for each in content.materials if each.bend is not None]
-    entry, steepness = _fit_noise(content, salt, 1 if seen else MAX_OCTAVES)
-    if seen:
-        choices = [(entry, steepness)]
-        while len(choices) < MAX_OCTAVES and (more := _fit_noise(content, salt, len(choices) + 1)) != choices[-1]:
-            choices.append(more)  # as long as the lattice shows another octave
-        bends = [measure_bends(Classes(each, len(content.materials), side), salt) for each, _ in choices]
-        wanted = float(np.mean([bend / side for bend in seen]))
-        entry, steepness = choices[int(np.abs(np.array(bends) - wanted).argmin())]
-    return replace(entry, jitter=_fit_jitter(content, steepness), rise=_fit_rise(content, steepness / side))
+    wanted, seen = _find_strays(content), any(each.strays for each in content.materials)
+    entry, steepness, strays = _fit_noise(content, salt, float(wanted[0]) if seen else None)
+    jitter = _fit_jitter(content, steepness, wanted, strays)
+    return replace(entry, jitter=jitter, rise=_fit_rise(content, steepness / content.side))
 
 
-def measure_bends(classes: Classes, salt: int) -> float:
-    """Mean of `borders.measure_bend` over materials and some places of the terrain, in tile sides; without jitter."""
+def _find_strays(content: BundleContent) -> Float[Array, "widths"]:
+    """How far borders stray at half a width of `borders.WIDTHS` after the other, in tile sides, as far as jitter goes.
+
+    It is the mean of the materials', and below the widths that were resolved it falls on as fast as before.
+    """
+    seen = [each.strays for each in content.materials if each.strays]
+    least = min([len(each) for each in seen], default=0)
+    strays = (np.mean([each[:least] for each in seen], 0) / content.side).tolist() if seen else [STRAY]
+    fall = float(np.clip(strays[-1] / max(strays[-2], 1e-9), *FALLS)) if len(strays) > 1 else FALL
+    while len(strays) <= MAX_JITTER:
+        strays.append(strays[-1] * fall)
+    return np.array(strays[: MAX_JITTER + 1])
+
+
+def measure_strays_of(classes: Classes, salt: int) -> Float[Array, "widths"] | None:
+    """Mean of `borders.measure_strays` over materials and some places of the terrain, in tile sides; without jitter.
+
+    None where no border is met.
+    """
     rng, found = np.random.default_rng([salt, 2]), []
-    for corner in rng.integers(-(2**20), 2**20, (WINDOWS, 2)).tolist():
-        x, y = (v.ravel() for v in np.meshgrid(*[(np.arange(WINDOW * FINE) + 0.5) / FINE] * 2))
-        i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-        scores = classes.scores_at(i + corner[0], j + corner[1], x - i, y - j)
-        material = scores.argmax(1).reshape(WINDOW * FINE, WINDOW * FINE)
+    number = classes.materials if classes.materials > 2 else 1  # two have the same borders
+    at = np.meshgrid(*[(np.arange(int(WINDOW * FINE)) + 0.5) * LATTICE / FINE] * 2, indexing="ij")
+    for corner in rng.integers(-(2**20), 2**20, (WINDOWS, 2)):
+        i, j = np.meshgrid(*(start * LATTICE + np.arange(WINDOW * LATTICE + 1) for start in corner))
+        lattice = classes.lattice_scores(i.ravel(), j.ravel()).reshape(*i.shape, classes.materials)
+        material = np.argmax([map_coordinates(layer, at, order=1) for layer in np.moveaxis(lattice, -1, 0)], 0)
         every = np.ones(material.shape, bool)
-        found += [measure_bend(material == number, every, float(FINE)) for number in range(classes.materials)]
-    seen = [bend for bend in found if bend is not None]
-    return float(np.mean(seen)) / FINE if seen else 0.0
+        found += [measure_strays((material == k).astype(float), every, FINE) for k in range(number)]
+    seen = [strays for strays in found if strays is not None]
+    return np.mean(seen, 0) / FINE if seen else None
 
 
-def _fit_noise(content: BundleContent, salt: int, most: int) -> tuple[ClassesEntry, float]:
-    """Classes by noise of at most so many octaves, and how steeply their scores cross, per tile side.
+def _fit_noise(
+    content: BundleContent, salt: int, bent: float | None
+) -> tuple[ClassesEntry, float, Float[Array, "widths"]]:
+    """Classes by noise, how steeply their scores cross, per tile side, and how far their borders stray.
 
     Wavelengths are in proportion to the patch scales; one factor brings the mean length of stretches on straight lines
-    to the measured one. Biases give the shares. Both are measured on the noise itself and repeated, since wavelengths
-    decide how many octaves the lattice shows.
+    to the measured one. Biases give the shares, and the ratio of each octave to the last gives `bent`, how far borders
+    stray at the widest of `borders.WIDTHS`; where they were photographed straighter than any noise of such patches,
+    stretches may be LONGEST times as long. All are measured on the noise itself and repeated. bent: None: not seen.
     """
     side = content.side
     wanted = np.maximum([material.patch_scale / side for material in content.materials], 1 / LATTICE)
     shares = np.array([material.share for material in content.materials])
-    shares, waves = shares / shares.sum(), wanted.copy()
-    entry = ClassesEntry(salt, [], JitterEntry(1, 1, 0.0), RiseEntry(0.0, 0.0, *2 * [[0.0] * len(shares)]))
-    steepness = 1.0
+    shares, waves, ratio, longer = shares / shares.sum(), wanted.copy(), GAIN, 1.0
+    entry = ClassesEntry(salt, [], JitterEntry(1, [1.0], 0.0), RiseEntry(0.0, 0.0, *2 * [[0.0] * len(shares)]))
+    steepness, strays = 1.0, np.zeros(1)
     for _ in range(PASSES):
         waves = np.clip(waves, SHORTEST / LATTICE, WIDEST / LATTICE)
-        octaves = [_count_octaves(wave * LATTICE, SHORTEST, most) for wave in waves.tolist()]
-        noise = NoiseTerm("noise", 1.0, waves.tolist(), octaves, [0.0] * len(waves))
+        most = int(np.clip(np.floor(np.log(LEAST_GAIN) / np.log(ratio)), 0, MAX_OCTAVES - 1))
+        finer = [min(most, int(np.log2(wave * LATTICE / SHORTEST))) for wave in waves.tolist()]
+        gains = [[*WIDER, *(ratio**k for k in range(number + 1))] for number in finer]
+        noise = NoiseTerm("noise", 1.0, (waves * 2 ** len(WIDER)).tolist(), gains, [0.0] * len(waves))
         plain = Classes(replace(entry, rule=[noise]), len(waves), side)
         points = np.random.default_rng(salt).integers(-(2**30), 2**30, (2, SAMPLES))
         noise = replace(noise, biases=fit_biases(plain.lattice_scores(*points), shares).tolist())
         entry = replace(entry, rule=[noise])
-        stretches, steepness = measure_lines(Classes(entry, len(waves), side), salt)
-        waves = waves * np.exp(shares @ np.log(wanted / stretches))
-    return entry, steepness
+        classes = Classes(entry, len(waves), side)
+        stretches, steepness = measure_lines(classes, salt)
+        waves = waves * np.exp(shares @ np.log(longer * wanted / stretches))
+        if bent is not None and (measured := measure_strays_of(classes, salt)) is not None:
+            strays = measured
+            missing = bent / max(float(strays[0]), 1e-9)
+            ratio = float(np.clip(ratio * np.clip(missing, 0.25, 2), LEAST_GAIN / 2, MOST_GAIN))
+            longer = float(np.clip(longer / max(missing, 1e-9), 1, LONGEST))
+    return entry, steepness, strays
 
 
 def fit_biases(scores: Float[Array, "n m"], shares: Float[Array, "m"]) -> Float[Array, "m"]:
@@ -166,23 +192,19 @@ def measure_lines(classes: Classes, salt: int) -> tuple[Float[Array, "m"], float
     return np.maximum(counts, 1) / np.maximum(runs, 1) / LATTICE, steepness
 
 
-def _count_octaves(widest: float, finest: float, most: int) -> int:
-    """Octaves of a noise from a widest to a finest wavelength, at least one."""
-    return int(np.clip(1 + np.floor(np.log2(widest / finest)), 1, most))
+def _fit_jitter(
+    content: BundleContent, steepness: float, wanted: Float[Array, "k"], strays: Float[Array, "widths"]
+) -> JitterEntry:
+    """The jitter that makes borders stray as wanted at the narrower widths, where the noise of classes does not.
 
-
-def _fit_jitter(content: BundleContent, steepness: float) -> JitterEntry:
-    """The jitter that moves borders as far as those that were seen stray; less where patches are small.
-
-    steepness: of scores, per tile side.
+    Args:   steepness: of scores, per tile side. strays: without jitter, from the widest width on.
     """
-    smallest = max(min(material.patch_scale for material in content.materials) / content.side, 1 / LATTICE)
-    seen = [material.fray / content.side for material in content.materials if material.fray is not None]
-    wanted = max(float(np.mean(seen)), LEAST_FRAY * content.spacing / content.side) if seen else FRAY
-    fray = min(wanted, 0.15 * smallest)
-    cells = int(np.clip(np.rint(1 / (WAVES * fray)), 1, 4096))
-    octaves = _count_octaves(content.side / cells, FINEST * content.spacing, 4)
-    return JitterEntry(cells, octaves, float(fray * steepness / TYPICAL))
+    octaves = int(np.clip(1 + np.log2(content.side / (JITTER * FINEST * content.spacing)), 1, MAX_JITTER))
+    own = [*strays, *(strays[-1] / 4**k for k in range(1, octaves + 1))][: octaves + 1]  # a smooth line
+    missing = np.maximum(wanted[: octaves + 1] ** 2 - np.square(own), 0)[1:]
+    heights = np.sqrt(missing) * steepness / TYPICAL
+    most = float(heights.max())
+    return JitterEntry(JITTER, (heights / most).tolist() if most else [1.0], float(heights.sum()) / CONTRAST)
 
 
 def _fit_rise(content: BundleContent, steepness: float) -> RiseEntry:
