@@ -33,7 +33,7 @@ LONGEST = 1.4  # stretches over measured ones, for borders that were photographe
 WINDOWS, WINDOW, FINE = 6, 6, 80.0  # places in which borders are measured; their sides in tile sides; cells of one
 
 STRAY, FALL, FALLS = 0.025, 0.6, (0.25, 0.75)  # at the widest width, where none was seen; of each width over the last
-JITTER, MAX_JITTER = 3, 5  # cells of the widest jitter along a tile's side; octaves
+JITTER, MAX_JITTER = 4, 5  # cells of the widest jitter along a tile's side; octaves
 FINEST = 3.0  # ground cells: wavelength of the finest jitter
 TYPICAL = 0.09  # how far jitter of one octave makes a border stray at its width, in heights of its noise
 LEAN = 1.0  # how far something reaches over a border, as a multiple of its height above the ground
