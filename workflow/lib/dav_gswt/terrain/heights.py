@@ -294,7 +294,7 @@ def gradient_noise(
     i, j = np.floor(x), np.floor(y)
     u, v = x - i, y - j
     step = np.arange(2).reshape(2, *[1] * x.ndim)
-    bits = np.asarray(hash_cell(i.astype(np.int64) + step, j.astype(np.int64) + step[:, None], axis, salt))
+    bits = _hash_corners(i.astype(np.int64), j.astype(np.int64), step, axis, salt)
     east, north = (bits & 0xFFFF) / 32767.5 - 1, (bits >> 16) / 32767.5 - 1
     planes = east * (u - step) + north * (v - step[:, None])
     fade_x, fade_y, turn_x, turn_y = smoothstep(u), smoothstep(v), _smoothstep_slope(u), _smoothstep_slope(v)
@@ -307,6 +307,17 @@ def gradient_noise(
             by_x += weight * east[b, a] + (turn_x if a else -turn_x) * along * plane
             by_y += weight * north[b, a] + across * (turn_y if b else -turn_y) * plane
     return value, np.stack([by_x, by_y], -1)
+
+
+def _hash_corners(i: Int64[Array, "*n"], j: Int64[Array, "*n"], step: Array, axis: Any, salt: int) -> Array:
+    """Bits of the four corners [north, east] of cells; of a few cells that many points lie in, each corner once."""
+    if isinstance(axis, int) and i.size:
+        west, south = int(i.min()), int(j.min())
+        columns, rows = int(i.max()) - west + 2, int(j.max()) - south + 2
+        if columns * rows < i.size:
+            bits = hash_cell(west + np.arange(columns), south + np.arange(rows)[:, None], axis, salt)
+            return np.asarray(bits)[j - south + step[:, None], i - west + step]
+    return np.asarray(hash_cell(i + step, j + step[:, None], axis, salt))
 
 
 def smoothstep(t):
