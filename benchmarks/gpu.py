@@ -1,8 +1,9 @@
 """A fit on an NVIDIA GPU, measured part by part, each within its seconds, on a machine without network.
 
-`PYTHONPATH=tests python benchmarks/gpu.py PHOTOS` with the folder results/copr_dunes/photos, made before on any machine
+`python benchmarks/gpu.py PHOTOS` with the folder results/copr_dunes/photos, made before on any machine
 (`snakemake --cores 2 results/copr_dunes/photos/ground.json`); --only PART ... for some parts, --dry-run to see what
-would be done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json and gpu.md have what was found so far.
+would be done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json and gpu.md have what was found so far,
+in earlier calls, too.
 """
 
 import argparse
@@ -21,7 +22,7 @@ import numpy as np
 from raster import made
 
 from dav_gswt.field import GaussianField, concatenate_fields
-from dav_gswt.files import write_json
+from dav_gswt.files import read_json, write_json
 from dav_gswt.raster import backends
 from dav_gswt.reconstruction import discs, ground
 from dav_gswt.reconstruction.fitting import exposure, state, trainer
@@ -59,10 +60,12 @@ PARTS = {
 def measure_tests() -> dict:
     """How many tests pass, fail and are left out."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *TESTS]
-    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
-    print(said[-3000:], file=sys.stderr)
-    counts = {word: re.search(rf"(\d+) {word}", said) for word in ("passed", "failed", "skipped")}
-    return {word: int(found[1]) if found else 0 for word, found in counts.items()}
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=PARTS["tests"].seconds - 10)
+    print(done.stdout[-3000:], file=sys.stderr)
+    matches = {word: re.search(rf"(\d+) {word}", done.stdout) for word in ("passed", "failed", "skipped", "error")}
+    counts = {word: int(found[1]) if found else 0 for word, found in matches.items()}
+    failed = counts["failed"] + counts.pop("error")
+    return counts | {"failed": max(failed, int(done.returncode != 0))}
 
 
 def measure_step(
@@ -187,7 +190,7 @@ def run_part(name: str, folder: Path | None) -> dict:
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=PARTS[name].seconds)
     except subprocess.TimeoutExpired:
         return {"stopped_after": PARTS[name].seconds}
-    return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else {"failed": done.returncode}
+    return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else {"exit_status": done.returncode}
 
 
 def write_table(found: dict[str, dict], path: Path) -> None:
@@ -217,10 +220,11 @@ def main() -> None:
         for name in given.only:
             print(f"{name}: {PARTS[name].what}, at most {PARTS[name].seconds} s, targets {PARTS[name].targets}")
     else:
-        found: dict[str, dict] = {}
+        path = ROOT / "results/gpu.json"
+        found: dict[str, dict] = read_json(path) if path.exists() else {}
         for name in given.only:
             found[name] = run_part(name, given.photos)
-            write_json(ROOT / "results/gpu.json", found)
+            write_json(path, found)
             write_table(found, ROOT / "results/gpu.md")
         print((ROOT / "results/gpu.md").read_text())
 

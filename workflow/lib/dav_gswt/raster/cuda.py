@@ -196,10 +196,10 @@ def list_pairs(
     """
     means, conics, opacities = (meta[name] for name in ("means2d", "conics", "opacities"))
     clear = torch.ones(1, height, width, device=means.device)
-    gaussians, pixels, _ = gsplat.rasterize_to_indices_in_range(
+    gaussians, pixels = gsplat.rasterize_to_indices_in_range(
         0, 1 << 30, clear, means, conics, opacities, width, height,
         meta["tile_size"], meta["isect_offsets"], meta["flatten_ids"],
-    )  # fmt: skip
+    )[:2]  # fmt: skip
     gaussians, pixels = gaussians.long(), pixels.long()
     d = means[0, gaussians] - torch.stack([pixels % width, pixels // width], 1) - 0.5
     a, b, c = conics[0, gaussians].unbind(1)

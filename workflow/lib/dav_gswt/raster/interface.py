@@ -135,25 +135,25 @@ class Rasterizer(ABC):
         colours: channels, or spherical harmonics (k = 1, 4, 9, 16; see `harmonics`) seen from the camera.
         Raises: ValueError: an array's type, shape or layout, a value that is not finite, a zero quaternion (index).
         """
-        return next(self._forward_each(GaussianArrays(means, log_scales, quats, opacity_logits, colours), [camera]))
+        return self._forward(GaussianArrays(means, log_scales, quats, opacity_logits, colours), camera)
 
     def forward_each(self, arrays: Mapping[str, Array], cameras: Iterable[Camera]) -> Iterator[Rendering]:
         """`forward` of the same Gaussians for one camera after the other; they must not change in between.
 
         A GPU is given them once, not for each picture.
         """
-        return self._forward_each(GaussianArrays(**arrays), cameras)
+        gaussians = GaussianArrays(**arrays)
+        return (self._forward(gaussians, camera) for camera in cameras)
 
-    def _forward_each(self, gaussians: GaussianArrays, cameras: Iterable[Camera]) -> Iterator[Rendering]:
-        for camera in cameras:
-            check_camera(camera)
-            gaussians.check_shapes()
-            self._last = None
-            rendering, state = self._render(gaussians, camera)
-            for image in vars(rendering).values():
-                image.flags.writeable = False  # the backward pass reads them
-            self._last = Forward(gaussians, camera, rendering, state)
-            yield rendering
+    def _forward(self, gaussians: GaussianArrays, camera: Camera) -> Rendering:
+        check_camera(camera)
+        gaussians.check_shapes()
+        self._last = None
+        rendering, state = self._render(gaussians, camera)
+        for image in vars(rendering).values():
+            image.flags.writeable = False  # the backward pass reads them
+        self._last = Forward(gaussians, camera, rendering, state)
+        return rendering
 
     def backward(
         self,

@@ -105,6 +105,7 @@ class DeviceDescent(Descent):
             last = self.raster.draw(run.state.values, camera)
             nothing = torch.empty(camera.height, camera.width, 0, device=self.device)
             peak = torch.maximum(peak, self.raster.contribute(last, nothing)[1])
+            del last  # its graph, before the next one is drawn
         return on_host(peak)
 
     def _pack(self, task: TrainingTask, index: int) -> dict[str, Any]:
