@@ -4,7 +4,7 @@ import pytest
 
 from dav_gswt.raster import backends
 
-OF_THE_CORE = ["test_core_memory.py", "test_gpu_benchmark.py", "test_oracle.py", "test_rasterizer.py"]
+OF_THE_CORE = ["test_core_memory.py", "test_oracle.py", "test_rasterizer.py"]
 collect_ignore = OF_THE_CORE if backends.explain_unavailable("cpu") else []  # test_choice_of_backend.py says so
 
 

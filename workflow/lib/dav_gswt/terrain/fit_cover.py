@@ -133,7 +133,7 @@ def _fit_noise(
     shares = np.array([material.share for material in content.materials])
     shares, waves, ratio, longer = shares / shares.sum(), wanted.copy(), GAIN, 1.0
     entry = ClassesEntry(salt, [], JitterEntry(1, [1.0], 0.0), RiseEntry(0.0, 0.0, *2 * [[0.0] * len(shares)]))
-    steepness, strays = 1.0, np.zeros(1)
+    steepness, strays, classes = 1.0, np.zeros(1), Classes(entry, len(waves), side)
     for _ in range(PASSES):
         waves = np.clip(waves, SHORTEST / LATTICE, WIDEST / LATTICE)
         most = int(np.clip(np.floor(np.log(LEAST_GAIN) / np.log(ratio)), 0, MAX_OCTAVES - 1))
@@ -152,6 +152,8 @@ def _fit_noise(
             missing = bent / max(float(strays[0]), 1e-9)
             ratio = float(np.clip(ratio * np.clip(missing, 0.25, 2), LEAST_GAIN / 2, MOST_GAIN))
             longer = float(np.clip(longer / max(missing, 1e-9), 1, LONGEST))
+    if bent is None and (measured := measure_strays_of(classes, salt)) is not None:
+        strays = measured
     return entry, steepness, strays
 
 

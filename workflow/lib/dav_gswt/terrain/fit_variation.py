@@ -30,10 +30,11 @@ from dav_gswt.tiles.compose import BinnedLevel
 WAVELENGTHS = 0.63, 1.57  # tile sides: widths of noise's cells. Its power is greatest at 1.6 times that
 WIDE = 0.1  # tile sides: blur of what counts as large scale
 FARTHEST = 2.5  # robust standard deviations at which large-scale values are cut
-SIDE = 12  # tiles along a terrain that is measured
+SIDE = 12  # tiles along a terrain that is measured, at least
+FINE = 32  # cells along a tile's side that are measured, at least: half a tile is the finest scale
 WINDOWS = 5  # along a square as large as the exemplar
 EVERY = slice(None)
-LEAST = 1e-9  # power that is rounding
+LEAST, FAINT = 1e-9, 0.01  # power that is rounding; of an exemplar's strongest octave: fainter ones count for nothing
 DIGITS = 5  # of amplitudes
 
 
@@ -44,7 +45,8 @@ def fit_variation(tiles: Sequence[TileSet], factor: float, salt: int, across: sl
     """
     if factor <= 0 or any(own.recipe is None for own in tiles):
         return None
-    colours = np.round([factor * _fit_waves(own, salt, across) for own in tiles], DIGITS)
+    colours = np.array([factor * _fit_waves(own, salt, across) for own in tiles])
+    colours = np.round(colours / np.maximum(1, np.abs(colours).max(-1, keepdims=True)), DIGITS)
     waves = zip(WAVELENGTHS, np.moveaxis(colours, 1, 0), strict=True)
     return [WaveEntry(width, each.tolist()) for width, each in waves if each.any()] or None
 
@@ -54,22 +56,24 @@ def _fit_waves(tiles: TileSet, salt: int, across: slice) -> Float[Array, "waves 
     exemplar, pieces = map_colours(tiles)
     cells, side = len(exemplar), pieces.shape[1]
     axis, wanted = find_axis(exemplar, WIDE * side)
-    terrain = _lay_out(pieces @ axis, tiles.variants, salt)
-    y, x = (np.mgrid[: SIDE * side, : SIDE * side] + 0.5) / side
+    count = max(SIDE, -(-cells // side))
+    terrain = _lay_out(pieces @ axis, tiles.variants, salt, count)
+    y, x = (np.mgrid[: count * side, : count * side] + 0.5) / side
     noises = [make_wave(x, y, k, width, salt) for k, width in enumerate(WAVELENGTHS)]
     target = measure_octaves(wanted, cells, side, across)
     own, *gains = (measure_octaves(values, cells, side) for values in (terrain, *noises))
-    known = target > LEAST
+    known = target > max(LEAST, FAINT * target.max())
     shares, missing = (values[..., known] / target[known] for values in (np.array(gains), target - own))
     power = nnls(shares.T, missing)[0]
     return np.sqrt(power)[:, None] * axis
 
 
 def map_colours(tiles: TileSet) -> tuple[Float[Array, "m m 3"], Float[Array, "t n n 3"]]:
-    """The exemplar with its trend, and each tile, from straight above, in cells of the coarsest composed level."""
+    """The exemplar with its trend, and each tile, from straight above, in cells of which a tile has FINE or more."""
     recipe = tiles.recipe
     assert recipe is not None
-    flat, trend, cell = _see_flat(recipe.levels[0]), recipe.trend.colour, recipe.levels[-1].cell
+    flat, trend, side = _see_flat(recipe.levels[0]), recipe.trend.colour, tiles.layout.side
+    cell = max(each for each in range(1, max(1, side // FINE) + 1) if side % each == 0)
     pieces = [
         _shrink(flat[layout.source_cells(own, shift)] + correction[..., :3], cell)
         for own, shift, correction in zip(tiles.labels, tiles.shifts, recipe.corrections, strict=True)
@@ -106,9 +110,9 @@ def find_axis(colour: Float[Array, "m m 3"], width: float) -> tuple[Float[Array,
     return axis, colour @ axis - (along - np.clip(along, -most, most))
 
 
-def _lay_out(pieces: Float[Array, "t n n"], variants: int, salt: int) -> Float[Array, "h w"]:
-    """A terrain of tiles, from its south-western cell."""
-    j, i = np.mgrid[:SIDE, :SIDE]
+def _lay_out(pieces: Float[Array, "t n n"], variants: int, salt: int, count: int) -> Float[Array, "h w"]:
+    """A terrain of `count` x `count` tiles, from its south-western cell."""
+    j, i = np.mgrid[:count, :count]
     return np.concatenate([np.concatenate(row, 1) for row in pieces[tiles_at(i, j, salt, variants)]])
 
 

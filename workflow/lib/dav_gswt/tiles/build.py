@@ -22,6 +22,7 @@ _log = logging.getLogger(__name__)
 
 WARN_UNCERTAINTY = 0.5  # mean of a tile, above which a warning is logged
 MOST_RESIZED = 0.3  # logarithm of a tile's size over the wanted one, for whole rows
+SIDES = 64  # sides between 0 and the wanted one that are tried, at most
 SIZE_COST = 0.2  # of that logarithm, where the norm of the exemplar's change costs 1
 
 
@@ -150,7 +151,8 @@ def _fit_periods(
     plan = _plan_layout(options, texture.measure_texture_scale(colour), Exemplar.from_grid(grid), fitted)
     rows, strip, cell = periods.describe_rows(waves, grid.spacing), plan.strip / plan.side, 2 ** (plan.levels - 1)
     found = []
-    for side in [plan.side] if fixed else range(cell, grid.cells + 1, cell):
+    step = max(cell, plan.side // SIDES // cell * cell)
+    for side in [plan.side] if fixed else range(plan.side % step or step, grid.cells + 1, step):
         if (size := abs(float(np.log(side / plan.side)))) > MOST_RESIZED:
             continue
         pattern = periods.fit_pattern(waves, grid.cells, side, 2 ** (fitted - 1), plan.block)

@@ -25,6 +25,7 @@ OVERLAY_SAMPLES = 64  # samples along a tile's side, of repetition
 LINE_WEIGHT = 4.0  # cost of lines over the cost of other repetition
 SPOTS = (1 / 80, 1 / 20), (1 / 24, 1 / 8)  # of a tile's side: two blurs each, whose difference shows landmarks
 OUTSTANDING = 10.0  # times the median squared difference of these: beyond it a cell belongs to a landmark
+INVISIBLE = (1 / 255) ** 2  # squared difference that nobody sees
 LANDMARK_COST = 1.0  # of a strip with the exemplar's share of landmarks, where a median seam costs 1
 
 UsedPatch = tuple[Array, tuple[int, int]]  # a place (x, y) and a size (width, height)
@@ -65,7 +66,7 @@ def find_landmarks(maps: Float[Array, "m m k"], side: int) -> Float[Array, "m m"
     for blurs in SPOTS:
         near, around = (gaussian_filter(maps, (b * side, b * side, 0), mode="nearest", truncate=2) for b in blurs)
         away = ((near - around) ** 2).sum(-1)
-        found |= away > OUTSTANDING * safe_unit(float(np.median(away)))
+        found |= away > OUTSTANDING * max(float(np.median(away)), INVISIBLE)
     return found / safe_unit(float(found.mean()))
 
 

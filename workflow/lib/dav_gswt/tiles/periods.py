@@ -148,7 +148,9 @@ def _find_generators(lines: list[_Line], cells: int) -> Float[Array, "k 2"]:
         size = np.linalg.norm(periods, axis=1)
         apart = np.flatnonzero(np.abs(across) > SLANT * size * size[:1])
         if len(apart):
-            return _fit_generators(waves, weights, waves @ periods[[0, apart[0]]].T, near)
+            made = _fit_generators(waves, weights, waves @ periods[[0, apart[0]]].T, near)
+            if np.linalg.matrix_rank(made, tol=near) == 2:
+                return made
     along = waves[parallel] @ way
     period = _find_periods(along[:, None], weights[parallel], reach[reach > 0, None])[:1]
     if not len(period):  # lines of several patterns: the strongest counts
@@ -202,14 +204,15 @@ def fit_pattern(waves: Float[Array, "k 2"], cells: int, side: int, unit: int, bl
     for up in product((0, 1), repeat=exact.size):
         counts = np.floor(exact).astype(int) + np.reshape(up, exact.shape)
         turn = _fit_turn(waves, counts / side)
-        changed, reach = float(np.linalg.norm(turn - np.eye(2), 2)), float(np.abs(turn).sum(1).max())
-        if changed > MOST_CHANGED or side * reach > cells:
+        changed = float(np.linalg.norm(turn - np.eye(2), 2))
+        if changed > MOST_CHANGED or (kept := int(cells / np.abs(turn).sum(1).max() / unit) * unit) < side:
             continue
-        pattern = Pattern(waves, counts, side, turn, int(cells / reach / unit) * unit, changed)
+        pattern = Pattern(waves, counts, side, turn, kept, changed)
         moves = np.arange(0, pattern.cells - side + 1, block)
         moves = np.stack(np.meshgrid(moves, moves), -1).reshape(-1, 2)
         off = pattern.measure_phases(moves)
-        found.append(replace(pattern, cost=changed + PHASE_COST * np.sort(off)[:LEAST_PLACES][-1]))
+        least = np.partition(off, min(LEAST_PLACES, len(off)) - 1)[min(LEAST_PLACES, len(off)) - 1]
+        found.append(replace(pattern, cost=changed + PHASE_COST * least))
     return min(found, key=lambda pattern: pattern.cost, default=None)
 
 

@@ -1,12 +1,13 @@
 """The script that measures a GPU, at tiny sizes without one: it is ready when there is one."""
 
 import sys
-from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from fixtures import fake_gsplat
 from fixtures import ground as made
 
+from dav_gswt.photos.colmap_model import ColmapModel
 from dav_gswt.raster import backends
 from dav_gswt.reconstruction.fitting.plan import FitSettings
 
@@ -15,7 +16,7 @@ TINY = FitSettings(fit_size=48, spacing=1.0, max_gaussians=3000, steps=25)
 
 @pytest.fixture
 def gpu(root, monkeypatch):
-    monkeypatch.setattr(sys, "path", [str(root / "benchmarks"), *sys.path])
+    monkeypatch.setattr(sys, "path", [str(root / folder) for folder in ("study/benchmarks", "benchmarks")] + sys.path)
     monkeypatch.setenv(backends.VARIABLE, "cpu")
     import gpu as script
 
@@ -37,10 +38,12 @@ def test_a_step_is_measured_against_its_kernels(gpu, monkeypatch):
 
 
 def test_fits_and_what_precedes_them_are_measured(gpu, tmp_path):
-    from dav_gswt_study.fit_profile import PhotoSet  # found by the script
+    from dav_gswt_study.fit_profile import PhotoSet
 
     views, points = made.photos(5), made.grid().centres[::7]
-    model = SimpleNamespace(points=points, colours=made.look(*points[:, :2].T))
+    none = np.zeros(0, int)
+    colours = made.look(*points[:, :2].T).astype(np.float32)
+    model = ColmapModel((), (), points, colours, none, none, np.zeros((0, 2)))
     photos = PhotoSet(made.FRAME, model, views[1:], {"test": views[:1]}, margin=0.0)
     fit, start = gpu.measure_fit(photos, TINY), gpu.measure_start(photos, TINY)
     assert len(fit["curves"]["ours"]) == 2 and fit["photos"] == 4

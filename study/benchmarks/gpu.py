@@ -1,8 +1,8 @@
 """A fit on an NVIDIA GPU, measured part by part, each within its seconds, on a machine without network.
 
-`python benchmarks/gpu.py PHOTOS` with the folder results/copr_dunes/photos, made before on any machine
-(`snakemake --cores 2 results/copr_dunes/photos/ground.json`); --only PART ... for some parts, --dry-run to see what
-would be done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json and gpu.md have what was found so far,
+`PYTHONPATH=study:benchmarks python study/benchmarks/gpu.py PHOTOS` with the folder results/copr_dunes/photos, made
+before on any machine (`snakemake --cores 2 results/copr_dunes/photos/ground.json`); --only PART ... for some parts,
+--dry-run to see what would be done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json and gpu.md have what was found so far,
 in earlier calls, too.
 """
 
@@ -30,8 +30,7 @@ from dav_gswt.reconstruction.fitting.descent import TrainingState, TrainingTask
 from dav_gswt.reconstruction.fitting.plan import FitPlan, FitSettings, Schedule
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.append(str(ROOT / "study"))
+ROOT = Path(__file__).resolve().parents[2]
 TESTS = "tests/unit/raster", "tests/unit/test_arrays.py", "tests/unit/reconstruction/fitting/test_device_descent.py"
 DUNES = FitSettings(fit_size=768, spacing=1.5, max_gaussians=500_000, steps=300, steps_per_photo=20)
 HUNDRED = replace(DUNES, fit_size=1024)
