@@ -2,8 +2,8 @@
 
 `PYTHONPATH=study:benchmarks python study/benchmarks/gpu.py PHOTOS` with the folder results/copr_dunes/photos, made
 before on any machine (`snakemake --cores 2 results/copr_dunes/photos/ground.json`); --only PART ... for some parts,
---dry-run to see what would be done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json and gpu.md have what was found so far,
-in earlier calls, too.
+--dry-run to see what would be done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json and gpu.md have
+what was found so far, in earlier calls, too.
 """
 
 import argparse
@@ -135,7 +135,7 @@ def measure_fit(photos, settings: FitSettings, rival: bool = False) -> dict:
         curves["gsplat"] = profile_gsplat(photos, RIVAL_STEPS, 5 * LOOKS)
     found: dict = {"curves": curves, "seconds": curves["ours"][-1]["seconds"], "photos": len(photos.train)}
     for decibel in DECIBELS:
-        times = {name: fit_profile.find_time_to(curve, decibel) for name, curve in curves.items()}
+        times = {name: fit_profile.find_time_to(curve, float(decibel)) for name, curve in curves.items()}
         found |= {f"{name}_to_{decibel}": seconds for name, seconds in times.items()}
         ours, theirs = times["ours"], times.get("gsplat")
         found[f"share_{decibel}"] = ours / theirs if ours is not None and theirs else None
