@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Integer
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt, gaussian_filter, label, map_coordinates, maximum_filter
 from scipy.optimize import minimize
@@ -194,7 +194,7 @@ class LandmarkMeasures:
 
 def measure_landmarks(
     marks: Landmarks,
-    labels: Int[Array, "tiles n n"],
+    labels: Integer[Array, "tiles n n"],
     shifts: Int[Array, "tiles 9 2"],
     chosen: Int[Array, "rows columns"],
 ) -> LandmarkMeasures:
