@@ -5,8 +5,8 @@
 - Regular ground: autocorrelation at the lags that the exemplar contains, terrain over exemplar (`measure_regularity`).
 - Jump: steps of brightness across tile borders over those at all other places (`measure_jump`).
 
-Repetition on a lattice is `lattice.measure_lattice`. Brightness is the mean of the encoded channels. A picture of the
-exemplar is that of its finest level with its trend, pixels as wide as those of the terrain.
+Repetition on a lattice is `lattice.measure_lattice`. Brightness is the mean of the encoded channels. Pictures of
+the exemplar show its finest level with its trend, at the terrain's pixel width.
 """
 
 import hashlib
@@ -167,14 +167,14 @@ def write_landmarks(marks: list[Landmarks], path: Path | str) -> None:
 
 
 def read_landmarks(path: Path | str, sets: list[Levels]) -> list[Landmarks]:
-    """Read what `write_landmarks` wrote for these exemplars. Raises: InputError: they are those of others."""
+    """Read what `write_landmarks` wrote for these exemplars. Raises: InputError: the file is of other exemplars."""
     marks = []
     for own, levels in zip(read_json(path), sets, strict=True):
         size = own["cells"]
         numbers = np.repeat(own["numbers"], np.diff([*own["first"], size**2])).reshape(size, size)
         marks.append(Landmarks(own["digest"], numbers))
         if own["digest"] != find_landmarks(levels).digest:
-            raise InputError(f"{path}: the landmarks are those of another exemplar: find them again")
+            raise InputError(f"{path}: made of another exemplar; delete the file and find the landmarks again")
     return marks
 
 

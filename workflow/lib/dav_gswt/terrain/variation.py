@@ -41,7 +41,8 @@ class Variation:
         change = np.zeros((len(x), 3))
         for k, wave in enumerate(self.waves):
             x, y = TURN[0] * x - TURN[1] * y, TURN[1] * x + TURN[0] * y
-            change += make_wave(x, y, k, wave.wavelength * self.side, self.salt)[:, None] * _of(wave, material)
+            noise = make_wave(x, y, k, wave.wavelength * self.side, self.salt)
+            change += noise[:, None] * np.array(wave.colours)[material]
         return change
 
 
@@ -49,10 +50,6 @@ def make_wave(x: Float[Array, "*n"], y: Float[Array, "*n"], number: int, width: 
     """Noise in cells of a width, at points in the wave's own axes; |noise| <= 1, its standard deviation about 0.18."""
     noise, _ = gradient_noise(x / width + number * SHIFT[0], y / width + number * SHIFT[1], VARIATION + number, salt)
     return noise
-
-
-def _of(wave: WaveEntry, material: int | Int[Array, "n"]) -> Float[Array, "..."]:
-    return np.array(wave.colours)[material]
 
 
 def tint_field(field: GaussianField, change: Float[Array, "n 3"]) -> GaussianField:
