@@ -107,3 +107,10 @@ def test_every_object_has_its_density_in_another_window():
     counts = np.bincount(scatter.instances_in(i, j).number) / (40 * 40 * SIDE**2 * np.array([0.4, 0.6]))
     # the window has about 1000 and 900 things, and a share of ground of its own
     assert counts == pytest.approx([0.1, 0.06], rel=0.15)
+
+
+def test_strays_follow_the_side_of_the_tiles():
+    strays = [0.4, 0.2, 0.1]  # at 0.1, 0.05 and 0.025 of a tile's side
+    assert fits.resample_strays(strays, 1.0) == pytest.approx(strays)
+    assert fits.resample_strays(strays, 0.5) == pytest.approx([0.2, 0.1, 0.1])  # the narrowest that is known
+    assert fits.resample_strays(strays, 2.0) == pytest.approx([0.4, 0.4, 0.2])

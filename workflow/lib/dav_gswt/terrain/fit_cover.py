@@ -15,7 +15,7 @@ from scipy.ndimage import map_coordinates
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.bundle.land_cover import ClassesEntry, JitterEntry, NoiseTerm, ObjectEntry, RiseEntry, ScatterEntry
 from dav_gswt.errors import InputError
-from dav_gswt.materials.borders import measure_strays
+from dav_gswt.materials.borders import WIDTHS, measure_strays
 from dav_gswt.materials.store import read_objects, read_report
 from dav_gswt.terrain.classes import CONTRAST, LATTICE, Classes
 from dav_gswt.terrain.fit_variation import fit_variation
@@ -63,7 +63,15 @@ def gather_content(
         raise InputError("materials: this tiling is of the first one alone; choose another or `materials: one`")
     objects = read_objects(materials, len(tiles[0].fields), tiles[0].spacing)
     waves = fit_variation(tiles, variation, salt)
-    return fit_cover(BundleContent(tiles, [*report.materials], objects, variation=waves), salt)
+    ratio = tiles[0].side / (report.tile_side * tiles[0].spacing) if report.tile_side else 1.0
+    known = [replace(own, strays=own.strays and resample_strays(own.strays, ratio)) for own in report.materials]
+    return fit_cover(BundleContent(tiles, known, objects, variation=waves), salt)
+
+
+def resample_strays(strays: list[float], ratio: float) -> list[float]:
+    """Strays at `borders.WIDTHS` of tiles that are `ratio` times as wide as those by which they were measured."""
+    widths = np.log(WIDTHS[: len(strays)])
+    return np.interp(widths + np.log(ratio), widths[::-1], strays[::-1]).tolist()
 
 
 def fit_cover(content: BundleContent, salt: int) -> BundleContent:
