@@ -111,6 +111,7 @@ def test_every_object_has_its_density_in_another_window():
 
 def test_strays_follow_the_side_of_the_tiles():
     strays = [0.4, 0.2, 0.1]  # at 0.1, 0.05 and 0.025 of a tile's side
-    assert fits.resample_strays(strays, 1.0) == pytest.approx(strays)
-    assert fits.resample_strays(strays, 0.5) == pytest.approx([0.2, 0.1, 0.1])  # the narrowest that is known
-    assert fits.resample_strays(strays, 2.0) == pytest.approx([0.4, 0.4, 0.2])
+    for ratio in (0.5, 1.0, 1.1):
+        assert fits.resample_strays(strays, ratio) == pytest.approx([ratio * stray for stray in strays])
+    assert fits.resample_strays([0.0, 0.0], 2.0) == [0.0, 0.0]
+    assert fits.resample_strays([0.4], 0.5) == pytest.approx([0.4 * fits.FALL])

@@ -33,6 +33,7 @@ LONGEST = 1.4  # stretches over measured ones, for borders that were photographe
 WINDOWS, WINDOW, FINE = 6, 6, 80.0  # places in which borders are measured; their sides in tile sides; cells of one
 
 STRAY, FALL, FALLS = 0.025, 0.6, (0.25, 0.75)  # at the widest width, where none was seen; of each width over the last
+STEEPEST = 2.0  # power of the width that strays grow by, at most
 JITTER, MAX_JITTER = 4, 5  # cells of the widest jitter along a tile's side; octaves
 FINEST = 3.0  # ground cells: wavelength of the finest jitter
 TYPICAL = 0.09  # how far jitter of one octave makes a border stray at its width, in heights of its noise
@@ -65,13 +66,17 @@ def gather_content(
     waves = fit_variation(tiles, variation, salt)
     ratio = tiles[0].side / (report.tile_side * tiles[0].spacing) if report.tile_side else 1.0
     known = [replace(own, strays=own.strays and resample_strays(own.strays, ratio)) for own in report.materials]
-    return fit_cover(BundleContent(tiles, known, objects, variation=waves), salt)
+    return fit_cover(BundleContent(tiles, [*known], objects, variation=waves), salt)
 
 
 def resample_strays(strays: list[float], ratio: float) -> list[float]:
-    """Strays at `borders.WIDTHS` of tiles that are `ratio` times as wide as those by which they were measured."""
-    widths = np.log(WIDTHS[: len(strays)])
-    return np.interp(widths + np.log(ratio), widths[::-1], strays[::-1]).tolist()
+    """Strays at `borders.WIDTHS` of tiles that are `ratio` times as wide as those by which they were measured.
+
+    Around each width they follow a power of it, as between its neighbours.
+    """
+    known = np.log(np.maximum(strays, 1e-9))
+    power = np.gradient(known, np.log(WIDTHS[: len(strays)])) if len(strays) > 1 else -np.log2(FALL)
+    return (np.array(strays) * ratio ** np.clip(power, 0, STEEPEST)).tolist()
 
 
 def fit_cover(content: BundleContent, salt: int) -> BundleContent:
