@@ -147,3 +147,14 @@ class WaveEntry(Entry):
 
     wavelength: Annotated[float, Field(ge=0.01, le=1e4)]
     colours: Annotated[list[Change], Field(min_length=1, max_length=8)]
+
+
+@dataclass(frozen=True)
+class LightEntry(Entry):
+    """The captured sun, whose light the baked colours contain: degrees above the horizon, degrees clockwise from north,
+    and how it is known.
+    """
+
+    elevation: Annotated[float, Field(ge=3, le=90)]
+    azimuth: Annotated[float, Field(ge=0, lt=360)]
+    source: Literal["config", "exif", "relief", "assumed"]

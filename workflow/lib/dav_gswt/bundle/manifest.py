@@ -28,7 +28,7 @@ from dav_gswt.bundle.encoding import (
     Share,
     Size,
 )
-from dav_gswt.bundle.land_cover import ClassesEntry, Name, ObjectEntry, Salt, ScatterEntry, WaveEntry
+from dav_gswt.bundle.land_cover import ClassesEntry, LightEntry, Name, ObjectEntry, Salt, ScatterEntry, WaveEntry
 from dav_gswt.bundle.parts import LEVEL, MAX_SIZE, MAX_TOTAL, PLAIN, RECIPES, RECORDS, ChunkEntry, PartEntry
 from dav_gswt.bundle.recipes import Composition, locate_corner
 from dav_gswt.errors import InputError, summarize_error
@@ -36,7 +36,16 @@ from dav_gswt.files import parse_record, read_json
 
 NAME = "davgswt.json"
 FORMAT, VERSION = "davgswt", 4
-OPTIONAL = "classes", "objects", "scatter", "variation", "composition", "heights"  # keys that are left out for None
+OPTIONAL = (
+    "classes",
+    "objects",
+    "scatter",
+    "variation",
+    "light",
+    "wind",
+    "composition",
+    "heights",
+)  # keys that are left out for None
 ONLY_MATERIAL = "ground"  # the name of the material of a set that has one
 MAX_BYTES = 1 << 26  # of a manifest
 WHOLE = 1e-9  # error of whole numbers of steps, of their own size
@@ -107,6 +116,8 @@ class Manifest(Entry):
     objects: Annotated[Sequence[ObjectEntry], Field(min_length=1, max_length=256)] | None = None
     scatter: ScatterEntry | None = None
     variation: Annotated[list[WaveEntry], Field(min_length=1, max_length=3)] | None = None
+    light: LightEntry | None = None
+    wind: Annotated[float, Field(ge=0, le=4)] | None = None
     format: Literal["davgswt"]
     version: Literal[4]
     unit: Annotated[str, Field(min_length=1)]

@@ -1,7 +1,7 @@
 """Backdrop of the terrain: sky, far ground, and the transition of the last tiles into it; on a plane and a planet."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float, Float32
@@ -13,6 +13,7 @@ from dav_gswt.terrain.choice import Vector
 from dav_gswt.terrain.draw_order import finer_share
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import Sphere
+from dav_gswt.terrain.light import Light, relight
 
 FADE = 0.5  # share of the reach at which the transition begins
 CLIMB = 3.0  # times the reach on the ground by which the reach grows with the eye's height over a planet, at most
@@ -26,6 +27,7 @@ class Backdrop:
     """Sky colours by elevation, and ground of the mean colour that pales towards the horizon.
 
     end: distance at which the transition of the last tiles is complete. low: sine of the angle below the horizon there.
+    light: whose sun is in the sky; None: no sun.
     """
 
     zenith: Float32[Array, "3"]
@@ -33,6 +35,7 @@ class Backdrop:
     ground: Float32[Array, "3"]
     end: float
     low: float
+    light: Light | None = field(default=None, kw_only=True)
 
     @property
     def begin(self) -> float:
@@ -42,6 +45,9 @@ class Backdrop:
     @staticmethod
     def for_eye(terrain: EndlessTerrain, eye: Vector, sky: Sky, ground_colour: Sequence[float] | Array) -> "Backdrop":
         """The backdrop that an eye sees behind a terrain."""
+        light = terrain.light and terrain.light.light
+        if light:
+            sky, ground_colour = light.change_sky(sky), relight(np.asarray(ground_colour), light.ground_ratio)
         zenith, horizon, ground = (np.asarray(c, np.float32) for c in (sky.zenith, sky.horizon, ground_colour))
         if isinstance(sphere := terrain.heights, Sphere):
             far, reach, radius = float(np.linalg.norm(eye)), find_reach(terrain, sphere, eye), sphere.radius
@@ -53,14 +59,22 @@ class Backdrop:
             low = max((square + reach * reach) / (2 * far * reach) - dip, LOWEST)
             return SphereBackdrop(zenith, horizon, ground, reach, low, eye, dip, radius)
         end, (lowest, _, _) = terrain.reach * terrain.side, terrain.heights.bounds
-        return Backdrop(zenith, horizon, ground, end, (eye[2] - lowest) / end)
+        return Backdrop(zenith, horizon, ground, end, (eye[2] - lowest) / end, light=light)
 
     def colours_along(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
-        """Colours in directions of any length."""
+        """Colours in directions of any length, without the sun."""
         rise = (directions[..., 2] / np.linalg.norm(directions, axis=-1))[..., None]
         above = self.horizon + (self.zenith - self.horizon) * np.clip(rise, 0, 1) ** 0.5
         below = self.ground + (self.horizon - self.ground) * np.exp(np.clip(rise, -1, 0) / (0.3 * self.low))
         return np.where(rise > 0, above, below).astype(np.float32)
+
+    def show(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
+        """Colours of pixels that see in directions of any length."""
+        colours = self.colours_along(directions)
+        if self.light is None:
+            return colours
+        rays = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+        return np.where(rays[..., 2:] > 0, self.light.add_sun(colours, rays), colours).astype(np.float32)
 
     def blend_far(self, field: GaussianField) -> GaussianField:
         """Blend the colours of distant Gaussians (positions relative to the eye) into the backdrop.
