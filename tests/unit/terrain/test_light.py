@@ -12,7 +12,7 @@ from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.bundle.land_cover import LightEntry
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.terrain import endless, stills
-from dav_gswt.terrain.heights import FlatSurface, Hills, HeightMap, Sphere
+from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills, Sphere
 from dav_gswt.terrain.light import ASSUMED, CELL, SIZE, Light, apply_light, light_of, place_light, relight
 from dav_gswt.terrain.sun import Sun, find_hour, measure_light, sun_at
 
