@@ -14,6 +14,7 @@ from dav_gswt.geometry.scene_frame import (
     read_scene_frame,
     write_scene_frame,
 )
+from dav_gswt.geometry.sun import CapturedSun
 
 PLACE = Georeference(47.1, 8.0, 430.0, 12.0, 2.5, slope=3.0)
 FRAME = scene_frame(
@@ -28,6 +29,7 @@ FRAME = scene_frame(
     focal=FocalLength(300.0, 300.0, None, 3.0, "EXIF's"),
     reprojection_error=0.5,
     points=100,
+    sun=CapturedSun(33.0, 270.0, "2024-06-23T20:00:00Z", "gps", 0.0, 0.1),
 )
 
 

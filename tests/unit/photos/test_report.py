@@ -9,6 +9,7 @@ from fixtures import photos as synth
 from fixtures.frames import scene_frame
 
 from dav_gswt.geometry.scene_frame import FocalLength, LeftOutPhoto, SfmSign, SfmVerdict, Square
+from dav_gswt.geometry.sun import CapturedSun
 from dav_gswt.photos.photo_set import write_photo_folder
 from dav_gswt.photos.report import list_advice, write_report
 
@@ -26,6 +27,7 @@ FRAME = scene_frame(
     focal=FocalLength(300.0, 300.0, 303.0, 30.0, "EXIF's, which the photos confirm"),
     reprojection_error=0.4,
     points=3000,
+    sun=CapturedSun(33.5, 225.0, "2024-06-23T20:00:00Z", "assumed", -8.0, 0.1),
     verdict=SfmVerdict("doubtful", (SfmSign("tilt", "doubtful", "it is odd"), SfmSign("relief", "good", "flat"))),
 )
 GREY = np.full((12, 16, 3), 0.5, np.float32)
@@ -65,6 +67,7 @@ def test_the_page_needs_nothing_but_itself_and_escapes_names(made, root, tmp_pat
         "&lt;b&gt;bold",
         "12 of 14 photos",
         "it is odd",
+        "the sun stood 34 degrees high in the south-west, from the photos&#39; EXIF time; assumed zone UTC-8",
         "0.40 px on average (good: up to 0.9)",
     ):
         assert said in text

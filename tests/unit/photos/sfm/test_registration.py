@@ -40,6 +40,7 @@ def as_jpeg(path, camera, ground, exif=True):
     spec["CompressionQuality"] = 98
     if exif:
         spec["Exif:FocalLengthIn35mmFilm"] = round(FILM)
+        spec["Exif:DateTimeOriginal"] = "2016:06:23 16:33:00"
     file = oiio.ImageOutput.create(str(path))
     assert file.open(str(path), spec) and file.write_image(np.rint(image * 255).astype(np.uint8))
     file.close()
@@ -160,6 +161,7 @@ def test_positions_by_gps_give_metres_and_north_and_the_photos_folder_is_whole(p
     assert np.abs(back - at).max() < 1.0  # of flights of 100 metres: features are read to half a pixel, 0.2 m here
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["ground.json", "images", "lenses.json", "sparse"]
     assert read_scene_frame(tmp_path / "out" / "ground.json") == made
+    assert (made.sun.clock, made.sun.zone, round(made.sun.azimuth)) == ("assumed", -6, 270)  # in the zone of 92 W
     assert (made.images, made.registered, made.points) == (8, 8, len(stored.points))
     for name, camera in zip(stored.names, stored.cameras, strict=True):
         assert image_files.read_size(tmp_path / "out" / "images" / name) == (camera.width, camera.height)

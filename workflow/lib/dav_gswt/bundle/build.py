@@ -12,7 +12,7 @@ from dav_gswt.bundle import direction_search, level_distances, manifest, parts, 
 from dav_gswt.bundle.blocks import Block, pack_block
 from dav_gswt.bundle.content import BundleContent, compute_ground_colour
 from dav_gswt.bundle.encoding import Encoding
-from dav_gswt.bundle.land_cover import ObjectEntry
+from dav_gswt.bundle.land_cover import LightEntry, ObjectEntry
 from dav_gswt.bundle.manifest import Manifest, MaterialEntry, Sky, TileEntry
 from dav_gswt.bundle.parts import ChunkEntry, PartEntry, write_part
 from dav_gswt.bundle.recipes import Composition
@@ -35,6 +35,7 @@ class BundleOptions:
         unit: of lengths, for display.
         level_pixels: mean standard deviation of a level, in pixels, where it takes over from its finer neighbour.
         band: half the width of that cross-fade, as a share of the distance.
+        light: the captured sun; None: not known.
     """
 
     tau: float
@@ -42,6 +43,7 @@ class BundleOptions:
     unit: str = "metre"
     level_pixels: float = 1.0
     band: float = 0.1
+    light: LightEntry | None = None
 
 
 def write_bundle(
@@ -107,6 +109,7 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
         objects=things or None,
         scatter=content.scatter,
         variation=content.variation,
+        light=options.light,
         format=manifest.FORMAT,
         version=manifest.VERSION,
         unit=options.unit,

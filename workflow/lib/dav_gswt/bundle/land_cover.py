@@ -1,4 +1,5 @@
-"""Entries of the manifest that say which material lies where, where objects stand, and how colours vary.
+"""Entries of the manifest that say which material lies where, where objects stand, how colours vary, and where the sun
+stood.
 
 `terrain.classes`, `terrain.scatter` and `terrain.variation` compute from them; docs/formats.md says what each key means
 and has the formulas.
@@ -151,8 +152,9 @@ class WaveEntry(Entry):
 
 @dataclass(frozen=True)
 class LightEntry(Entry):
-    """The captured sun, whose light the baked colours contain: degrees above the horizon, degrees clockwise from north,
-    and how it is known.
+    """The captured sun, whose light the colours contain: degrees above the horizon and clockwise from the tiles' +y.
+
+    source: the config, the photos' EXIF, the shading of the relief, or nothing (a guess).
     """
 
     elevation: Annotated[float, Field(ge=3, le=90)]

@@ -36,16 +36,8 @@ from dav_gswt.files import parse_record, read_json
 
 NAME = "davgswt.json"
 FORMAT, VERSION = "davgswt", 4
-OPTIONAL = (
-    "classes",
-    "objects",
-    "scatter",
-    "variation",
-    "light",
-    "wind",
-    "composition",
-    "heights",
-)  # keys that are left out for None
+# keys that are left out for None
+OPTIONAL = "classes", "objects", "scatter", "variation", "light", "wind", "composition", "heights"
 ONLY_MATERIAL = "ground"  # the name of the material of a set that has one
 MAX_BYTES = 1 << 26  # of a manifest
 WHOLE = 1e-9  # error of whole numbers of steps, of their own size

@@ -21,6 +21,7 @@ from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame
+from dav_gswt.geometry.sun import name_direction
 from dav_gswt.images import image_files
 from dav_gswt.raster import render
 from dav_gswt.templates import render_template
@@ -31,7 +32,6 @@ MARGIN = 0.14  # around everything on the map, as a share of the longer side
 LOW = 0.5  # flying heights: anything higher would hide the ground on the map
 BLANK = 0.8  # grey where nothing is known
 CLOSE, TURNED = 0.2, 15  # flying heights, degrees: a photo nearer than this to its pose is always assigned to it
-COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 ON_MAP = ("top", "upper right", "right", "lower right", "bottom", "lower left", "left", "upper left")
 HERE = 0.05  # flying heights: shorter walks are not mentioned
 STEEP = 80.0  # degrees below the horizon from which a camera counts as looking straight down
@@ -69,7 +69,7 @@ class Ruler:
     def format_direction(self, direction: Float[Array, "d"]) -> str:
         """A compass direction, or a direction on the map if north is not known."""
         if self.place:
-            return COMPASS[round(self.place.azimuth(direction) / 45) % 8]
+            return name_direction(self.place.azimuth(direction))
         return f"the {ON_MAP[round(np.degrees(np.arctan2(direction[0], direction[1])) / 45) % 8]} of the map"
 
 

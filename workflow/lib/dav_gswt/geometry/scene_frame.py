@@ -11,6 +11,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_record, write_json
 from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.geometry.sun import CapturedSun
 
 
 @dataclass(frozen=True)
@@ -121,8 +122,8 @@ class SceneFrame:
     flying_height: median height of the cameras, in world units. exemplar: the square that tiles are made of. extent: of
     all ground that photos see. test, test_groups: names of photos that only test; None where the scene names none.
     relief: spread of the points about the plane, in flying heights. focal_ratio: the used focal length over EXIF's.
-    reprojection_error: mean, pixels. points: of the sparse model. verdict: on structure from motion. gaussians,
-    removed, source: of an imported field. renderer: versions of a synthetic scene's renderer.
+    reprojection_error: mean, pixels. points: of the sparse model. verdict: on structure from motion. sun: by EXIF, where
+    time and place are known. gaussians, removed, source: of an imported field. renderer: versions of a synthetic scene's renderer.
     """
 
     kind: Literal["photos", "synthetic", "field"]
@@ -142,6 +143,7 @@ class SceneFrame:
     reprojection_error: float | None = None
     points: int | None = None
     verdict: SfmVerdict | None = None
+    sun: CapturedSun | None = None
     gaussians: int | None = None
     removed: int | None = None
     source: SourceFrame | None = None

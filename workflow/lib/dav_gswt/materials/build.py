@@ -20,6 +20,7 @@ from dav_gswt.materials.filling import fill_cells
 from dav_gswt.materials.left_out import LeftOut
 from dav_gswt.materials.maps import HALF, GroundMaps, measure_ground, read_masks, resample, unite
 from dav_gswt.materials.model import MaterialInfo
+from dav_gswt.materials.shading import Sun
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import compose, energy, layout, patches, texture
 from dav_gswt.tiles.layout import Exemplar
@@ -180,10 +181,10 @@ def plan_ground(maps: GroundMaps, layered: bool, mask_files: Mapping[str, Path |
         _log.info("left out: %s", phrase)
     sources = [_ignore_scarce(classes, k) for k in range(classes.number)]
     if all(source.all() for source in sources) and masks is None:
-        return _plan_whole(maps)
+        return _plan_whole(maps, classes.sun)
     if not any(source.any() for source in sources):
         _warn_of_nothing()
-        return _plan_whole(maps)
+        return _plan_whole(maps, classes.sun)
     return GroundPlan(maps, classes, sources, choose_tile_side(maps, sources), left_out=lost)
 
 
@@ -191,10 +192,10 @@ def _warn_of_nothing() -> None:
     _log.warning("materials: nothing is left to tile (shade, objects or cut off): all of the ground is tiled as one")
 
 
-def _plan_whole(maps: GroundMaps) -> GroundPlan:
+def _plan_whole(maps: GroundMaps, sun: Sun | None = None) -> GroundPlan:
     """All of the ground as one material."""
     everything, nothing = np.ones(maps.known.shape, bool), np.zeros(maps.known.shape, bool)
-    classes = GroundClasses(nothing.astype(int), nothing.astype(int), [], nothing, ["material0"])
+    classes = GroundClasses(nothing.astype(int), nothing.astype(int), [], nothing, ["material0"], sun)
     return GroundPlan(maps, classes, [everything], choose_tile_side(maps, [everything]), True)
 
 
@@ -220,7 +221,7 @@ def find_materials(
         kept |= {} if made is None else {k: made}
     if not kept:
         _warn_of_nothing()
-        return _keep_whole(field, grid, _plan_whole(plan.maps), focused)
+        return _keep_whole(field, grid, _plan_whole(plan.maps, plan.classes.sun), focused)
     total = sum(each.info.share for each in kept.values())
     materials = [replace(each, info=replace(each.info, share=each.info.share / total)) for each in kept.values()]
     objects = _extract_objects(plan, field, grid, {k: place for place, k in enumerate(kept)}, focused)

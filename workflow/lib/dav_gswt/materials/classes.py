@@ -37,6 +37,7 @@ class GroundClasses:
         kinds: what every cell is: its material's number, also of small pieces within another material,
             which are excluded there; from `number` on each strip (a path, a road).
         names: of the materials.
+        sun: in which the ground lay; None: not known.
     """
 
     materials: Int[Array, "m m"]
@@ -44,6 +45,7 @@ class GroundClasses:
     footprints: list[Footprint]
     excluded: Bool[Array, "m m"]
     names: list[str]
+    sun: shading.Sun | None = None
 
     @property
     def number(self) -> int:
@@ -78,7 +80,8 @@ def classify_ground(
     relief: what stands or is sunk: excluded, and it makes no class common or wide.
     """
     sun = None if masks and masks.materials else shading.fit_sun(maps)  # shade that is named is kept
-    maps = maps if sun is None else shading.even_light(maps, sun)
+    if sun and sun.explained >= shading.LEAST_EXPLAINED:
+        maps = shading.even_light(maps, sun)
     relief = np.zeros_like(maps.known) if relief is None else relief
     features = segmentation.describe_cells(maps.colour)
     if masks and masks.materials:
@@ -96,9 +99,9 @@ def classify_ground(
         kinds[strip] = len(ground.chosen) + place
     taken = unite([each.cells for each in footprints], known.shape) | excluded | around.strips
     if masks is None and around.rough == {0} and len(ground.chosen) == 1 and taken.mean() < LITTLE:
-        return GroundClasses(around.materials, kinds, [], ~maps.known | relief, ground.names)
+        return GroundClasses(around.materials, kinds, [], ~maps.known | relief, ground.names, sun)
     wide = _widen(excluded & maps.known | around.strips | relief, footprints) | ~maps.known
-    return GroundClasses(around.materials, kinds, footprints, wide, ground.names)
+    return GroundClasses(around.materials, kinds, footprints, wide, ground.names, sun)
 
 
 @dataclass(frozen=True)

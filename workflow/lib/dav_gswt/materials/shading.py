@@ -26,6 +26,7 @@ FITTED = 64  # cells along a side, at most, that the sun is fitted on
 AZIMUTHS, HEIGHTS = range(0, 360, 10), range(10, 71, 5)  # degrees, of the suns that are tried
 SHARES = np.linspace(0.05, 0.95, 10)  # of the light of level ground, that are tried for what is no sun's
 LEAST_EXPLAINED = 0.4  # of the variance of brightness: with less (desert .26), shadows of plants became objects
+LEAST_TOLD = 0.1  # of it, that tells where the sun stood
 SHADE = 0.5  # of the light of level ground: less is shade that no tile can show, where it is wide
 WIDE = 1 / 30  # of the side: narrower shade is texture, as that of ripples
 LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -51,6 +52,16 @@ class Sun:
         """What the sun adds where it stands straight above the surface."""
         return (1 - self.ambient) / self.direction[2]
 
+    @property
+    def elevation(self) -> float:
+        """Degrees above the horizon."""
+        return float(np.degrees(np.arcsin(np.clip(self.direction[2], -1, 1))))
+
+    @property
+    def azimuth(self) -> float:
+        """Degrees clockwise from the world's +y."""
+        return float(np.degrees(np.arctan2(self.direction[0], self.direction[1])) % 360)
+
     def shade(self, normals: Float[Array, "*shape 3"]) -> Float[Array, "*shape 3"]:
         """Light of ground with these normals."""
         return self.ambient + np.maximum(0, normals @ self.direction)[..., None] * self.direct
@@ -67,7 +78,7 @@ def even_light(maps: GroundMaps, sun: Sun) -> GroundMaps:
 
 
 def fit_sun(maps: GroundMaps) -> Sun | None:
-    """The sun that explains most of the brightness, of many tried; None where none explains much."""
+    """The sun that explains most of the brightness, of many tried; None where none explains LEAST_TOLD."""
     block = -(-maps.cells // FITTED)
     light = gaussian_filter(decode_srgb(maps.colour), (RELIEF * maps.cells, RELIEF * maps.cells, 0))
     normals, light = _average(measure_normals(maps), block), _average(light, block)
@@ -79,7 +90,7 @@ def fit_sun(maps: GroundMaps) -> Sun | None:
 
     best = max(product(list_directions(), SHARES), key=lambda each: explain(*each, seen[0]))
     explained = explain(*best, seen[0])
-    if explained < LEAST_EXPLAINED:
+    if explained < LEAST_TOLD:
         return None
     _log.info("light: relief in the sun explains %.0f %% of the ground's brightness", 100 * explained)
     ambient = [max(SHARES, key=lambda share: explain(best[0], share, values)) for values in seen[1:]]

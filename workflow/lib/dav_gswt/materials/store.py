@@ -48,6 +48,15 @@ class ObjectRecord:
 
 
 @dataclass(frozen=True)
+class SunRecord:
+    """The sun that the ground's relief tells, in materials.json: see `shading.Sun`."""
+
+    elevation: float
+    azimuth: float
+    explained: float
+
+
+@dataclass(frozen=True)
 class MaterialsReport:
     """materials.json.
 
@@ -58,6 +67,7 @@ class MaterialsReport:
         materials, objects: by number.
         left_out: what stands or is sunk, is cut off, or was seen from above only, and is shown nowhere.
         provenance: of the files that they were made from.
+        sun: that shines on them; None: not known.
     """
 
     verdict: MaterialVerdict
@@ -67,6 +77,7 @@ class MaterialsReport:
     objects: list[ObjectRecord]
     left_out: list[LeftOut]
     provenance: dict[str, Any]
+    sun: SunRecord | None = None
 
 
 def write_materials(found: FoundMaterials, folder: Path | str, provenance: dict[str, Any]) -> None:
@@ -77,7 +88,7 @@ def write_materials(found: FoundMaterials, folder: Path | str, provenance: dict[
             ground.write_ground(material.grid, part / f"material{number}.exr")
         for each in found.objects:
             write_field(each.field, part / f"{each.name}.ply")
-        classes, place = found.classes, found.maps.exemplar
+        classes, place, sun = found.classes, found.maps.exemplar, found.classes.sun
         numbers = sum((k * each.cells for k, each in enumerate(classes.footprints, 1)), np.zeros(classes.kinds.shape))
         layers = {"material": classes.materials, "kind": classes.kinds, "object": numbers, "excluded": classes.excluded}
         header = {name: repr(getattr(place, name)) for name in ("west", "south", "spacing")}
@@ -93,6 +104,7 @@ def write_materials(found: FoundMaterials, folder: Path | str, provenance: dict[
             [ObjectRecord(each.name, each.material, each.radius, each.height, each.density) for each in found.objects],
             list(found.left_out),
             provenance,
+            sun and SunRecord(round(sun.elevation, 2), round(sun.azimuth, 2) % 360, round(sun.explained, 3)),
         )
         write_json(part / NAME, asdict(report))
 

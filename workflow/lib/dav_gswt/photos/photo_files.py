@@ -5,7 +5,8 @@ import math
 import re
 from collections import Counter
 from collections.abc import Sequence
-from datetime import datetime
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from pathlib import Path, PurePosixPath
 
@@ -13,6 +14,7 @@ import exifread
 import numpy as np
 from exifread.utils import Ratio
 
+from dav_gswt.geometry.sun import Clock
 from dav_gswt.images import image_files
 from dav_gswt.images.camera_formats import read_heif_exif
 from dav_gswt.images.file_kinds import HEIF_SUFFIXES, RAW_SUFFIXES, SUFFIXES, detect_kind
@@ -22,6 +24,8 @@ logging.getLogger("exifread").setLevel(logging.ERROR)  # it warns of every pictu
 FILM_DIAGONAL = 43.2666  # mm, of a 36 x 24 mm frame: "35 mm equivalent" compares diagonals
 WIDEST = 1.55  # photos wider than a 3:2 sensor are cropped from a 4:3 sensor, whose diagonal the equivalent refers to
 UNITS = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # FocalPlaneResolutionUnit in millimetres
+EXIF_TIME = "%Y:%m:%d %H:%M:%S"
+FIRST_YEAR = 1990  # of photos whose time is believed: cameras without a clock say 1970 or 1980
 UNSAFE = re.compile(
     r"[\s#{}<>]+"
 )  # COLMAP's lists end a name at a blank and skip lines with #; Snakemake has {} and <>
@@ -93,9 +97,44 @@ def read_gps_position(path: Path | str) -> tuple[float, float, float] | None:
 
 def read_capture_time(path: Path | str) -> str | None:
     """When the photo was taken, ISO 8601 without a time zone, or None where EXIF does not say."""
+    local = _read_time(_read_tags(path), "EXIF DateTimeOriginal", EXIF_TIME)
+    return local.isoformat() if local else None
+
+
+@dataclass(frozen=True)
+class PhotoTime:
+    """When a photo was taken, UTC, and how that is known: see `geometry.sun.CapturedSun`."""
+
+    utc: datetime
+    clock: Clock
+    zone: float
+
+
+def read_utc_time(path: Path | str, longitude: float) -> PhotoTime | None:
+    """When the photo was taken; None where EXIF does not say, or a year before FIRST_YEAR.
+
+    GPS has UTC. Else EXIF has local time; where it names no zone, that of the longitude is assumed. Daylight saving is
+    not known.
+    """
+    tags = _read_tags(path)
+    date, clock = _read_time(tags, "GPS GPSDate", "%Y:%m:%d"), _read_numbers(tags, "GPS GPSTimeStamp")
+    local, zone = _read_time(tags, "EXIF DateTimeOriginal", EXIF_TIME), 0.0
+    if date and len(clock) == 3 and 0 <= (seconds := np.dot(clock, [3600, 60, 1])) < 86400:
+        utc, known = date + timedelta(seconds=float(seconds)), "gps"
+    elif local is None or local.year < FIRST_YEAR:
+        return None
+    else:
+        offset = _read_time(tags, "EXIF OffsetTimeOriginal", "%z")
+        zone = offset.utcoffset() / timedelta(hours=1) if offset else float(round(longitude / 15))
+        utc, known = local - timedelta(hours=zone), "offset" if offset else "assumed"
+    return PhotoTime(utc.replace(tzinfo=UTC), known, zone) if utc.year >= FIRST_YEAR else None
+
+
+def _read_time(tags: dict, name: str, form: str) -> datetime | None:
+    """A tag with a date or time of this form; None without one."""
     try:
-        return datetime.strptime(str(_read_tags(path)["EXIF DateTimeOriginal"]), "%Y:%m:%d %H:%M:%S").isoformat()
-    except (KeyError, ValueError):
+        return datetime.strptime(str(tags.get(name)), form)
+    except ValueError:
         return None
 
 

@@ -18,6 +18,7 @@ from dav_gswt.geometry.scene_frame import LeftOutPhoto, SceneFrame, write_scene_
 from dav_gswt.images import image_files
 from dav_gswt.images.file_kinds import detect_kind
 from dav_gswt.logs import progress
+from dav_gswt.photos.captured_sun import find_sun
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model, splat
@@ -62,6 +63,7 @@ def prepare_photos(
         reprojection_error=found.error,
         points=len(model.points),
         verdict=found.verdict,
+        sun=find_sun(found.sources, frame.georeference) if frame.georeference else None,
     )
     known = PhotoMasks(covers, find_borders(found.sources))
     numbers, masked = progress(range(len(model.names)), "undistort photos"), Counter[str]()

@@ -101,6 +101,8 @@ def _list_facts(frame: SceneFrame, model: ColmapModel) -> list[tuple[str, str]]:
         facts.append(("Focal length", ratio + frame.focal.decision))
     if frame.georeference:
         facts.append(("Place", f"{frame.georeference.latitude:.6f}, {frame.georeference.longitude:.6f}"))
+    if frame.sun:
+        facts.append(("Light", frame.sun.describe()))
     return facts
 
 
