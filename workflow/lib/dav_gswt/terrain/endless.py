@@ -37,8 +37,8 @@ class EndlessTerrain:
     material's tiles. near: distance of the near plane. reach: distance to the last tiles, in tile sides; beyond it the
     ground has the terrain's mean colour. classes: which material lies where; None with one. objects:
     objects[number][level], about the foot. extents: of each object, the largest distance of a Gaussian's rim from the
-    foot. scatter: where they stand; None without objects. variation: of colours, not on a sphere; None: none. light: of sun and sky
-    around an eye; None: as captured.
+    foot. scatter: where they stand; None without objects. variation: of colours, not on a sphere; None: none. light: of
+    sun and sky around an eye; None: as captured.
     """
 
     tiles: dict[tuple[int, int], GaussianField]
