@@ -17,7 +17,7 @@ const STEPS = 40, FARTHEST = 64; // samples towards the sun, and the distance of
 const BORDER = 16; // points along the edge of the grid over which shadows end
 const MOST = 2; // of a margin
 const SOFT = 0.02; // half the width of a shadow's edge, as a change of the sun's elevation in radians
-const STEEPEST = 89; // elevation, of which the tangent is taken
+const STEEPEST = 80; // elevation, of which the tangent is taken: above, the most of a margin would be no whole sun
 const PAD = FARTHEST + 1, WIDE = SIZE + 2 * PAD; // the heights repeat beyond the edge of the grid
 
 /** @param {Sun} sun */
