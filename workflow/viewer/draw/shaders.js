@@ -6,6 +6,7 @@ import {
 import { MAX_TURN, TURN_STEPS } from "../data/layout.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import { FACES } from "../terrain/sphere.js";
+import { lightCode, lightPaint } from "./lighting.js";
 import { OBJECTS, OVERLAYS } from "./overlays.js";
 
 const AIR = 0.12; // height at which the sky of a planet is 1/e as bright, in radii
@@ -237,8 +238,9 @@ const PLACE_ON_SPHERE = `
 /**
  * @param {import("../terrain/heights.js").HeightField["kind"]} kind
  * @param {import("../terrain/variation.js").Variation | null} varied
+ * @param {boolean} lit
  */
-export const vertexShader = (kind, varied) => `#version 300 es
+export const vertexShader = (kind, varied, lit) => `#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2D;
@@ -259,7 +261,7 @@ ${DECODE}
 ${kind === "sphere" ? SPHERE_BACKDROP : BACKDROP}
 ${kind === "hills" || varied ? HASH : ""}
 ${kind === "sphere" ? SPHERE : SURFACES[kind]}
-${varied ? variationCode(varied.waves.length, varied.waves[0].colours.length) : ""}
+${varied ? variationCode(varied.waves.length, varied.waves[0].colours.length) : ""}${lit ? lightCode(kind) : ""}
 mat3 rotation(vec4 q) { // of length 1
   float w = q.x, x = q.y, y = q.z, z = q.w;
   return mat3(
@@ -317,7 +319,7 @@ ${kind === "sphere" ? "    axes[k] = bent * axes[k];" : SHEAR}
   at = (vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) * 2.0 - 1.0) * reach;
   vec2 pixel = focal * p.xy / p.z + at.x * lengths.x * major + at.y * lengths.y * vec2(-major.y, major.x);
   ${kind === "sphere" ? SPHERE_GOING : PLANE_GOING}
-${varied ? VARY : ""}
+${varied ? VARY : ""}${lit ? `\n${lightPaint(kind)}` : ""}
   vec3 paint = mix(one.paint.rgb, backdrop(${kind === "sphere" ? "seen / distance" : "seen.z / distance"}), going * going * (3.0 - 2.0 * going));
   if (overlay > 0) {
     uint owner = texelFetch(owners, ivec2(0, int(row / ${ROW}u)), 0).x;
