@@ -2,7 +2,7 @@
 // colours as dav_gswt/terrain/backdrop.py.
 
 import { createProgram, setAxes } from "./gl.js";
-import { BACKDROP, SPHERE_BACKDROP } from "./shaders.js";
+import { backdropCode } from "./shaders.js";
 
 /**
  * @typedef {import("../terrain/camera.js").Camera} Camera
@@ -16,14 +16,14 @@ void main() {
   gl_Position = vec4(at, 0.0, 1.0);
 }`;
 
-/** @param {boolean} round is the ground a sphere? */
-const fragmentShader = (round) => `#version 300 es
+/** @param {import("../terrain/heights.js").HeightField["kind"]} kind @param {boolean} round is the ground a sphere? */
+const fragmentShader = (kind, round) => `#version 300 es
 precision highp float;
 in vec2 at;
 out vec4 colour;
 uniform vec3 right, up, ahead, sun, sunColour; // sun: its direction; of length 0: none
 uniform vec2 halfTangent; // tangents of half the field of view
-${round ? SPHERE_BACKDROP : BACKDROP}
+${backdropCode(kind)}
 void main() {
   vec3 ray = normalize(ahead + at.x * halfTangent.x * right + at.y * halfTangent.y * up);
   vec3 seen = backdrop(${round ? "ray" : "ray.z"});
@@ -35,7 +35,7 @@ void main() {
 /** @param {import("./gl.js").GL} gl @param {import("../data/manifest.js").Manifest} manifest */
 export function createSky(gl, { sky, ground_colour: ground, heights }) {
   const sphere = heights?.kind === "sphere" ? heights : null, empty = gl.createVertexArray();
-  const { use, uniforms } = createProgram(gl, VERTEX, fragmentShader(sphere !== null));
+  const { use, uniforms } = createProgram(gl, VERTEX, fragmentShader(heights?.kind ?? "flat", sphere !== null));
   const long = sky.sun ? Math.hypot(...sky.sun.direction) : 1;
   return {
     /**
