@@ -13,26 +13,30 @@ import { createTexture } from "./gl.js";
 const LEVEL_CODE = `
 uniform vec3 levelLight;`;
 
-const SLOPE_CODE = `
+/** What sRGB colours of ground are multiplied by. share: of the sun that it sees. @param {boolean} lit */
+export const shineCode = (lit) => (!lit ? "vec3 shineOn(vec2 slope, float share) { return vec3(1.0); }" : `
 uniform vec3 toSun, direct, ambient;
+vec3 shineOn(vec2 slope, float share) {
+  float n = inversesqrt(1.0 + dot(slope, slope)), lambert = max((toSun.z - dot(toSun.xy, slope)) * n, 0.0);
+  vec3 ratio = min(direct * (lambert * share) + ambient * (0.5 + 0.5 * n), ${MOST.toFixed(1)});
+  return pow(ratio, vec3(${1 / GAMMA}));
+}`);
+
+const SHADOW_CODE = `
 uniform highp sampler2D shadows; // margins of terrain/shadows.js
 uniform vec2 shadowUnder;        // the eye in that texture
 uniform float shadowScale, soft; // of places seen from the eye; margin at which the sun is whole
 float sunShare(vec2 at) {
   return clamp(0.5 + textureLod(shadows, shadowUnder + at * shadowScale, 0.0).r / (2.0 * soft), 0.0, 1.0);
-}
-vec3 lit(vec3 colour, vec2 slope, float share) { // an sRGB colour on ground of this slope; share: of the sun that it sees
-  float n = inversesqrt(1.0 + dot(slope, slope)), lambert = max((toSun.z - dot(toSun.xy, slope)) * n, 0.0);
-  vec3 ratio = min(direct * (lambert * share) + ambient * (0.5 + 0.5 * n), ${MOST.toFixed(1)});
-  return clamp(colour * pow(ratio, vec3(${1 / GAMMA})), 0.0, 1.0);
 }`;
 
 /** What a vertex shader declares, by the kind of its surface. @param {string} kind */
-export const lightCode = (kind) => (kind === "flat" ? LEVEL_CODE : SLOPE_CODE);
+export const lightCode = (kind) => (kind === "flat" ? LEVEL_CODE : SHADOW_CODE);
 
 /** Change of a Gaussian's colour; objects are upright, and lit as level ground at their foot. @param {string} kind */
 export const lightPaint = (kind) => (kind === "flat" ? "  one.paint.rgb = clamp(one.paint.rgb * levelLight, 0.0, 1.0);"
-  : `  one.paint.rgb = lit(one.paint.rgb, place > 0u ? vec2(0.0) : rise.yz, sunShare(place > 0u ? cell * side + corner.xy : seen.xy));`);
+  : `  shine = shineOn(place > 0u ? vec2(0.0) : rise.yz, sunShare(place > 0u ? cell * side + corner.xy : seen.xy));
+  one.paint.rgb = clamp(one.paint.rgb * shine, 0.0, 1.0);`);
 
 /** Glow of the sky about the sun, see terrain/light.py. */
 export const GLOW = `
@@ -47,7 +51,7 @@ export const GLOW = `
 export function setLight(gl, uniforms, { sky, ground_colour: ground }, light) {
   gl.uniform3fv(uniforms.zenith, light?.zenith ?? sky.zenith);
   gl.uniform3fv(uniforms.horizon, light?.horizon ?? sky.horizon);
-  gl.uniform3fv(uniforms.ground, light?.ground ?? ground);
+  gl.uniform3fv(uniforms.ground, light && !uniforms.toSun ? light.ground : ground); // on hills the shader lights it
   if (!light) return;
   gl.uniform3fv(uniforms.levelLight, light.level);
   gl.uniform3fv(uniforms.toSun, light.sun.direction);

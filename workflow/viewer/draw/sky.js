@@ -3,7 +3,7 @@
 
 import { createProgram, setAxes } from "./gl.js";
 import { GLOW, setLight } from "./lighting.js";
-import { BACKDROP, SPHERE_BACKDROP } from "./shaders.js";
+import { backdropCode } from "./shaders.js";
 
 /**
  * @typedef {import("../terrain/camera.js").Camera} Camera
@@ -17,27 +17,28 @@ void main() {
   gl_Position = vec4(at, 0.0, 1.0);
 }`;
 
-/** @param {boolean} round is the ground a sphere? @param {boolean} [lit] below a sun that moves? */
-const fragmentShader = (round, lit = false) => `#version 300 es
+/** @param {import("../terrain/heights.js").HeightField["kind"]} kind @param {boolean} [lit] below a sun that moves? */
+const fragmentShader = (kind, lit = false) => `#version 300 es
 precision highp float;
 in vec2 at;
 out vec4 colour;
 uniform vec3 right, up, ahead, sun, sunColour; // sun: its direction; of length 0: none
 uniform vec2 halfTangent; // tangents of half the field of view
-${round ? SPHERE_BACKDROP : BACKDROP}
+${backdropCode(kind, lit)}
 void main() {
   vec3 ray = normalize(ahead + at.x * halfTangent.x * right + at.y * halfTangent.y * up);
-  vec3 seen = backdrop(${round ? "ray" : "ray.z"});
+  vec3 seen = backdrop(${kind === "sphere" ? "ray" : "ray.z"});
   float close = dot(ray, sun);${lit ? GLOW : ""}
-  float disc = ${round ? "dot(ray, upward) + dip" : "ray.z"} > 0.0 ? smoothstep(0.99988, 0.99996, close) + 0.25 * pow(max(close, 0.0), 350.0) : 0.0;
+  float disc = ${kind === "sphere" ? "dot(ray, upward) + dip" : "ray.z"} > 0.0 ? smoothstep(0.99988, 0.99996, close) + 0.25 * pow(max(close, 0.0), 350.0) : 0.0;
   colour = vec4(mix(seen, sunColour, clamp(disc, 0.0, 1.0)), 1.0);
 }`;
 
 /** @param {import("./gl.js").GL} gl @param {import("../data/manifest.js").Manifest} manifest */
 export function createSky(gl, manifest) {
-  const { sky, heights } = manifest, sphere = heights?.kind === "sphere" ? heights : null, empty = gl.createVertexArray();
-  const plain = createProgram(gl, VERTEX, fragmentShader(sphere !== null));
-  const sunny = manifest.light && !sphere ? createProgram(gl, VERTEX, fragmentShader(false, true)) : plain;
+  const { sky, heights } = manifest, kind = heights?.kind ?? "flat", empty = gl.createVertexArray();
+  const sphere = heights?.kind === "sphere" ? heights : null;
+  const plain = createProgram(gl, VERTEX, fragmentShader(kind));
+  const sunny = manifest.light && !sphere ? createProgram(gl, VERTEX, fragmentShader(kind, true)) : plain;
   const long = sky.sun ? Math.hypot(...sky.sun.direction) : 1;
   return {
     /**

@@ -5,13 +5,14 @@ import { PageError } from "../data/checks.js";
 import {
   BLOCK, MAX_LEVELS, NEAR, orderPages, PAGE, PAGES_A_ROW, PLACE, PLACES_A_ROW, recordRows, ROW,
 } from "../data/layout.js";
+import { REACH } from "../terrain/cells.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import { rateOf } from "../terrain/sphere.js";
 import { createVariation, VARIATION } from "../terrain/variation.js";
 import { createProgram, createTexture, setAxes } from "./gl.js";
 import { createShadowTexture, setLight } from "./lighting.js";
 import { OBJECTS, overlayColours } from "./overlays.js";
-import { FRAGMENT, vertexShader } from "./shaders.js";
+import { FAR_HAZE, FRAGMENT, vertexShader } from "./shaders.js";
 import { setHorizon } from "./sky.js";
 
 /**
@@ -32,7 +33,8 @@ const FULL = "The terrain does not fit into this machine's graphics memory. Clos
   + "tiles or fewer variants, or open it on a larger machine.";
 const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
 const QUADS = Uint16Array.from({ length: 6 * PAGE }, (_, k) => 4 * Math.floor(k / 6) + [0, 1, 2, 2, 1, 3][k % 6]);
-const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3, PLACES = 4, OWNERS = 5, SHADOWS = 6; // texture units
+export const RELIEF = 2;
+const RECORDS = 0, ENTRIES = 1, HUES = 3, PLACES = 4, OWNERS = 5, SHADOWS = 6; // texture units
 
 /** @param {GL} gl @param {Manifest} manifest @param {HeightField} heights */
 export function createSplats(gl, manifest, heights) {
@@ -178,6 +180,7 @@ export function createSplats(gl, manifest, heights) {
       gl.bindVertexArray(null);
     },
 
+    relief,
     /** Free the textures. */
     end() {
       for (const texture of [records, entries, nearEntries, places, hues, owners, relief, shadows?.texture ?? null]) gl.deleteTexture(texture);
@@ -204,12 +207,22 @@ function setConstants(gl, uniforms, manifest, heights) {
   gl.uniform1i(uniforms.levels, manifest.levels.length);
   gl.uniform1f(uniforms.side, manifest.tile_side);
   gl.uniform1f(uniforms.near, NEAR * manifest.eye_floor);
+  gl.uniform1f(uniforms.haze, hazeOf(manifest.tile_side));
   if (heights.kind === "sphere") {
     const rate = rateOf(heights, manifest.tile_side);
     gl.uniform1f(uniforms.radius, heights.radius);
     gl.uniform1f(uniforms.rate, rate);
     gl.uniform1f(uniforms.stretch, heights.radius * rate);
-  } else if (heights.kind === "hills") {
+  }
+  setSurface(gl, uniforms, heights);
+}
+
+/** @param {number} side of a tile */
+export const hazeOf = (side) => 1 / (FAR_HAZE * REACH * side);
+
+/** @param {GL} gl @param {Uniforms} uniforms @param {HeightField} heights */
+export function setSurface(gl, uniforms, heights) {
+  if (heights.kind === "hills") {
     gl.uniform1i(uniforms.octaves, heights.amplitudes.length);
     gl.uniform1ui(uniforms.salt, heights.salt);
     gl.uniform1fv(uniforms["amplitude[0]"], padded(heights.amplitudes, MAX_OCTAVES));
@@ -238,11 +251,18 @@ function setView(gl, uniforms, heights, side, camera, { i0, j0, eye, switches, b
   if (heights.kind === "sphere") {
     setHorizon(gl, uniforms, heights, camera.eye);
     gl.uniform3fv(uniforms.moved, eye.map((v, k) => v - camera.eye[k]));
-  } else if (heights.kind !== "flat") {
-    const { cells, places } = heights.under(x, y);
-    gl.uniform2iv(uniforms["cellUnder[0]"], cells);
-    gl.uniform2fv(uniforms["placeUnder[0]"], places);
-  }
+  } else setUnder(gl, uniforms, heights, camera.eye);
+}
+
+/**
+ * @param {GL} gl @param {Uniforms} uniforms @param {Exclude<HeightField, import("../terrain/sphere.js").Sphere>} heights
+ * @param {number[]} eye
+ */
+export function setUnder(gl, uniforms, heights, [x, y]) {
+  if (heights.kind === "flat") return;
+  const { cells, places } = heights.under(x, y);
+  gl.uniform2iv(uniforms["cellUnder[0]"], cells);
+  gl.uniform2fv(uniforms["placeUnder[0]"], places);
 }
 
 /** @param {GL} gl @param {Uniforms} uniforms @param {Variation} variation */

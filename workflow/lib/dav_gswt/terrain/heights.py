@@ -62,6 +62,10 @@ class HeightField:
         """h and its derivatives by x and y at points of the world."""
         return np.zeros(len(x)), np.zeros((len(x), 2))
 
+    def smooth_at(self, x: Floats, y: Floats, spacing: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
+        """`at` without detail that points at this spacing cannot show, where the surface can leave that out."""
+        return self.at(x, y)
+
     @classmethod
     def from_config(cls, entry: Mapping[str, Any], side: float, eye: float = 0.0) -> "HeightField":
         """The surface of the config's `heights`; see `surface_from_config`. Raises: InputError: it cannot be made."""
@@ -122,15 +126,20 @@ class Hills(HeightField, kind="hills"):
         return -self.height, self.height, STEEPEST * rise / self.wavelength
 
     def at(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
+        return self.smooth_at(x, y, np.zeros(1))
+
+    def smooth_at(self, x: Floats, y: Floats, spacing: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
+        """An octave has its full height up to four points a cell, and none below two."""
         octaves = np.arange(self.octaves)[:, None]
         cells = 2.0**octaves / self.wavelength
         noise, gradient = gradient_noise(
             x * cells + octaves * SHIFT[0], y * cells + octaves * SHIFT[1], HILLS + octaves, self.salt
         )
         height, slope = np.zeros(len(x)), np.zeros((len(x), 2))
+        kept = np.clip(2 - 4 * spacing * cells, 0, 1)
         for octave, amplitude in enumerate(self._amplitudes()):
-            height += amplitude * noise[octave]
-            slope += amplitude * cells[octave] * gradient[octave]
+            height += kept[octave] * (amplitude * noise[octave])
+            slope += kept[octave][:, None] * (amplitude * cells[octave] * gradient[octave])
         return height, slope
 
     def _amplitudes(self) -> list[float]:

@@ -31,7 +31,7 @@ STEPS, FARTHEST = 40, 64.0  # samples towards the sun, and the distance of the l
 BORDER = 16  # points along the edge of the grid over which shadows end
 MOST_MARGIN = 2.0
 SOFT = 0.02  # half the width of a shadow's edge, as a change of the sun's elevation in radians
-STEEPEST = 89.0  # elevation, of which the tangent is taken
+STEEPEST = 80.0  # elevation, of which the tangent is taken: above, MOST_MARGIN would be no whole sun
 GLOW, GLOW_WIDTH = 0.35, 6  # brightness of the sky about a sun at the horizon, and the exponent of its cosine
 HAZE = 0.1  # share of the sun's beam in the light of the horizon
 
@@ -151,7 +151,7 @@ class PlacedLight:
         return np.clip(0.5 + margin / (2 * SOFT * (1 + tangent * tangent)), 0, 1)
 
 
-def relight(colours: Float[Array, "*n 3"], ratio: Float[Array, "*n 3"]) -> Float[Array, "*n 3"]:
+def relight(colours: Float[Array, "*#n 3"], ratio: Float[Array, "*n 3"]) -> Float[Array, "*n 3"]:
     """sRGB colours in the light of a ratio."""
     return np.clip(colours * ratio ** (1 / GAMMA), 0, 1)
 

@@ -119,7 +119,7 @@ def render_view(
             field, slope = place_on_sphere(terrain, sphere, cells[k : k + 1], eye)
         else:
             field, slope = place_cell(terrain, cells[k : k + 1], eye, things.get(k))
-        return splats.project(backdrop.blend_far(field), slope, here, terrain.near)[0]
+        return splats.project(backdrop.blend_far(field, slope), slope, here, terrain.near)[0]
 
     far, close = [splats.EMPTY], [splats.EMPTY]
     with ThreadPoolExecutor(default_threads()) as pool:  # NumPy works beside itself; each cell is on its own
