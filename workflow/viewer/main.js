@@ -77,6 +77,7 @@ async function start() {
     },
     onPicture() {
       paint.brush.draw();
+      paint.drawObjects();
       map?.draw();
       if (viewer.scene) firstView.note(viewer.scene.walker, viewer.overlay > 0 || (viewer.scene.light?.chosen ?? null) !== null);
     },
