@@ -23,6 +23,8 @@ rule make_page:
     params:
         heights=lookup(dpath="heights", within=config),
         classes=lookup(dpath="classes", within=config),
+        sun=lookup(dpath="sun", within=config),
+        wind=lookup(dpath="wind", within=config),
         source=code_of("make_page"),
     script:
         "../scripts/make_page.py"
@@ -53,6 +55,7 @@ rule render_terrain:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
         classes=lookup(dpath="classes", within=config),
+        sun=lookup(dpath="sun", within=config),
         source=code_of("render_terrain"),
     script:
         "../scripts/render_terrain.py"

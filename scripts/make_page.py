@@ -8,7 +8,9 @@ from dav_gswt.terrain import heights, page, page_story
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    surface = heights.surface_from_config(params.heights, read_json(given.manifest)["tile_side"])
+    manifest = read_json(given.manifest)
+    surface = heights.surface_from_config(params.heights, manifest["tile_side"], manifest["eye_floor"])
     front = page.front_of_scene(snakemake.wildcards.scene, page_story.tell_story(given), given.still)
     viewer = next(Path(path).parent for path in given.viewer if Path(path).name == page.INDEX)
-    page.write_page(Path(given.manifest).parent, viewer, snakemake.output.page, surface, params.classes, front)
+    bundle, out = Path(given.manifest).parent, snakemake.output.page
+    page.write_page(bundle, viewer, out, surface, params.classes, front, params.sun, params.wind)

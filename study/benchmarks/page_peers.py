@@ -199,8 +199,8 @@ def collect_view(terrain: endless.EndlessTerrain, camera, manifest):
     cells, eye = visibility.visible_cells(terrain, camera), camera.centre
     things = group_by_cell(terrain, cells, eye)
     backdrop = Backdrop.for_eye(terrain, eye, manifest.sky, manifest.ground_colour)
-    placed = (place_cell(terrain, cells[k : k + 1], eye, things.get(k))[0] for k in range(len(cells)))
-    return concatenate_fields([backdrop.blend_far(field) for field in placed])
+    placed = (place_cell(terrain, cells[k : k + 1], eye, things.get(k)) for k in range(len(cells)))
+    return concatenate_fields([backdrop.blend_far(field, slope) for field, slope in placed])
 
 
 def look(yaw: float, pitch: float) -> list[float]:

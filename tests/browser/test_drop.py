@@ -67,6 +67,7 @@ def changed(folder, where: str, value) -> bytes:
 
 HILLS = dict(kind="hills", height=1.0, wavelength=9.0, octaves=3, salt=5)
 RELIEF = dict(kind="image", file="heights.bin", rows=4, columns=4, width=8.0, bytes=64)
+SUN = dict(elevation=3.0, azimuth=0.0, source="exif")
 FIRST = "tiles 0 chunks 0"
 
 
@@ -112,6 +113,15 @@ def planet(radius: float, cells: float) -> dict:
         ("heights", planet(24.0, 11), "“heights”"),
         ("heights", planet(24.0, 9.5), "“heights”"),
         ("heights", planet(4e-9, 1), "“heights”"),
+        ("light", SUN | {"elevation": 90}, None),
+        ("light", SUN | {"elevation": 2.9}, "“light”"),
+        ("light", SUN | {"azimuth": 360}, "“light”"),
+        ("light", SUN | {"azimuth": "1e999"}, "“light”"),
+        ("light", SUN | {"source": "__proto__"}, "“light”"),
+        ("light", None, "“light”"),
+        ("wind", 4, None),
+        ("wind", -1, "“wind”"),
+        ("wind", [1], "“wind”"),
         (f"{FIRST} count", -64, "contradicts itself"),
         (f"{FIRST} part", 9, "contradicts itself"),
         (f"{FIRST} first", -1, "contradicts itself"),

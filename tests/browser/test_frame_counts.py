@@ -13,9 +13,11 @@ PLACE = dict(x=1.0, y=2.0, eye=1.6, yaw=60.0, pitch=-45.0)
 
 @pytest.fixture(scope="module")
 def address(page_of):
-    """A page of three levels and shrubs on hills."""
+    """A page of three levels and shrubs on hills in the sun."""
     ground = bundles.Ground(levels=3, speckle=40, discs=40, things=4)
-    with served(page_of(ground, surface=Hills(2.0, 30.0, 3, 5))) as address:
+    sun = {"elevation": 40.0, "azimuth": 200.0, "source": "assumed"}
+    surface = Hills(2.0, 30.0, 3, 5)
+    with served(page_of(ground, surface=surface, edit=lambda manifest: manifest.update(light=sun))) as address:
         yield address
 
 

@@ -232,12 +232,12 @@ def test_keys_choose_a_brush_and_paint_under_it_and_sliders_set_densities(visit,
     seen.page.keyboard.press("Escape")
     assert seen.page.evaluate("davgswt.painting.painted.count") == 0 and not seen.page.locator("#brush").is_visible()
     before = seen.picture()
-    seen.page.locator("#densities input").focus()
+    seen.page.locator("#densities [type=range]").focus()
     seen.page.keyboard.press("ArrowRight")
     assert seen.page.evaluate("davgswt.painting.densities[0]") == 1.05 and seen.state["yaw"] == ABOVE["yaw"]
     drag = "one => { one.value = '0'; for (const kind of ['input', 'change'])"
     drag += " one.dispatchEvent(new Event(kind, { bubbles: true })); }"
-    seen.page.locator("#densities input").evaluate(drag)
+    seen.page.locator("#densities [type=range]").evaluate(drag)
     dark = [int((picture[..., 1] < 105).sum()) for picture in (before, seen.picture())]
     assert dark[1] < 0.1 * dark[0], "no shrubs, no gaps"
     for _ in range(2):

@@ -6,6 +6,7 @@ import { createContext } from "./draw/gl.js";
 import { BUDGET } from "./draw/pacing.js";
 import { parsePaint, syncAddress } from "./ui/address.js";
 import { createOrbit, listenToControls } from "./ui/controls.js";
+import { listenToDaylight } from "./ui/daylight.js";
 import { createPanel, element } from "./ui/dom.js";
 import { listenToDrops } from "./ui/drop.js";
 import { createFirstView } from "./ui/first_view.js";
@@ -20,7 +21,7 @@ import { explainError, Viewer } from "./ui/viewer.js";
 
 document.documentElement.classList.add("running"); // hides the hint that nothing happens
 const hud = createHud(), menu = createPanel("menu");
-const story = createStoryPanel((error) => hud.showError(explainError(error)));
+const story = createStoryPanel(() => viewer.scene?.manifest.light, (error) => hud.showError(explainError(error)));
 const firstView = createFirstView({ onStep: closePanels });
 
 /** @type {Viewer} */
@@ -57,6 +58,7 @@ async function start() {
       listenToControls(walker, createOrbit(viewer), canvas, element("pad", HTMLElement), paint.brush, redraw);
       new ResizeObserver(redraw).observe(canvas);
       listenToTools(viewer, paint.keep, walker);
+      listenToDaylight(viewer);
       map = createMinimap(viewer);
       if (still) return;
       runFrameLoop(viewer);
@@ -75,8 +77,9 @@ async function start() {
     },
     onPicture() {
       paint.brush.draw();
+      paint.drawObjects();
       map?.draw();
-      if (viewer.scene) firstView.note(viewer.scene.walker, viewer.overlay);
+      if (viewer.scene) firstView.note(viewer.scene.walker, viewer.overlay > 0 || (viewer.scene.light?.chosen ?? null) !== null);
     },
     onWhole: firstView.showTerrain,
   });

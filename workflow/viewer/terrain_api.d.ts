@@ -52,7 +52,7 @@ export interface Update {
   /** Distance at which level l gives way to l + 1, and half the width of that fade. */
   switches: number[];
   bands: number[];
-  /** False: tiles are still being composed or sorted; another update shows more. */
+  /** False: tiles or shadows are still being made; another update shows more. */
   complete: boolean;
 }
 
@@ -81,6 +81,16 @@ export interface Order {
   number: number;
   direction: number[];
   indices: Uint32Array;
+}
+
+/** A position of the sun. */
+export interface Sun {
+  /** Solar time. */
+  hour: number;
+  elevation: number;
+  /** Clockwise from north. */
+  azimuth: number;
+  direction: Vector;
 }
 
 /** Draws the last update on a WebGL2 context. */
@@ -121,6 +131,10 @@ export interface Terrain {
   variation(x: number, y: number, material?: number): Vector;
   cellAt(x: number, y: number): Cell;
   pick(origin: ArrayLike<number>, direction: ArrayLike<number>, farthest?: number): Hit | null;
+  /** The sun that lights what painters draw; null: colours are as photographed. */
+  readonly sun: Sun | null;
+  /** Hour of the day, null for the sun of the photos, or "off". Shadows follow with updates. */
+  setSun(hour: number | null | "off"): void;
   camera(place: Place, width: number, height: number): Camera;
   /** Rejects with a TerrainError once the terrain was ended. */
   update(camera: Camera, options?: { budget?: number; exact?: boolean }): Promise<Update>;

@@ -1,6 +1,6 @@
 // The endless terrain in other pages: docs/terrain-api.md. Types: terrain_api.d.ts, which a test holds to this file.
 
-import { checkCamera, createChunkReader, createGround, createPainter } from "./api/parts.js";
+import { checkCamera, chooseSun, createChunkReader, createGround, createPainter, describeSun } from "./api/parts.js";
 import { openSource } from "./data/bundle.js";
 import { PageError } from "./data/checks.js";
 import { NO_ORDER } from "./data/layout.js";
@@ -11,6 +11,7 @@ export { PageError as TerrainError } from "./data/checks.js";
 export { rayThrough } from "./terrain/camera.js";
 
 const BUDGET = 1_000_000; // Gaussians of an update
+const SHADE = 5; // milliseconds of an update for shadows
 
 /**
  * Open a terrain: the address of a page folder or a bundle, its zip, or its files. Resolves when its manifest is read;
@@ -52,16 +53,24 @@ export async function load(where, { onProgress, onError = console.error } = {}) 
     loaded,
     ...createGround(open),
     ...createChunkReader(open, whole, checkRunning),
+    get sun() {
+      return describeSun(open);
+    },
+    /** @param {number | null | "off"} hour */
+    setSun: (hour) => chooseSun(open, hour),
     /** @param {import("./terrain/camera.js").Place} place @param {number} width @param {number} height */
     camera: (place, width, height) => checkCamera(cameraAt(place, width, height, open.heights)),
     /** @param {import("./terrain/camera.js").Camera} camera @param {{ budget?: number, exact?: boolean }} [options] */
     async update(camera, { budget = BUDGET, exact = false } = {}) {
       if (!(budget > 0)) throw new RangeError(`budget: ${budget} is not above 0`);
       checkRunning();
-      open.client.ask(checkCamera(camera), budget, exact);
+      const view = checkCamera(camera);
+      open.client.ask(view, budget, exact);
       await open.client.answered();
+      if (exact) await open.light?.finish(view.eye);
       checkRunning(); // the end lets whoever waits go on
-      return describeUpdate(/** @type {NonNullable<typeof frame>} */ (frame));
+      const { complete, ...told } = describeUpdate(/** @type {NonNullable<typeof frame>} */ (frame));
+      return { ...told, complete: (open.light?.step(view.eye, SHADE) ?? true) && complete };
     },
     /** @param {WebGL2RenderingContext} gl */
     createPainter(gl) {

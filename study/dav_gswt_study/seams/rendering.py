@@ -180,7 +180,7 @@ def render_pieces(
         field, slope = displace_means(field, terrain.heights, piece.corner, eye)
         distance = np.linalg.norm(field.means.astype(float), axis=1)
         field, active = placement.fade_levels(terrain, field, level, distance)
-        part, indices = splats.project(behind.blend_far(field), slope[active], here, terrain.near)
+        part, indices = splats.project(behind.blend_far(field, slope[active]), slope[active], here, terrain.near)
         parts.append((part, [recolour(field, eye)[indices] for recolour in recolourings], piece.close))
     parts.sort(key=lambda each: each[2])  # close pieces come last
     ordered = splats.Splats.concatenate([splats.EMPTY, *(part for part, _, _ in parts)])

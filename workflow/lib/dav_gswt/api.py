@@ -201,12 +201,19 @@ def look_at(
     return pinhole(eye, target, width, height, fov)
 
 
-def render(shown: GaussianField | Terrain, camera: Camera) -> Float32[Array, "h w 3"] | Float[Array, "h w 3"]:
-    """Render a field or a terrain: colours in sRGB, 0 to 1, the first row at the top."""
+def render(
+    shown: GaussianField | Terrain, camera: Camera, hour: float | None = None
+) -> Float32[Array, "h w 3"] | Float[Array, "h w 3"]:
+    """Render a field or a terrain: colours in sRGB, 0 to 1, the first row at the top.
+
+    hour: Solar time, 6 to 18, of a terrain whose page has a sun; by default its light is the captured one.
+    """
     if isinstance(shown, Terrain):
+        from dav_gswt.terrain.light import light_of
         from dav_gswt.terrain.stills import render_view
 
-        return render_view(shown.endless, camera, shown.manifest.sky, shown.manifest.ground_colour)
+        manifest = shown.manifest
+        return render_view(shown.endless, camera, manifest.sky, manifest.ground_colour, light=light_of(manifest, hour))
     from dav_gswt import raster
 
     return raster.render(shown, camera).colour

@@ -166,8 +166,23 @@ function decodeRecords(records, count, encoding) {
   return { deviations, turns, colours };
 }
 
+/** The sun of a terrain; null: none, or switched off. @param {Pick<OpenTerrain, "light">} terrain */
+export function describeSun({ light }) {
+  if (!light?.now) return null;
+  const { hour, elevation, azimuth, direction } = light.now.sun;
+  return { hour, elevation, azimuth, direction: /** @type {[number, number, number]} */ ([...direction]) };
+}
+
+/** @param {Pick<OpenTerrain, "light">} terrain @param {number | null | "off"} hour */
+export function chooseSun({ light }, hour) {
+  const isSun = hour === null || hour === "off" || Number.isFinite(hour);
+  if (!isSun) throw new TypeError(`hour: ${hour} is not a finite number, null or "off"`);
+  if (!light) throw new TypeError("hour: this terrain has no sun");
+  light.choose(hour);
+}
+
 /**
- * @param {import("../draw/gl.js").GL} gl @param {Pick<OpenTerrain, "manifest" | "heights">} terrain
+ * @param {import("../draw/gl.js").GL} gl @param {Pick<OpenTerrain, "manifest" | "heights" | "light">} terrain
  * @param {() => void} onEnd
  */
 export function createPainter(gl, terrain, onEnd) {

@@ -5,6 +5,7 @@ import { MAX_OCTAVES } from "../terrain/heights.js";
 import { MAX_OCTAVES as MAX_JITTER } from "../terrain/jitter.js";
 import { findRunFault } from "../terrain/painted.js";
 import { MAX_RADIUS } from "../terrain/scatter.js";
+import { LOWEST } from "../terrain/sun.js";
 import { MAX_WAVES as MAX_VARIATION } from "../terrain/variation.js";
 import {
   brief, isColour, isCoordinate, isDigest, isDirection, isFilled, isInside, isLength, isList, isName, isNatural,
@@ -35,7 +36,8 @@ import { MAX_RATIO } from "./zip.js";
  *   materials: MaterialEntry[],
  *   classes?: import("../terrain/classes.js").ClassesEntry, objects?: ObjectEntry[],
  *   scatter?: import("../terrain/scatter.js").ScatterEntry, variation?: import("../terrain/variation.js").Wave[],
- *   heights?: import("../terrain/heights.js").HeightsEntry }} Manifest
+ *   heights?: import("../terrain/heights.js").HeightsEntry, light?: import("../terrain/light.js").LightEntry,
+ *   wind?: number }} Manifest
  */
 
 export const NAME = "davgswt.json";
@@ -54,6 +56,8 @@ const NARROWEST = 0.01, BROADEST = 1e4; // cells of the variation, in tile sides
 const MAX_GROUND = 4096; // along a tile or an exemplar
 const MAX_WAVES = 4096; // cells of the jitter along a tile's side
 const UNTURNED = 180; // degrees
+const SUNS = new Set(["config", "exif", "relief", "assumed"]); // where the captured sun is known from
+const STRONGEST = 4; // wind
 const DEEPEST = 6; // levels of lists and objects within a manifest
 const KEYS = new Set(`format version unit tile_side salt eye_floor ground_colour sky zenith horizon
   sun direction colour encoding origin step log_scale sh_degree directions levels level mean_scale
@@ -61,7 +65,8 @@ const KEYS = new Set(`format version unit tile_side salt eye_floor ground_colour
   parts part first composition side cell exemplars
   wavelength octaves radius cells rows columns width materials name share first_tile classes
   rule weight wavelengths biases material low high soft jitter amplitude rise slope most ground
-  clearance painted objects density probability scatter turn size variation colours gains`.split(/\s+/));
+  clearance painted objects density probability scatter turn size variation colours gains
+  light elevation azimuth source wind`.split(/\s+/));
 
 /**
  * What each part of a manifest must be, given the whole; the parts before it are sound.
@@ -101,6 +106,9 @@ const PARTS = {
     && waves.every((/** @type {any} */ wave) => isWave(wave, length))),
   heights: (heights, m) => heights === undefined || (isSurface(heights, m.tile_side)
     && !(heights.kind === "sphere" && (m.classes || m.objects))),
+  light: (light) => light === undefined || (isCoordinate(light?.elevation) && light.elevation >= LOWEST
+    && light.elevation <= 90 && isSize(light.azimuth) && light.azimuth < 360 && SUNS.has(light.source)),
+  wind: (wind) => wind === undefined || (isSize(wind) && wind <= STRONGEST),
 };
 
 /**

@@ -1,6 +1,7 @@
 // What draws a bundle on a graphics context: backdrop and splats, previews and pictures at rest. Made again after the
 // context was lost.
 
+import { createFarGround } from "./far_ground.js";
 import { createTexture, hasPassed } from "./gl.js";
 import { createPreview, createRest } from "./pacing.js";
 import { createSky } from "./sky.js";
@@ -25,7 +26,15 @@ const MOST = 250; // slices of a picture: where each waits long whatever its siz
  */
 export function createRenderer(gl, manifest, heights) {
   const sky = createSky(gl, manifest), splats = createSplats(gl, manifest, heights);
-  const picture = createSlicedPicture(gl, sky, splats);
+  const farGround = createFarGround(gl, manifest, heights, splats.relief);
+  const backdrop = {
+    /** @param {Camera} camera @param {DrawOptions} options */
+    draw(camera, options) {
+      sky.draw(camera, options);
+      farGround?.draw(camera, options);
+    },
+  };
+  const picture = createSlicedPicture(gl, backdrop, splats);
   return {
     splats,
     rest: createRest(),
@@ -33,7 +42,7 @@ export function createRenderer(gl, manifest, heights) {
     preview: createPreview(gl),
     /** @param {Camera} camera @param {DrawOptions} options */
     draw(camera, options) {
-      sky.draw(camera, options);
+      backdrop.draw(camera, options);
       splats.draw(camera, options);
     },
     end() {

@@ -6,9 +6,13 @@ import {
 import { MAX_TURN, TURN_STEPS } from "../data/layout.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import { FACES } from "../terrain/sphere.js";
+import { lightCode, lightPaint, shineCode } from "./lighting.js";
 import { OBJECTS, OVERLAYS } from "./overlays.js";
 
 const AIR = 0.12; // height at which the sky of a planet is 1/e as bright, in radii
+/** Distance that leaves 1/e of the far ground's colour, over the distance of the last tiles; see terrain/far_ground.py. */
+export const FAR_HAZE = 2.5;
+const FAR_SPACING = 0.037; // of its points, over their distance
 const UNCERTAINTY = OVERLAYS.indexOf("uncertainty");
 
 /** A record as a Gaussian; the other end of data/layout.js. */
@@ -35,6 +39,22 @@ vec3 backdrop(float rise) {
   return rise > 0.0 ? above : below;
 }`;
 
+/**
+ * The same where the ground is neither level nor a sphere: haze by distance, which ends at the horizon of a plane through
+ * the lowest ground.
+ */
+export const roughBackdrop = (/** @type {boolean} */ lit) => `
+uniform vec3 zenith, horizon, ground;
+uniform float low;
+uniform float haze; // a unit's share of the distance that leaves 1/e of the ground's colour
+${shineCode(lit)}
+vec3 farColour(float distance, vec3 shine) { return mix(horizon, clamp(ground * shine, 0.0, 1.0), exp(-haze * distance)); }
+vec3 backdrop(float rise) {
+  vec3 above = mix(horizon, zenith, sqrt(clamp(rise, 0.0, 1.0)));
+  vec3 below = mix(horizon, clamp(ground * shineOn(vec2(0.0), 1.0), 0.0, 1.0), exp(low / (${FAR_HAZE.toFixed(1)} * min(rise, -1e-6))));
+  return rise > 0.0 ? above : below;
+}`;
+
 const FLAT = `vec3 surface(vec2 at) { return vec3(0.0); }`;
 
 const HASH = `
@@ -47,7 +67,8 @@ uint hashCell(ivec2 cell, uint seed) { // seed: of axis and salt
   return mixBits(mixBits(uint(cell.x) * 0x8da6b343u ^ seed) + uint(cell.y) * 0xd8163841u);
 }`;
 
-const HILLS = `
+/** @param {string} kept of each octave k */
+const hills = (kept = "") => `
 uniform ivec2 cellUnder[${MAX_OCTAVES}]; // the noise's cell under the eye, octave by octave, and the place in it
 uniform vec2 placeUnder[${MAX_OCTAVES}];
 uniform float amplitude[${MAX_OCTAVES}], scale[${MAX_OCTAVES}];
@@ -70,7 +91,7 @@ vec3 surface(vec2 at) { // height and slope at a place seen from the eye
       noise += vec3(weight * plane, weight * gradient.x + (east ? turn.x : -turn.x) * share.y * plane,
         weight * gradient.y + share.x * (north ? turn.y : -turn.y) * plane);
     }
-    sum += amplitude[k] * noise * vec3(1.0, scale[k], scale[k]);
+    sum += ${kept}amplitude[k] * noise * vec3(1.0, scale[k], scale[k]);
   }
   return sum;
 }`;
@@ -147,7 +168,14 @@ float crossfadeOpacity(float alpha, float weight) {
   return weight < 1.0 ? 1.0 - pow(1.0 - min(alpha, 0.999999), weight) : alpha;
 }`;
 
-const SURFACES = { flat: FLAT, hills: HILLS, image: IMAGE };
+const SURFACES = { flat: FLAT, hills: hills(), image: IMAGE };
+
+/** The surface without detail that points of the far ground cannot show. @param {"hills" | "image"} kind */
+export const farSurface = (kind) => (kind === "image" ? IMAGE
+  : HASH + hills(`clamp(2.0 - ${4 * FAR_SPACING} * length(at) * scale[k], 0.0, 1.0) * `));
+
+/** @param {import("../terrain/heights.js").HeightField["kind"]} kind @param {boolean} lit below a sun that moves? */
+export const backdropCode = (kind, lit) => (kind === "sphere" ? SPHERE_BACKDROP : kind === "flat" ? BACKDROP : roughBackdrop(lit));
 
 // What differs between a plane and a sphere: which cell or object an entry belongs to, where its Gaussian is seen from the
 // eye, and how its axes follow the ground.
@@ -215,6 +243,11 @@ vec2 tangent(vec2 a) { // of small angles, to single precision; the tan of graph
 const PLANE_GOING = `float going = 1.0 - clamp(2.0 - 2.0 * distance / end, 0.0, 1.0); // smoothstep from half the reach to its end`;
 const SPHERE_GOING = "float going = clamp((distance - begin) / (end - begin), 0.0, 1.0); // from half-way past the ground below";
 
+const FAR_PAINT = { // what it goes over into
+  flat: "backdrop(seen.z / distance)", sphere: "backdrop(seen / distance)",
+  hills: "farColour(distance, shine)", image: "farColour(distance, shine)",
+};
+
 const SPHERE_CODE = `  if (code >= ${SLOTS}u) place = (code - ${SLOTS}u) / ${MAX_LEVELS}u + 1u;`;
 
 /** As terrain/sphere.js bends a tile. */
@@ -237,8 +270,9 @@ const PLACE_ON_SPHERE = `
 /**
  * @param {import("../terrain/heights.js").HeightField["kind"]} kind
  * @param {import("../terrain/variation.js").Variation | null} varied
+ * @param {boolean} lit
  */
-export const vertexShader = (kind, varied) => `#version 300 es
+export const vertexShader = (kind, varied, lit) => `#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2D;
@@ -256,10 +290,10 @@ flat out vec4 colour;
 flat out float weight;          // of the Gaussian's level
 out vec2 at;                    // in standard deviations from the centre
 ${DECODE}
-${kind === "sphere" ? SPHERE_BACKDROP : BACKDROP}
+${backdropCode(kind, lit)}
 ${kind === "hills" || varied ? HASH : ""}
 ${kind === "sphere" ? SPHERE : SURFACES[kind]}
-${varied ? variationCode(varied.waves.length, varied.waves[0].colours.length) : ""}
+${varied ? variationCode(varied.waves.length, varied.waves[0].colours.length) : ""}${lit ? lightCode(kind) : ""}
 mat3 rotation(vec4 q) { // of length 1
   float w = q.x, x = q.y, y = q.z, z = q.w;
   return mat3(
@@ -317,8 +351,9 @@ ${kind === "sphere" ? "    axes[k] = bent * axes[k];" : SHEAR}
   at = (vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) * 2.0 - 1.0) * reach;
   vec2 pixel = focal * p.xy / p.z + at.x * lengths.x * major + at.y * lengths.y * vec2(-major.y, major.x);
   ${kind === "sphere" ? SPHERE_GOING : PLANE_GOING}
-${varied ? VARY : ""}
-  vec3 paint = mix(one.paint.rgb, backdrop(${kind === "sphere" ? "seen / distance" : "seen.z / distance"}), going * going * (3.0 - 2.0 * going));
+  vec3 shine = vec3(1.0);
+${varied ? VARY : ""}${lit ? `\n${lightPaint(kind)}` : ""}
+  vec3 paint = mix(one.paint.rgb, ${FAR_PAINT[kind]}, going * going * (3.0 - 2.0 * going));
   if (overlay > 0) {
     uint owner = texelFetch(owners, ivec2(0, int(row / ${ROW}u)), 0).x;
     uint numbers[5] = uint[5](mark & 255u, uint(level) * 32u, mark >> 8u & 255u, mark >> 16u & 255u, owner & 255u);

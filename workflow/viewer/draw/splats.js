@@ -5,12 +5,14 @@ import { PageError } from "../data/checks.js";
 import {
   BLOCK, MAX_LEVELS, NEAR, orderPages, PAGE, PAGES_A_ROW, PLACE, PLACES_A_ROW, recordRows, ROW,
 } from "../data/layout.js";
+import { REACH } from "../terrain/cells.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import { rateOf } from "../terrain/sphere.js";
 import { createVariation, VARIATION } from "../terrain/variation.js";
 import { createProgram, createTexture, setAxes } from "./gl.js";
+import { createShadowTexture, setLight } from "./lighting.js";
 import { OBJECTS, overlayColours } from "./overlays.js";
-import { FRAGMENT, vertexShader } from "./shaders.js";
+import { FAR_HAZE, FRAGMENT, vertexShader } from "./shaders.js";
 import { setHorizon } from "./sky.js";
 
 /**
@@ -21,8 +23,9 @@ import { setHorizon } from "./sky.js";
  * @typedef {import("../worker/frame_builder.js").FrameAnswer} FrameAnswer
  * @typedef {Record<string, WebGLUniformLocation | null>} Uniforms
  *
- * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there.
- * @typedef {{ end: number, low: number, overlay: number }} DrawOptions
+ * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there;
+ * light: null: colours as captured.
+ * @typedef {{ end: number, low: number, overlay: number, light: import("../terrain/light.js").Lighting | null }} DrawOptions
  * @typedef {ReturnType<typeof createSplats>} Splats
  */
 
@@ -30,12 +33,21 @@ const FULL = "The terrain does not fit into this machine's graphics memory. Clos
   + "tiles or fewer variants, or open it on a larger machine.";
 const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
 const QUADS = Uint16Array.from({ length: 6 * PAGE }, (_, k) => 4 * Math.floor(k / 6) + [0, 1, 2, 2, 1, 3][k % 6]);
-const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3, PLACES = 4, OWNERS = 5; // texture units
+export const RELIEF = 2;
+const RECORDS = 0, ENTRIES = 1, HUES = 3, PLACES = 4, OWNERS = 5, SHADOWS = 6; // texture units
 
 /** @param {GL} gl @param {Manifest} manifest @param {HeightField} heights */
 export function createSplats(gl, manifest, heights) {
   const variation = createVariation(manifest);
-  const { use, uniforms } = createProgram(gl, vertexShader(heights.kind, variation), FRAGMENT);
+  const programs = [false, true].map((lit) => once(() => {
+    const program = createProgram(gl, vertexShader(heights.kind, variation, lit), FRAGMENT), { uniforms } = program;
+    program.use();
+    setConstants(gl, uniforms, manifest, heights);
+    if (variation) setWaves(gl, uniforms, variation);
+    return program;
+  }));
+  const isLit = manifest.light !== undefined && heights.kind !== "sphere";
+  programs[Number(isLit)](); // the other one when it is used
   const tallest = Math.max(recordRows(manifest), orderPages(manifest) / PAGES_A_ROW);
   if (tallest > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new PageError(FULL);
   const records = createTexture(gl, gl.RGBA32UI, ROW, recordRows(manifest));
@@ -46,13 +58,11 @@ export function createSplats(gl, manifest, heights) {
   /** @type {FrameAnswer | null} */
   let frame = null;
   const relief = heights.kind === "image" ? createRelief(gl, heights) : null;
+  const shadows = isLit && heights.kind !== "flat" ? createShadowTexture(gl) : null;
   const hues = createTexture(gl, gl.RGBA8, 256, 1), owners = createTexture(gl, gl.R32UI, 1, recordRows(manifest));
   const each = manifest.tiles.length / manifest.materials.length;
   let shownOverlay = -1;
   if (gl.getError() === gl.OUT_OF_MEMORY) throw new PageError(FULL);
-  use();
-  setConstants(gl, uniforms, manifest, heights);
-  if (variation) setWaves(gl, uniforms, variation);
 
   /** @param {number} unit @param {WebGLTexture} texture */
   function bind(unit, texture) {
@@ -133,10 +143,16 @@ export function createSplats(gl, manifest, heights) {
      * @param {number} [from] the first block
      * @param {number} [many] of them; all of a picture, in slices or at once, are drawn in order
      */
-    draw(camera, { end, low, overlay }, from = 0, many = far.length + close.length) {
+    draw(camera, { end, low, overlay, light }, from = 0, many = far.length + close.length) {
       if (!frame) return;
+      const { use, uniforms } = programs[Number(light !== null)]();
       use();
       setView(gl, uniforms, heights, manifest.tile_side, camera, frame);
+      setLight(gl, uniforms, manifest, light);
+      if (light && shadows) {
+        bind(SHADOWS, shadows.texture);
+        shadows.set(uniforms, light.shadows, camera.eye);
+      }
       if (variation) setWavesUnder(gl, uniforms, variation, camera);
       if (heights.kind === "sphere") {
         gl.uniform1f(uniforms.begin, 0.5 * (Math.max(Math.hypot(...camera.eye) - heights.radius, 0) + end));
@@ -164,9 +180,10 @@ export function createSplats(gl, manifest, heights) {
       gl.bindVertexArray(null);
     },
 
+    relief,
     /** Free the textures. */
     end() {
-      for (const texture of [records, entries, nearEntries, places, hues, owners, relief]) gl.deleteTexture(texture);
+      for (const texture of [records, entries, nearEntries, places, hues, owners, relief, shadows?.texture ?? null]) gl.deleteTexture(texture);
     },
   };
 }
@@ -186,18 +203,26 @@ function setConstants(gl, uniforms, manifest, heights) {
   gl.uniform1i(uniforms.hues, HUES);
   gl.uniform1i(uniforms.places, PLACES);
   gl.uniform1i(uniforms.owners, OWNERS);
+  gl.uniform1i(uniforms.shadows, SHADOWS);
   gl.uniform1i(uniforms.levels, manifest.levels.length);
   gl.uniform1f(uniforms.side, manifest.tile_side);
   gl.uniform1f(uniforms.near, NEAR * manifest.eye_floor);
-  gl.uniform3fv(uniforms.zenith, manifest.sky.zenith);
-  gl.uniform3fv(uniforms.horizon, manifest.sky.horizon);
-  gl.uniform3fv(uniforms.ground, manifest.ground_colour);
+  gl.uniform1f(uniforms.haze, hazeOf(manifest.tile_side));
   if (heights.kind === "sphere") {
     const rate = rateOf(heights, manifest.tile_side);
     gl.uniform1f(uniforms.radius, heights.radius);
     gl.uniform1f(uniforms.rate, rate);
     gl.uniform1f(uniforms.stretch, heights.radius * rate);
-  } else if (heights.kind === "hills") {
+  }
+  setSurface(gl, uniforms, heights);
+}
+
+/** @param {number} side of a tile */
+export const hazeOf = (side) => 1 / (FAR_HAZE * REACH * side);
+
+/** @param {GL} gl @param {Uniforms} uniforms @param {HeightField} heights */
+export function setSurface(gl, uniforms, heights) {
+  if (heights.kind === "hills") {
     gl.uniform1i(uniforms.octaves, heights.amplitudes.length);
     gl.uniform1ui(uniforms.salt, heights.salt);
     gl.uniform1fv(uniforms["amplitude[0]"], padded(heights.amplitudes, MAX_OCTAVES));
@@ -226,11 +251,18 @@ function setView(gl, uniforms, heights, side, camera, { i0, j0, eye, switches, b
   if (heights.kind === "sphere") {
     setHorizon(gl, uniforms, heights, camera.eye);
     gl.uniform3fv(uniforms.moved, eye.map((v, k) => v - camera.eye[k]));
-  } else if (heights.kind !== "flat") {
-    const { cells, places } = heights.under(x, y);
-    gl.uniform2iv(uniforms["cellUnder[0]"], cells);
-    gl.uniform2fv(uniforms["placeUnder[0]"], places);
-  }
+  } else setUnder(gl, uniforms, heights, camera.eye);
+}
+
+/**
+ * @param {GL} gl @param {Uniforms} uniforms @param {Exclude<HeightField, import("../terrain/sphere.js").Sphere>} heights
+ * @param {number[]} eye
+ */
+export function setUnder(gl, uniforms, heights, [x, y]) {
+  if (heights.kind === "flat") return;
+  const { cells, places } = heights.under(x, y);
+  gl.uniform2iv(uniforms["cellUnder[0]"], cells);
+  gl.uniform2fv(uniforms["placeUnder[0]"], places);
 }
 
 /** @param {GL} gl @param {Uniforms} uniforms @param {Variation} variation */
@@ -245,6 +277,13 @@ function setWavesUnder(gl, uniforms, variation, { eye: [x, y] }) {
   const { cells, places } = variation.under(x, y);
   gl.uniform2iv(uniforms["waveUnder[0]"], cells);
   gl.uniform2fv(uniforms["wavePlace[0]"], places);
+}
+
+/** A function that makes a value when it is first called. @template T @param {() => T} make */
+function once(make) {
+  /** @type {T | undefined} */
+  let made;
+  return () => (made ??= make());
 }
 
 /** @param {number[]} list @param {number} length */

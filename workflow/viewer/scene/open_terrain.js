@@ -5,6 +5,7 @@ import { readHeightMap, readManifest, readParts } from "../data/bundle.js";
 import { PageError } from "../data/checks.js";
 import { REACH } from "../terrain/cells.js";
 import { createHeights } from "../terrain/heights.js";
+import { createLight } from "../terrain/light.js";
 import { findEnd, findReach } from "../terrain/sphere_cells.js";
 
 const WIDER = 1.25; // times the picture's size, so that a turn finds tiles before the worker has answered
@@ -41,8 +42,9 @@ export async function readTerrain(source) {
 /** Start the worker of a terrain. @param {TerrainFiles} files @param {Handlers} handlers */
 export function openTerrain({ source, manifest, pixels }, handlers) {
   const stop = new AbortController(), client = createWorkerClient({ manifest, pixels }, handlers);
+  const heights = createHeights(manifest.heights, pixels);
   return {
-    manifest, client, heights: createHeights(manifest.heights, pixels),
+    manifest, client, heights, light: createLight(manifest, heights),
     /** Mean height of the ground of its tiles above the surface. */
     lift: mean(manifest.classes?.rise.ground ?? [0]),
     /**
@@ -168,18 +170,20 @@ function createWorkerClient(bundle, { onRecords, onFrame, onError }) {
 const mean = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
 
 /**
- * Where the tiles of a picture end and its backdrop begins: `end` and `low` of the options that renderers take.
+ * Where the tiles of a picture end and its backdrop begins, and the light on both: `end`, `low` and `light` of the options
+ * that renderers take.
  *
- * @param {{ manifest: import("../data/manifest.js").Manifest, heights: import("../terrain/heights.js").HeightField }} terrain
+ * @param {Pick<OpenTerrain, "manifest" | "heights" | "light">} terrain
  * @param {FrameAnswer | null} frame the last one
  * @param {import("../terrain/camera.js").Camera} camera
  */
-export function backdropOptions({ manifest, heights }, frame, camera) {
+export function backdropOptions({ manifest, heights, light }, frame, camera) {
   const farthest = REACH * manifest.tile_side;
   if (heights.kind === "sphere") {
-    return findEnd(heights, camera.eye, frame?.reach ?? findReach({ side: manifest.tile_side }, heights, camera.eye));
+    const reach = frame?.reach ?? findReach({ side: manifest.tile_side }, heights, camera.eye);
+    return { ...findEnd(heights, camera.eye, reach), light: null };
   }
-  return { end: frame?.reach ?? farthest, low: Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest) };
+  return { end: frame?.reach ?? farthest, low: Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest), light: light?.now ?? null };
 }
 
 /** The cells of a frame, back to front. @param {FrameAnswer} frame @returns {DrawnCell[]} */

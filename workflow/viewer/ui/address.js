@@ -1,4 +1,5 @@
-// The page's address: the place, the overlay and what is painted: `#x,y,eye,yaw,pitch&show=level&paint=...`.
+// The page's address: the place, the overlay, the sun and what is painted:
+// `#x,y,eye,yaw,pitch&show=level&sun=14.5&paint=...`.
 
 import { OVERLAYS } from "../draw/overlays.js";
 import { PLACE_KEYS } from "./walker.js";
@@ -45,18 +46,28 @@ export const parsePaint = (hash) => partOf(hash, "paint");
 /** The overlay of an address; 0, the terrain as it is, where it names none. @param {string} hash */
 export const parseOverlay = (hash) => Math.max(0, OVERLAYS.indexOf(decode(partOf(hash, "show"))));
 
+/** The sun of an address; null: as captured. @param {string} hash @returns {import("../terrain/light.js").ChosenSun} */
+export function parseSun(hash) {
+  const text = decode(partOf(hash, "sun")).trim(), hour = text === "" ? NaN : Number(text);
+  if (text === "off") return text;
+  return Number.isFinite(hour) ? hour : null;
+}
+
 /** @param {string} hash @param {string} name */
 const partOf = (hash, name) => hash.split(`&${name}=`)[1]?.split("&")[0] ?? "";
 
 /**
- * The address's part for a place, what is shown there and what is painted.
+ * The address's part for a place, what is shown there, the sun and what is painted.
  *
  * @param {Walker} walker
  * @param {number} overlay 0: the terrain as it is
  * @param {string} paint "": nothing
+ * @param {import("../terrain/light.js").ChosenSun} [sun]
  */
-export const formatAddress = (walker, overlay, paint) =>
-  `${formatPlace(walker)}${overlay ? `&show=${OVERLAYS[overlay]}` : ""}${paint && `&paint=${paint}`}`;
+export function formatAddress(walker, overlay, paint, sun = null) {
+  const light = sun === null ? "" : `&sun=${typeof sun === "number" ? Number(sun.toFixed(2)) : sun}`;
+  return `${formatPlace(walker)}${overlay ? `&show=${OVERLAYS[overlay]}` : ""}${light}${paint && `&paint=${paint}`}`;
+}
 
 /** @param {string} text */
 function decode(text) {
@@ -95,6 +106,7 @@ export function syncAddress(viewer, paint) {
     ours = location.hash;
     viewer.setPlace(parsePlace(ours));
     viewer.showOverlay(parseOverlay(ours));
+    viewer.showSun(parseSun(ours));
     paint.follow(parsePaint(ours)).catch((error) => viewer.fail(error));
   });
 }

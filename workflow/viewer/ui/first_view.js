@@ -37,9 +37,9 @@ export function createFirstView({ onStep }) {
     showHint() {
       hint.hidden = begin === null;
     },
-    /** A picture was drawn. @param {import("./walker.js").Walker} place @param {number} overlay */
-    note(place, overlay) {
-      if (overlay) showTerrain();
+    /** A picture was drawn. @param {import("./walker.js").Walker} place @param {boolean} other than the still: an overlay, another sun */
+    note(place, other) {
+      if (other) showTerrain();
       const start = begin;
       if (!start || PLACE_KEYS.every((key) => place[key] === start[key])) return;
       begin = null;

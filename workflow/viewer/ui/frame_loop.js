@@ -10,6 +10,7 @@ import { stepWalker } from "./walker.js";
  */
 
 const MAX_STEP = 250; // milliseconds of walking that one frame makes up for
+const SHADE = 5; // milliseconds of a turn for shadows
 const QUIET = 700; // milliseconds at rest before its progress is said: fast devices are done by then
 
 /** @param {Viewer} viewer */
@@ -30,9 +31,12 @@ export function runFrameLoop(viewer) {
 
   /** @param {Scene} scene @param {number} now @param {boolean} may */
   const ask = (scene, now, may) => {
+    const shaded = scene.light?.step([scene.walker.x, scene.walker.y], SHADE) ?? true;
+    if (shaded && !viewer.shaded) viewer.dirty = viewer.stale = true;
+    viewer.shaded = shaded;
     if (viewer.stale) resting.restart(scene, now);
     if (viewer.stale && may && scene.client.idle) viewer.askWorker(viewer.loaded ? pacing.budget : BUDGET.least, false);
-    else if (viewer.loaded && !viewer.stale) resting.step(scene, now);
+    else if (viewer.loaded && !viewer.stale && viewer.shaded) resting.step(scene, now);
   };
 
   /** @param {number} now */
@@ -107,7 +111,7 @@ export function createResting(viewer) {
     /** Is the finest picture of the place shown? */
     get whole() {
       const { renderer, frame } = viewer.scene ?? {};
-      return !viewer.stale && !frame?.missing.length && (renderer?.rest.whole ?? false);
+      return !viewer.stale && viewer.shaded && !frame?.missing.length && (renderer?.rest.whole ?? false);
     },
     /** How much of it is drawn, 0 to 1. */
     get done() {

@@ -12,13 +12,18 @@ import { cssColour, element, swatch } from "./dom.js";
  */
 
 const STEPS = 7; // swatches of a scale
-const HINT = "Point at the ground for its values";
+const HINT = "Point at the ground for its values", LOADING = "Finer levels are still loading";
 
 /** A unit after a number. @param {string} unit */
 export const unitName = (unit) => (unit === "metre" ? "m" : `${unit}s`);
 
+/** A length to two digits, in metres or else tiles. @param {number} v @param {Manifest} manifest */
+export const lengthText = (v, { unit, tile_side: side }) => (
+  unit === "metre" ? `${Number(v.toPrecision(2))} m` : `${Number((v / side).toPrecision(2))} tiles`);
+
 export function createLegend() {
   const box = element("legend", HTMLElement), value = document.createElement("p");
+  const loading = Object.assign(document.createElement("p"), { textContent: LOADING });
   /** @type {Manifest | null} */
   let shown = null;
   /** @param {string} text */
@@ -39,7 +44,11 @@ export function createLegend() {
         return item;
       }));
       say(HINT);
-      box.replaceChildren(list, value);
+      box.replaceChildren(list, ...name === "level" ? [loading] : [], value);
+    },
+    /** Does the picture lack levels that the legend names? @param {boolean} lacking */
+    setLoading(lacking) {
+      loading.hidden = !lacking;
     },
     /** Tell what is under the pointer; null: no ground. @param {Under | null} under */
     tell(under) {
@@ -60,13 +69,14 @@ export function createLegend() {
  * @param {string} name @param {Manifest} manifest
  * @returns {[number[] | null, string][]}
  */
-function entriesOf(name, { tiles, levels, directions, materials, objects, unit }) {
+function entriesOf(name, manifest) {
+  const { tiles, levels, directions, materials, objects } = manifest;
   if (name === "tile") return [[null, `A colour for each of ${tiles.length} tiles`]];
   if (name === "level") {
     return levels.map(({ level, distance }) => {
-      const until = distance === null ? null : `up to ${Number(distance.toPrecision(2))} ${unitName(unit)}`;
-      const text = until ? `${level ? "" : ", finest"}: ${until}` : levels.length > 1 ? ": beyond" : "";
-      return [levelColour(level), `level ${level}${text}`];
+      const end = level ? level === levels.length - 1 ? ", coarsest" : "" : ", finest";
+      const text = distance !== null ? `: up to ${lengthText(distance, manifest)} away` : level ? ": beyond" : "";
+      return [levelColour(level), `level ${level}${end}${text}`];
     });
   }
   if (name === "order") {
@@ -92,7 +102,8 @@ export function tellValues(viewer) {
   /** @type {{ clientX: number, clientY: number } | null} */
   let pointer = null;
   const tell = () => {
-    const { scene } = viewer;
+    const { scene } = viewer, { shrink = 0, missing = [] } = scene?.frame ?? {};
+    viewer.hud.legend.setLoading(!viewer.resting.whole && (shrink < 1 || missing.length > 0));
     if (viewer.overlay === 0 || !scene || !pointer) return;
     const across = pointer.clientX / canvas.clientWidth, down = pointer.clientY / canvas.clientHeight;
     viewer.hud.legend.tell(valuesAt(scene, viewer.camera(scene), across, down));

@@ -3,7 +3,7 @@
 import { tileColour } from "../draw/overlays.js";
 import { tileUnder } from "../terrain/cells.js";
 import { cssColour, element, listenToKeys } from "./dom.js";
-import { unitName } from "./legend.js";
+import { lengthText } from "./legend.js";
 import { moveTo } from "./walker.js";
 
 const CELLS = 9; // along a side
@@ -40,8 +40,10 @@ export function createMinimap(viewer) {
   }
 
   /** @param {import("../data/manifest.js").Manifest} manifest */
-  const explain = ({ tile_side: side, unit }) => viewer.hud.say(
-    `Each square is a place of a tile, ${Number(side.toPrecision(2))} ${unitName(unit)} wide; equal numbers are the same tile. North is up.`);
+  const explain = (manifest) => {
+    const wide = manifest.unit === "metre" ? `, ${lengthText(manifest.tile_side, manifest)} wide` : "";
+    viewer.hud.say(`Each square is a place of a tile${wide}; equal numbers are the same tile. North is up.`);
+  };
   const toggle = () => {
     map.hidden = !map.hidden;
     button.setAttribute("aria-pressed", String(!map.hidden));

@@ -21,7 +21,7 @@ const TOO_LONG = "This is too much for a link. Save it as a file.";
 /** @param {Viewer} viewer */
 export function createPaintPanel(viewer) {
   const toggle = element("paintButton", HTMLButtonElement);
-  const panel = createPanel("paint", { onShow: (on) => on || choose(LOOK), closesOnEscape: false });
+  const panel = createPanel("paint", { onShow: (on) => (on ? drawObjects() : choose(LOOK)), closesOnEscape: false });
   const brushes = element("brushes", HTMLFieldSetElement), status = element("paintStatus", HTMLElement);
   const [undo, redo, clear, save, open] = ["undo", "redo", "clear", "savePaint", "openPaint"]
     .map((id) => element(id, HTMLButtonElement));
@@ -30,6 +30,7 @@ export function createPaintPanel(viewer) {
   const keep = createPaintKeep(viewer, (tooLong) => tooLong && say(TOO_LONG));
   /** @type {(() => void)[]} */
   let refreshers = []; // of sliders
+  let drawn = false; // are the small pictures of objects, or will they be?
   Object.assign(size, { min: SIZES.least, max: SIZES.most, step: 0.1, value: SIZES.first });
 
   /** @param {string} text */
@@ -55,6 +56,19 @@ export function createPaintPanel(viewer) {
     label.append(radio, ...colour ? [swatch(cssColour(colour))] : [], name);
     label.title = `${name} (${key})`;
     brushes.append(label);
+  }
+
+  /** Once, when the panel is first open and the terrain is read. */
+  async function drawObjects() {
+    const { scene } = viewer;
+    if (drawn || !panel.open || !viewer.loaded || !scene) return;
+    drawn = true;
+    const canvases = [...element("densities", HTMLElement).querySelectorAll("canvas")];
+    try {
+      if (canvases.length) await (await import("./thumbnails.js")).drawThumbnails(scene, canvases);
+    } catch (error) {
+      console.error(error); // the sliders work without pictures
+    }
   }
 
   function update() {
@@ -110,6 +124,7 @@ export function createPaintPanel(viewer) {
   return {
     brush,
     keep,
+    drawObjects,
     /** Something was painted, set, or taken back. */
     note() {
       keep.note();
@@ -131,30 +146,45 @@ export function createPaintPanel(viewer) {
       const box = element("densities", HTMLElement);
       element("densityBox", HTMLElement).hidden = !objects.length;
       box.replaceChildren();
-      refreshers = objects.map(({ name, material }, k) => (
-        addDensity(box, materials.length > 1 ? `${name} on ${materials[material].name}` : name, painting, k)));
+      drawn = false;
+      refreshers = objects.map(({ name, material }, k) => {
+        const on = materials.length > 1 ? ` on ${materials[material].name}` : "";
+        return addDensity(box, titleOf(name) + on, painting, k);
+      });
       update();
     },
   };
 }
 
+/** A name to read: object07 becomes Object 7. @param {string} name */
+const titleOf = (name) => `${name[0].toUpperCase()}${name.slice(1).replace(/(\D)0*(\d+)$/, "$1 $2")}`;
+
 /**
- * A slider of an object's density. Returns: a function that brings it up to date.
+ * Switch, small picture and density of an object. Returns: a function that brings them up to date.
  *
  * @param {HTMLElement} box @param {string} name @param {Painting} painting @param {number} object
  */
 function addDensity(box, name, painting, object) {
-  const label = document.createElement("label"), title = document.createElement("span"), step = 1 / DENSITY_STEPS;
+  const row = document.createElement("div"), label = document.createElement("label"), step = 1 / DENSITY_STEPS;
+  const on = document.createElement("input"), title = document.createElement("span");
   const input = document.createElement("input"), output = document.createElement("output");
-  Object.assign(input, { type: "range", min: 0, max: MAX_DENSITY, step });
-  [title.textContent, title.className] = [name, "name"];
-  label.append(title, input, output);
-  box.append(label);
+  let last = 1; // density before the object was switched off
+  Object.assign(on, { type: "checkbox", title: "Show this object" });
+  Object.assign(input, { type: "range", min: 0, max: MAX_DENSITY, step, ariaLabel: `Density of ${name}` });
+  [title.textContent, title.className, row.className] = [name, "name", "density"];
+  label.append(on, document.createElement("canvas"), title);
+  row.append(label, input, output);
+  box.append(row);
+  on.addEventListener("change", () => {
+    if (!on.checked) last = painting.densities[object];
+    painting.setDensity(object, on.checked ? last : 0, true);
+  });
   for (const kind of ["input", "change"]) { // the second when it is let go
     input.addEventListener(kind, () => painting.setDensity(object, Number(input.value), kind === "change"));
   }
   return () => {
     const value = painting.densities[object];
+    on.checked = value > 0;
     output.textContent = `${value.toFixed(2)}×`;
     if (document.activeElement !== input || Math.abs(Number(input.value) - value) > step) input.value = String(value);
   };

@@ -21,13 +21,20 @@ const MOST = 10_000; // photos
  *   thumb: number, columns: number, pictures: number }} Story
  */
 
-/** @param {(error: unknown) => void} onError */
-export function createStoryPanel(onError) {
+const COMPASS = ["north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"];
+/** @type {Record<string, string>} */
+const SOURCES = {
+  config: "as the settings say", exif: "by the places and times of the photos", relief: "judged by the shading of the ground",
+  assumed: "which is assumed: the photos do not tell",
+};
+
+/** @param {() => import("../terrain/light.js").LightEntry | undefined} findLight @param {(error: unknown) => void} onError */
+export function createStoryPanel(findLight, onError) {
   const body = element("storyBody", HTMLElement);
   return createPanel("story", {
     onShow(on) {
       if (!on || body.firstChild) return;
-      readOwnStory().then((story) => body.replaceChildren(...describe(story)), onError);
+      readOwnStory().then((story) => body.replaceChildren(...describe(story), ...describeLight(findLight())), onError);
     },
   });
 }
@@ -45,6 +52,16 @@ function describe(story) {
     + `${rounds.length > 1 ? `After the first, ${rounds.length - 1} times further photos were asked for. ` : ""}`
     + `${tested.length ? "PSNR, in decibels, says how well photos that were not used are predicted: more is better." : ""}`;
   return [drawPlan(story), listRounds(story), text, showPhotos(story)];
+}
+
+/** Which sun the colours contain, and what stays as it was in the photos. @param {import("../terrain/light.js").LightEntry} [light] */
+function describeLight(light) {
+  if (!light) return [];
+  const { elevation, azimuth, source } = light, text = document.createElement("p");
+  text.textContent = `The photos show light of a sun ${Math.round(elevation)}° high in the `
+    + `${COMPASS[Math.round(azimuth / 45) % COMPASS.length]}, ${SOURCES[source]}. `
+    + "The time of day changes sky, hills and their shadows; ripples, stones, and the shade on objects stay as photographed.";
+  return [text];
 }
 
 /** @param {string} name @param {Record<string, string | number>} attributes */

@@ -9,7 +9,8 @@ import { createRenderer } from "../draw/renderer.js";
 import { backdropOptions, listDrawnCells, openTerrain, readTerrain } from "../scene/open_terrain.js";
 import { cameraAt } from "../terrain/camera.js";
 import { tileUnder } from "../terrain/cells.js";
-import { formatAddress, parseOverlay, parsePlace } from "./address.js";
+import { formatAddress, parseOverlay, parsePlace, parseSun } from "./address.js";
+import { showDaylight } from "./daylight.js";
 import { element } from "./dom.js";
 import { createResting } from "./frame_loop.js";
 import { createPainting } from "./painting.js";
@@ -50,6 +51,7 @@ export class Viewer {
   overlay = 0;
   dirty = true; // the picture must be drawn again
   stale = true; // the worker must be asked again
+  shaded = true; // shadows are those of the place
   pacing = createFramePacing();
   stats = createFrameStats();
   tour = createTour();
@@ -107,10 +109,12 @@ export class Viewer {
     this.scene = scene;
     if (first) {
       this.overlay = parseOverlay(location.hash);
+      terrain.light?.choose(parseSun(location.hash));
       this.options.onFirstScene(walker);
     }
     element("tools", HTMLElement).hidden = false;
     this.#showLegend();
+    showDaylight(terrain.light);
     this.drawFrame(); // sky and far ground at once
     await this.options.onScene(this.scene, first);
     if (first) await this.options.onSize(sizeOf(manifest));
@@ -209,6 +213,7 @@ export class Viewer {
     const renderer = this.scene?.renderer;
     this.askWorker(budget, true);
     await this.scene?.client.answered();
+    if (this.scene) await this.scene.light?.finish([this.scene.walker.x, this.scene.walker.y]);
     this.drawFrame();
     // the context may be lost without an event yet, or be back and empty
     if (this.gl.isContextLost() || renderer !== this.scene?.renderer) {
@@ -236,6 +241,15 @@ export class Viewer {
     this.redraw();
   }
 
+  /** @param {import("../terrain/light.js").ChosenSun} sun */
+  showSun(sun) {
+    const light = this.scene?.light;
+    if (!light || light.chosen === sun) return;
+    light.choose(sun);
+    showDaylight(light);
+    this.redraw();
+  }
+
   #showLegend() {
     this.hud.legend.show(this.overlay, this.scene?.manifest ?? null);
     element("overlay", HTMLSelectElement).selectedIndex = this.overlay;
@@ -243,7 +257,7 @@ export class Viewer {
 
   /** The address of this place. @param {string} paint of what is painted */
   address(paint) {
-    return this.scene ? formatAddress(this.scene.walker, this.overlay, paint) : "";
+    return this.scene ? formatAddress(this.scene.walker, this.overlay, paint, this.scene.light?.chosen) : "";
   }
 
   /** The finest picture of this place as a PNG file, when it is drawn. @returns {Promise<Blob>} */

@@ -37,7 +37,7 @@ from dav_gswt.files import parse_record, read_json
 NAME = "davgswt.json"
 FORMAT, VERSION = "davgswt", 4
 # keys that are left out for None
-OPTIONAL = "classes", "objects", "scatter", "variation", "light", "composition", "heights"
+OPTIONAL = "classes", "objects", "scatter", "variation", "light", "wind", "composition", "heights"
 ONLY_MATERIAL = "ground"  # the name of the material of a set that has one
 MAX_BYTES = 1 << 26  # of a manifest
 WHOLE = 1e-9  # error of whole numbers of steps, of their own size
@@ -109,6 +109,7 @@ class Manifest(Entry):
     scatter: ScatterEntry | None = None
     variation: Annotated[list[WaveEntry], Field(min_length=1, max_length=3)] | None = None
     light: LightEntry | None = None
+    wind: Annotated[float, Field(ge=0, le=4)] | None = None
     format: Literal["davgswt"]
     version: Literal[4]
     unit: Annotated[str, Field(min_length=1)]

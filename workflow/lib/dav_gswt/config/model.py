@@ -9,10 +9,11 @@ from dav_gswt.config.exports import Export
 from dav_gswt.config.scenes import FieldScene, Scene
 from dav_gswt.config.settings import (
     ClassTerm,
-    Flat,
+    Hills,
     NoiseClasses,
     Preset,
     Prior,
+    SunPosition,
     Surface,
     Tiling,
 )
@@ -70,7 +71,14 @@ class Config(ConfigModel):
         ge=0,
         le=4,
     )
-    heights: Surface = key("the surface that the tiles are placed on", Flat(kind="flat"))
+    heights: Surface = key("the surface that the tiles are placed on", Hills(kind="hills"))
+    sun: SunPosition | Auto | Literal["off"] = key(
+        "the sun that shone on the photos. The page moves it over the day, with light and shadow on hills. `auto`: "
+        "from the time and place in EXIF, or from light and dark on the ground's relief; else 45 degrees high in the "
+        "south-west. `off`: the light stays as photographed. Neither on a sphere nor in exports",
+        "auto",
+    )
+    wind: float = key("how far plants sway on the page; 0: none", 1, ge=0, le=4)
     classes: list[ClassTerm] = key(
         "which material lies where, on a terrain of several: terms whose scores are added",
         [NoiseClasses(kind="noise")],

@@ -17,8 +17,16 @@ class Hills(ConfigModel):
     """Hills by noise."""
 
     kind: Literal["hills"]
-    height: float = key("nothing is higher above the plain or deeper below it", unit="tile sides", ge=0, le=100)
-    wavelength: float = key("from one large hill to the next, about", unit="tile sides", ge=1, le=100_000)
+    height: Annotated[float, Field(ge=0, le=100)] | Auto = key(
+        "nothing is higher above the plain or deeper below it; `auto`: a quarter of the wavelength",
+        "auto",
+        unit="tile sides",
+    )
+    wavelength: Annotated[float, Field(ge=1, le=100_000)] | Auto = key(
+        "from one large hill to the next, about; `auto`: 24 times the lowest height of the eye, from 16 to 32",
+        "auto",
+        unit="tile sides",
+    )
 
 
 class HeightMap(ConfigModel):
@@ -46,6 +54,15 @@ class Sphere(ConfigModel):
 
 Heights = Annotated[Flat | Hills | HeightMap, Field(discriminator="kind")]
 Surface = Annotated[Flat | Hills | HeightMap | Sphere, Field(discriminator="kind")]
+
+
+class SunPosition(ConfigModel):
+    """The sun that shone on the photos."""
+
+    elevation: float = key("above the horizon", unit="degrees", ge=3, le=90)
+    azimuth: float = key(
+        "clockwise from north; without GPS, from the y axis of the field", unit="degrees", ge=0, lt=360
+    )
 
 
 Weight = Annotated[float, Field(ge=0, le=1000)]

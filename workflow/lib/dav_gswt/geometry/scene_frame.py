@@ -122,8 +122,8 @@ class SceneFrame:
     flying_height: median height of the cameras, in world units. exemplar: the square that tiles are made of. extent: of
     all ground that photos see. test, test_groups: names of photos that only test; None where the scene names none.
     relief: spread of the points about the plane, in flying heights. focal_ratio: the used focal length over EXIF's.
-    reprojection_error: mean, pixels. points: of the sparse model. verdict: on structure from motion. sun: by EXIF.
-    gaussians, removed, source: of an imported field. renderer: versions of a synthetic
+    reprojection_error: mean, pixels. points: of the sparse model. verdict: on structure from motion. sun: by EXIF,
+    where time and place are known. gaussians, removed, source: of an imported field. renderer: versions of a synthetic
     scene's renderer.
     """
 

@@ -48,7 +48,7 @@ class CapturedSun:
 
 
 def locate_sun(time: datetime, latitude: float, longitude: float) -> tuple[float, float]:
-    """Elevation and azimuth (clockwise from north) of the sun in degrees, at a place in degrees north and east.
+    """Elevation and azimuth (clockwise from north) of the sun's centre, at a place north and east; all in degrees.
 
     The Astronomical Almanac's formula (Michalsky 1988): within 0.01 degrees from 1950 to 2050. Refraction, which lifts
     the sun by 0.25 degrees at 3 degrees above the horizon, is left out. time: with its zone.
@@ -58,7 +58,9 @@ def locate_sun(time: datetime, latitude: float, longitude: float) -> tuple[float
     along = np.radians(280.460 + 0.9856474 * days + 1.915 * np.sin(anomaly) + 0.020 * np.sin(2 * anomaly))
     tilt, north = np.radians([23.439 - 0.0000004 * days, latitude])
     ascension = np.arctan2(np.cos(tilt) * np.sin(along), np.cos(along))
-    up = np.sin(tilt) * np.sin(along)  # sine of the declination; across: its cosine
+    up = np.sin(tilt) * np.sin(
+        along
+    )  # part of the unit vector towards the sky's north pole; across: towards its equator
     across = np.sqrt(1 - up**2)
     hour = np.radians(280.46062 + 360.98564737 * days + longitude) - ascension
     height = np.sin(north) * up + np.cos(north) * across * np.cos(hour)

@@ -1,7 +1,7 @@
 """Backdrop of the terrain: sky, far ground, and the transition of the last tiles into it; on a plane and a planet."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float, Float32
@@ -12,7 +12,9 @@ from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.terrain.choice import Vector
 from dav_gswt.terrain.draw_order import finer_share
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.heights import Sphere
+from dav_gswt.terrain.far_ground import HAZE, FarColours, FarGround
+from dav_gswt.terrain.heights import FlatSurface, Slope, Sphere
+from dav_gswt.terrain.light import Light, PlacedLight, relight
 
 FADE = 0.5  # share of the reach at which the transition begins
 CLIMB = 3.0  # times the reach on the ground by which the reach grows with the eye's height over a planet, at most
@@ -26,6 +28,7 @@ class Backdrop:
     """Sky colours by elevation, and ground of the mean colour that pales towards the horizon.
 
     end: distance at which the transition of the last tiles is complete. low: sine of the angle below the horizon there.
+    light: whose sun is in the sky; None: no sun.
     """
 
     zenith: Float32[Array, "3"]
@@ -33,6 +36,7 @@ class Backdrop:
     ground: Float32[Array, "3"]
     end: float
     low: float
+    light: Light | None = field(default=None, kw_only=True)
 
     @property
     def begin(self) -> float:
@@ -42,6 +46,9 @@ class Backdrop:
     @staticmethod
     def for_eye(terrain: EndlessTerrain, eye: Vector, sky: Sky, ground_colour: Sequence[float] | Array) -> "Backdrop":
         """The backdrop that an eye sees behind a terrain."""
+        light, bare = terrain.light and terrain.light.light, np.asarray(ground_colour, np.float32)
+        if light:
+            sky, ground_colour = light.change_sky(sky), relight(bare, light.ground_ratio)
         zenith, horizon, ground = (np.asarray(c, np.float32) for c in (sky.zenith, sky.horizon, ground_colour))
         if isinstance(sphere := terrain.heights, Sphere):
             far, reach, radius = float(np.linalg.norm(eye)), find_reach(terrain, sphere, eye), sphere.radius
@@ -53,16 +60,37 @@ class Backdrop:
             low = max((square + reach * reach) / (2 * far * reach) - dip, LOWEST)
             return SphereBackdrop(zenith, horizon, ground, reach, low, eye, dip, radius)
         end, (lowest, _, _) = terrain.reach * terrain.side, terrain.heights.bounds
-        return Backdrop(zenith, horizon, ground, end, (eye[2] - lowest) / end)
+        low = (eye[2] - lowest) / end
+        if isinstance(terrain.heights, FlatSurface):
+            return Backdrop(zenith, horizon, ground, end, low, light=light)
+        colours = FarColours(bare, horizon, end, light)
+        rings = FarGround.around(eye, terrain.heights, colours)
+        return RoughBackdrop(zenith, horizon, ground, end, low, colours, rings, terrain.light, eye, light=light)
 
     def colours_along(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
-        """Colours in directions of any length."""
+        """Colours in directions of any length, without the sun."""
         rise = (directions[..., 2] / np.linalg.norm(directions, axis=-1))[..., None]
         above = self.horizon + (self.zenith - self.horizon) * np.clip(rise, 0, 1) ** 0.5
-        below = self.ground + (self.horizon - self.ground) * np.exp(np.clip(rise, -1, 0) / (0.3 * self.low))
+        below = self.ground + (self.horizon - self.ground) * self.haze_below(rise)
         return np.where(rise > 0, above, below).astype(np.float32)
 
-    def blend_far(self, field: GaussianField) -> GaussianField:
+    def show(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
+        """Colours of pixels that see in directions of any length."""
+        colours = self.colours_along(directions)
+        if self.light is None:
+            return colours
+        rays = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+        return np.where(rays[..., 2:] > 0, self.light.add_sun(colours, rays), colours).astype(np.float32)
+
+    def haze_below(self, rise: Float[Array, "*n"]) -> Float[Array, "*n"]:
+        """Share of the horizon's colour in directions below it. rise: sine of the angle above it."""
+        return np.exp(np.clip(rise, -1, 0) / (0.3 * self.low))
+
+    def colours_behind(self, to: Float[Array, "n 3"], slope: Slope) -> Float32[Array, "n 3"]:
+        """Colours that distant Gaussians go over into. to: from the eye. slope: of the surface."""
+        return self.colours_along(to)
+
+    def blend_far(self, field: GaussianField, slope: Slope) -> GaussianField:
         """Blend the colours of distant Gaussians (positions relative to the eye) into the backdrop.
 
         Colours are blended, not opacities: a stack of fading Gaussians would stay opaque until the very end.
@@ -73,8 +101,28 @@ class Backdrop:
         if not share.any():
             return field
         sh = field.sh.copy()
-        sh[:, 0] += share[:, None].astype(np.float32) * (rgb_to_sh(self.colours_along(to))[:, 0] - sh[:, 0])
+        sh[:, 0] += share[:, None].astype(np.float32) * (rgb_to_sh(self.colours_behind(to, slope))[:, 0] - sh[:, 0])
         return replace(field, sh=sh)
+
+
+@dataclass(frozen=True)
+class RoughBackdrop(Backdrop):
+    """Hills that fade into haze, before a plane through the lowest ground, whose haze ends at the horizon."""
+
+    colours: FarColours
+    rings: FarGround
+    placed: PlacedLight | None
+    eye: Vector
+
+    def haze_below(self, rise: Float[Array, "*n"]) -> Float[Array, "*n"]:
+        return -np.expm1(self.low / (HAZE * np.minimum(rise, -1e-6)))
+
+    def colours_behind(self, to: Float[Array, "n 3"], slope: Slope) -> Float32[Array, "n 3"]:
+        seen = self.placed.visible(*(to[:, :2] + self.eye[:2]).T) if self.placed else 1.0
+        return self.colours.at(np.linalg.norm(to, axis=1), slope, seen)
+
+    def show(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
+        return self.rings.paint(directions, super().show(directions))
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from dav_gswt.terrain import heights
 from dav_gswt.terrain.class_rules import NOISE, apply_rule, warn_of_missing
 from dav_gswt.terrain.classes import Classes
 from dav_gswt.terrain.heights import FlatSurface, HeightField
+from dav_gswt.terrain.light import PlacedLight
 from dav_gswt.terrain.scatter import Scatter
 from dav_gswt.terrain.variation import Variation
 from dav_gswt.tiles.layout import EDGES
@@ -36,7 +37,8 @@ class EndlessTerrain:
     material's tiles. near: distance of the near plane. reach: distance to the last tiles, in tile sides; beyond it the
     ground has the terrain's mean colour. classes: which material lies where; None with one. objects:
     objects[number][level], about the foot. extents: of each object, the largest distance of a Gaussian's rim from the
-    foot. scatter: where they stand; None without objects. variation: of colours, not on a sphere; None: none.
+    foot. scatter: where they stand; None without objects. variation: of colours, not on a sphere; None: none. light: of
+    sun and sky around an eye; None: as captured.
     """
 
     tiles: dict[tuple[int, int], GaussianField]
@@ -57,6 +59,7 @@ class EndlessTerrain:
     extents: list[float] = field(default_factory=list)
     scatter: Scatter | None = None
     variation: Variation | None = None
+    light: PlacedLight | None = None
 
     @property
     def object_entries(self) -> Sequence[ObjectEntry]:
@@ -111,7 +114,7 @@ def terrain_from_fields(
     """
     levels, entries, side = manifest.levels, manifest.tiles, manifest.tile_side
     largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles for f in row)
-    surface = heights.surface_from_config(surface, side) if isinstance(surface, dict) else surface
+    surface = heights.surface_from_config(surface, side, manifest.eye_floor) if isinstance(surface, dict) else surface
     heights.require_plain_cover(surface, manifest.classes, manifest.objects)
     classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, surface)
     beyond = (RIM - 3) * largest  # the manifest's heights reach three deviations beyond the centres

@@ -13,7 +13,7 @@ from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain.choice import Ints, Vector
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import Sphere, displace_field
-from dav_gswt.terrain.placement import collect_tiles, vary_objects
+from dav_gswt.terrain.placement import collect_tiles, colour_objects
 from dav_gswt.terrain.scatter import Instances
 from dav_gswt.terrain.visibility import GridCells, choose_tiles, count_levels
 
@@ -87,7 +87,7 @@ def _place_objects(terrain: EndlessTerrain, cells: GridCells, level: int, corner
     row = np.repeat(np.arange(len(found)), [len(field) for field in fields])
     feet, way = place_feet(terrain, found) - corner, turn_rows(np.radians(found.turn))
     field = turn_and_scale(concatenate_fields(fields), way[row], found.size[row], feet[row])
-    yield vary_objects(terrain, field, found, row)
+    yield colour_objects(terrain, field, found, row)
 
 
 def place_feet(terrain: EndlessTerrain, found: Instances) -> Float[Array, "n 3"]:

@@ -28,6 +28,10 @@ HILLS = 3  # axis of the hash of octave 0, after west, south and centre; octave 
 GAIN = 0.4  # height of an octave over that of the one twice as wide
 SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells; else all are 0 at the corners of the first
 STEEPEST = 2.75  # upper bound of the slope of the noise, per cell, over all gradients at the corners
+WAVELENGTH = (24.0, 16.0, 32.0)  # of hills of no size: in heights of the eye; at least and at most, in tile sides
+WALKABLE = (
+    0.25  # height of hills over their wavelength: half of the ground is less steep than 0.14, 1 % steeper than 0.36
+)
 FARTHEST = 1e9  # units from 0 to a height: more is refused by the page too
 MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in use takes textures of this size
 PIXELS = "heights.bin"  # the pixels of a height map in a page: float32, little-endian, rows from the north
@@ -58,9 +62,13 @@ class HeightField:
         """h and its derivatives by x and y at points of the world."""
         return np.zeros(len(x)), np.zeros((len(x), 2))
 
+    def smooth_at(self, x: Floats, y: Floats, spacing: Float[Array, "#n"]) -> tuple[Floats, Float[Array, "n 2"]]:
+        """`at` without detail that points at this spacing cannot show, where the surface can leave that out."""
+        return self.at(x, y)
+
     @classmethod
-    def from_config(cls, entry: Mapping[str, Any], side: float) -> "HeightField":
-        """The surface of the config's `heights`. side: of a tile. Raises: InputError: it cannot be made."""
+    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float = 0.0) -> "HeightField":
+        """The surface of the config's `heights`; see `surface_from_config`. Raises: InputError: it cannot be made."""
         return cls()
 
     def describe(self) -> tuple[dict[str, Any], bytes]:
@@ -73,12 +81,14 @@ class HeightField:
         return parse_record(dict(entry), cls)
 
 
-def surface_from_config(entry: Mapping[str, Any], side: float) -> HeightField:
-    """The surface that the config's `heights` describes; side: of a tile, the unit of hills and of the sphere.
+def surface_from_config(entry: Mapping[str, Any], side: float, eye: float = 0.0) -> HeightField:
+    """The surface that the config's `heights` describes.
+
+    Args:   side: of a tile, the unit of hills and of the sphere. eye: lowest height of the eye, for hills of no size.
 
     Raises: InputError: the image cannot be read (`read_height_map`), or its heights are beyond all bounds.
     """
-    return SURFACES[entry["kind"]].from_config(entry, side)
+    return SURFACES[entry["kind"]].from_config(entry, side, eye)
 
 
 def read_surface(folder: Path, entry: Mapping[str, Any], side: float) -> HeightField:
@@ -116,15 +126,20 @@ class Hills(HeightField, kind="hills"):
         return -self.height, self.height, STEEPEST * rise / self.wavelength
 
     def at(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
+        return self.smooth_at(x, y, np.zeros(1))
+
+    def smooth_at(self, x: Floats, y: Floats, spacing: Float[Array, "#n"]) -> tuple[Floats, Float[Array, "n 2"]]:
+        """An octave has its full height up to four points a cell, and none below two."""
         octaves = np.arange(self.octaves)[:, None]
         cells = 2.0**octaves / self.wavelength
         noise, gradient = gradient_noise(
             x * cells + octaves * SHIFT[0], y * cells + octaves * SHIFT[1], HILLS + octaves, self.salt
         )
         height, slope = np.zeros(len(x)), np.zeros((len(x), 2))
+        kept = np.clip(2 - 4 * spacing * cells, 0, 1)
         for octave, amplitude in enumerate(self._amplitudes()):
-            height += amplitude * noise[octave]
-            slope += amplitude * cells[octave] * gradient[octave]
+            height += kept[octave] * (amplitude * noise[octave])
+            slope += kept[octave][:, None] * (amplitude * cells[octave] * gradient[octave])
         return height, slope
 
     def _amplitudes(self) -> list[float]:
@@ -134,8 +149,12 @@ class Hills(HeightField, kind="hills"):
         return [self.height * share / sum(shares) for share in shares]
 
     @classmethod
-    def from_config(cls, entry: Mapping[str, Any], side: float) -> "Hills":
-        return cls(entry["height"] * side, entry["wavelength"] * side)
+    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float = 0.0) -> "Hills":
+        wavelength = entry["wavelength"]
+        if wavelength == "auto":
+            wavelength = min(max(WAVELENGTH[0] * eye / side, WAVELENGTH[1]), WAVELENGTH[2])
+        height = WALKABLE * wavelength if entry["height"] == "auto" else entry["height"]
+        return cls(height * side, wavelength * side)
 
 
 @dataclass(frozen=True)
@@ -172,7 +191,7 @@ class HeightMap(HeightField, kind="image"):
         return height, slope * per_unit
 
     @classmethod
-    def from_config(cls, entry: Mapping[str, Any], side: float) -> "HeightMap":
+    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float = 0.0) -> "HeightMap":
         with np.errstate(over="ignore"):  # what becomes infinite is refused
             pixels = read_height_map(path := locate_path(entry["file"])) * np.float32(entry["height"])
         fault, bad = f"times heights.height is beyond {FARTHEST:g} units", ~(np.abs(pixels) <= FARTHEST)
@@ -223,7 +242,7 @@ class Sphere(HeightField, kind="sphere"):
         return np.tan((np.stack([a, b], -1) / self.cells - 0.5) * QUARTER)
 
     @classmethod
-    def from_config(cls, entry: Mapping[str, Any], side: float) -> "Sphere":
+    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float = 0.0) -> "Sphere":
         return make_sphere(entry["radius"], side)
 
     def describe(self) -> tuple[dict[str, Any], bytes]:

@@ -20,6 +20,7 @@ from dav_gswt.images.figures import encode_jpeg
 from dav_gswt.images.image_files import read_photo, shrink_to
 from dav_gswt.terrain.class_rules import NOISE, apply_rule
 from dav_gswt.terrain.heights import PIXELS, FlatSurface, HeightField, require_plain_cover
+from dav_gswt.terrain.light import apply_light
 from dav_gswt.terrain.page_story import SHEET, STORY, Story
 
 INDEX, STILL = "index.html", "first.jpg"
@@ -79,6 +80,8 @@ def write_page(
     surface: HeightField | None = None,
     rule: Sequence[dict[str, Any]] = NOISE,
     front: Front | None = None,
+    sun: Any = "off",
+    wind: float = 0.0,
 ) -> None:
     """Copy viewer, manifest and parts to `out_dir`, atomically: an older page stays until the new one is complete.
 
@@ -86,12 +89,12 @@ def write_page(
 
     Args:   surface: of the terrain (default: level ground), stored in the page's manifest as `heights`. rule: the
             config's `classes`, stored as those of the page's manifest. front: name of the scene, line about it, first
-            still and story (default: the viewer's own texts, no still, no story).
+            still and story (default: the viewer's own texts, no still, no story). sun, wind: of the config.
     Raises: InputError: a part is missing; see also `manifest.read_manifest`,
             `class_rules.apply_rule`, `heights.require_plain_cover`.
     """
     bundle, viewer, out, surface = Path(bundle_dir), Path(viewer_dir), Path(out_dir), surface or FlatSurface()
-    manifest = apply_rule(read_manifest(bundle), rule)
+    manifest = apply_light(apply_rule(read_manifest(bundle), rule), sun, wind, surface)
     require_plain_cover(surface, manifest.classes, manifest.objects)
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
     copies += [(bundle / name, name) for name in _list_parts(bundle, manifest)]

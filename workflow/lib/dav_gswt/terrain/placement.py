@@ -15,6 +15,7 @@ from dav_gswt.terrain.choice import Floats, Vector
 from dav_gswt.terrain.draw_order import crossfade_opacity, level_weights, nearest_order
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import displace_means
+from dav_gswt.terrain.light import shade_field
 from dav_gswt.terrain.scatter import Instances
 from dav_gswt.terrain.variation import tint_field
 from dav_gswt.terrain.visibility import GridCells, active_levels, active_range
@@ -55,7 +56,7 @@ def collect_tiles(terrain: EndlessTerrain, cell: GridCells, levels: list[int]) -
     (i,), (j,), (tile,), (bits,) = cell.i.tolist(), cell.j.tolist(), cell.tile.tolist(), cell.materials.tolist()
     if terrain.classes is None or bits & (bits - 1) == 0:
         material = tile // terrain.tiles_each
-        return {level: _vary_colours(terrain, terrain.tiles[level, tile], i, j, material) for level in levels}
+        return {level: _colour_ground(terrain, terrain.tiles[level, tile], i, j, material) for level in levels}
     found, each = {}, terrain.tiles_each
     for level in levels:
         parts = {
@@ -64,29 +65,33 @@ def collect_tiles(terrain: EndlessTerrain, cell: GridCells, levels: list[int]) -
         field = concatenate_fields(list(parts.values()))
         material = np.repeat(list(parts), [len(part) for part in parts.values()])
         kept = terrain.classes.keep(i, j, field.means, material)
-        found[level] = _vary_colours(terrain, field[kept], i, j, material[kept])
+        found[level] = _colour_ground(terrain, field[kept], i, j, material[kept])
     return found
 
 
-def _vary_colours(
+def _colour_ground(
     terrain: EndlessTerrain, field: GaussianField, i: int, j: int, material: int | Int[Array, "n"]
 ) -> GaussianField:
     """Gaussians of a cell, positions from its corner, with the colours of their places."""
-    if terrain.variation is None:
+    if terrain.variation is None and terrain.light is None:
         return field
     x, y = (at * terrain.side + field.means[:, axis].astype(float) for axis, at in enumerate((i, j)))
-    return tint_field(field, terrain.variation.at(x, y, material))
+    if terrain.variation is not None:
+        field = tint_field(field, terrain.variation.at(x, y, material))
+    return field if terrain.light is None else shade_field(field, terrain.light.ground_ratio(x, y))
 
 
-def vary_objects(
+def colour_objects(
     terrain: EndlessTerrain, field: GaussianField, found: Instances, row: Int[Array, "n"]
 ) -> GaussianField:
     """Gaussians of objects with the colours of the ground at their feet. row: the object of each."""
-    if terrain.variation is None:
+    if terrain.variation is None and terrain.light is None:
         return field
     x, y = (found.i + found.u) * terrain.side, (found.j + found.v) * terrain.side
-    material = np.array([each.material for each in terrain.object_entries])[found.number]
-    return tint_field(field, terrain.variation.at(x, y, material)[row])
+    if terrain.variation is not None:
+        material = np.array([each.material for each in terrain.object_entries])[found.number]
+        field = tint_field(field, terrain.variation.at(x, y, material)[row])
+    return field if terrain.light is None else shade_field(field, terrain.light.object_ratio(x, y)[row])
 
 
 def order_gaussians(parts: dict[int, GaussianField], direction: Vector) -> Part:
@@ -182,4 +187,4 @@ def place_objects(terrain: EndlessTerrain, found: Instances, cell: tuple[int, in
     field, level = concatenate_parts(parts)
     row = np.repeat(sequence, [len(levels) for _, levels in parts])
     field = turn_and_scale(field, turn_rows(angle)[row], found.size[row], feet[row])
-    return vary_objects(terrain, field, found, row), level
+    return colour_objects(terrain, field, found, row), level

@@ -16,6 +16,7 @@ from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.choice import Vector
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import Sphere
+from dav_gswt.terrain.light import Light, light_of, place_light
 from dav_gswt.terrain.placement import group_by_cell, place_cell
 from dav_gswt.terrain.planet import place_on_sphere, visible_on_sphere
 from dav_gswt.terrain.sphere import frame_at, walk_from
@@ -83,7 +84,7 @@ def render_shot(
 ) -> Float32[Array, "h w 3"]:
     """Render a shot with the eye floor, sky and ground colour of the bundle's manifest."""
     camera = shot_camera(shot, terrain, manifest.eye_floor, width, height)
-    return render_view(terrain, camera, manifest.sky, manifest.ground_colour)
+    return render_view(terrain, camera, manifest.sky, manifest.ground_colour, light=light_of(manifest))
 
 
 def render_view(
@@ -92,18 +93,21 @@ def render_view(
     sky: Sky,
     ground_colour: Sequence[float] | Array,
     exact: bool = False,
+    light: Light | None = None,
 ) -> Float32[Array, "h w 3"]:
     """Render the terrain; pixels that no tile covers show the sky above the horizon and the far ground below it.
 
     Tiles are drawn back to front, each in a pre-sorted order; the 3 x 3 block about the eye is drawn last and sorted by
     depth.
 
-    Args:   exact: sort all Gaussians together by depth, as a reference.
+    Args:   exact: sort all Gaussians together by depth, as a reference. light: of sun and sky; None: as captured.
     Raises: ValueError: an orthographic camera, whose rays have no common origin.
     """
     if camera.orthographic:
         raise ValueError("the terrain is drawn for a pinhole camera")
     eye, here, surface = camera.centre, replace(camera, translation=np.zeros(3)), terrain.heights
+    if light:
+        terrain = replace(terrain, light=place_light(light, surface, terrain.side, eye))
     sphere = surface if isinstance(surface, Sphere) else None
     cells = visible_on_sphere(terrain, sphere, camera) if sphere else visibility.visible_cells(terrain, camera)
     terrain = visibility.coarsen_to_budget(terrain, camera, MAX_GAUSSIANS, cells)
@@ -115,7 +119,7 @@ def render_view(
             field, slope = place_on_sphere(terrain, sphere, cells[k : k + 1], eye)
         else:
             field, slope = place_cell(terrain, cells[k : k + 1], eye, things.get(k))
-        return splats.project(backdrop.blend_far(field), slope, here, terrain.near)[0]
+        return splats.project(backdrop.blend_far(field, slope), slope, here, terrain.near)[0]
 
     far, close = [splats.EMPTY], [splats.EMPTY]
     with ThreadPoolExecutor(default_threads()) as pool:  # NumPy works beside itself; each cell is on its own
@@ -123,4 +127,4 @@ def render_view(
             (close if exact or cells.close[k] else far).append(part)
     last = splats.Splats.concatenate(close)
     seen = splats.blend(splats.Splats.concatenate([*far, last[splats.depth_order(last)]]), here)
-    return np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop.colours_along(here.rays()[1]), 0, 1)
+    return np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop.show(here.rays()[1]), 0, 1)
