@@ -22,6 +22,7 @@ import { findHour, luminance, measureLight, placeSun, sunAt } from "./sun.js";
 
 export const GAMMA = 2.2; // exponent that stands for the curve of sRGB
 export const MOST = 4; // times the captured light, of any ground
+const EXPOSED = 0.7; // share of a change of brightness, in stops, that the exposure makes up for
 const HAZE = 0.1; // share of the sun's beam in the light of the horizon
 const TURN = 8; // milliseconds of work on shadows between which others have a turn
 
@@ -37,16 +38,18 @@ const relight = (colour, ratio) => colour.map((v, k) => Math.min(Math.max(v * ra
  */
 export function lightBelow({ sky, ground_colour: ground }, captured, sun) {
   const before = measureLight(captured.elevation), now = measureLight(sun.elevation);
-  const exposure = Math.sqrt(luminance(before.level) / luminance(now.level)); // half of the change, in stops
+  const exposure = (luminance(before.level) / luminance(now.level)) ** EXPOSED;
   const direct = now.direct.map((v, k) => (exposure * v) / before.level[k]);
   const ambient = now.sky.map((v, k) => (exposure * v) / before.level[k]);
   const level = direct.map((v, k) => Math.min(v * Math.max(sun.direction[2], 0) + ambient[k], MOST));
   const above = now.sky.map((v, k) => (exposure * v) / before.sky[k]);
   const haze = now.sky.map((v, k) => (exposure * (v + HAZE * now.direct[k])) / (before.sky[k] + HAZE * before.direct[k]));
+  /** No brighter than it was captured. @param {number[]} ratio */
+  const dim = (ratio) => ratio.map((v) => v / Math.max(luminance(ratio), 1));
   const brightest = Math.max(...now.direct);
   return {
-    sun, direct, ambient, level: level.map((v) => v ** (1 / GAMMA)), zenith: relight(sky.zenith, above),
-    horizon: relight(sky.horizon, haze), ground: relight(ground, level),
+    sun, direct, ambient, level: level.map((v) => v ** (1 / GAMMA)), zenith: relight(sky.zenith, dim(above)),
+    horizon: relight(sky.horizon, dim(haze)), ground: relight(ground, level),
     sunColour: now.direct.map((v) => (v / brightest) ** (1 / GAMMA)),
   };
 }
