@@ -39,7 +39,8 @@ export function createSky(gl, manifest) {
   const sphere = heights?.kind === "sphere" ? heights : null;
   const plain = createProgram(gl, VERTEX, fragmentShader(sphere !== null));
   const sunny = manifest.light && !sphere ? createProgram(gl, VERTEX, fragmentShader(false, true)) : plain;
-  const long = sky.sun ? Math.hypot(...sky.sun.direction) : 1, own = sky.sun?.direction.map((v) => v / long) ?? [0, 0, 0];
+  const long = sky.sun ? Math.hypot(...sky.sun.direction) : 1;
+  const own = sky.sun?.direction.map((v) => v / long) ?? [0, 0, 0];
   return {
     /**
      * Fill the picture; low: sine of the angle below the horizon at which tiles end.

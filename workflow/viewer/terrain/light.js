@@ -11,7 +11,7 @@ import { findHour, luminance, measureLight, placeSun, sunAt } from "./sun.js";
  * @typedef {import("./sun.js").Sun & { hour: number }} DaySun
  *
  * direct: light of ground that faces the sun; ambient: of the whole sky; both over that of level ground as captured;
- * level: what sRGB colours of open, level ground are multiplied by; the others are sRGB colours; shadows: null: none yet.
+ * level: what sRGB colours of open, level ground are multiplied by; the others are sRGB; shadows: null: none yet.
  * @typedef {{ sun: DaySun, direct: number[], ambient: number[], level: number[], zenith: number[], horizon: number[],
  *   ground: number[], sunColour: number[], shadows: import("./shadows.js").Shadows | null }} Lighting
  * @typedef {NonNullable<ReturnType<typeof createLight>>} Light

@@ -57,13 +57,13 @@ function describe(story) {
   return [drawPlan(story), listRounds(story), text, showPhotos(story)];
 }
 
-/** Which sun the colours contain, and what stays as in the photos. @param {import("../terrain/light.js").LightEntry} [light] */
+/** Which sun the colours contain, and what stays. @param {import("../terrain/light.js").LightEntry} [light] */
 function describeLight(light) {
   if (!light) return [];
   const { elevation, azimuth, source } = light, text = document.createElement("p");
   text.textContent = `The photos show light of a sun ${Math.round(elevation)}° high in the `
     + `${COMPASS[Math.round(azimuth / 45) % COMPASS.length]}, ${SOURCES[source]}. `
-    + "The time of day changes sky, hills and their shadows; ripples, stones, and the shade on objects stay as they were.";
+    + "The time of day changes sky, hills and their shadows; ripples, stones and the shade on objects stay.";
   return [text];
 }
 
