@@ -16,7 +16,8 @@ GROUND = Ground(speckle=40, things=4)
 HILLS = Hills(3.0 * GROUND.side, 12.0 * GROUND.side, 3, 5)
 LIGHT = {"elevation": 40.0, "azimuth": 200.0, "source": "assumed"}
 PLACE = dict(x=3.0, y=5.0, eye=2.0, yaw=60.0, pitch=-12.0)
-CAPTURED = 6 + np.degrees(np.arctan2(np.hypot(np.cos(np.radians(20)), np.tan(np.radians(40))), np.sin(np.radians(200)))) / 15
+NORTH, UP, EAST = np.cos(np.radians(20)), np.tan(np.radians(40)), np.sin(np.radians(200))  # over cos 40
+CAPTURED = 6 + np.degrees(np.arctan2(np.hypot(NORTH, UP), EAST)) / 15  # hours
 
 BELOW = """async (cases) => {
   const { createSky } = await import("./draw/sky.js"), { lightBelow } = await import("./terrain/light.js");
@@ -118,7 +119,8 @@ def test_ground_has_the_light_and_the_shadows_of_the_library(modules):
 def test_open_level_ground_keeps_its_colours_below_the_captured_sun(modules, elevation):
     level, margins, soft = modules.evaluate(
         """async (elevation) => {
-          const { lightBelow } = await import("./terrain/light.js"), { createShadows } = await import("./terrain/shadows.js");
+          const { lightBelow } = await import("./terrain/light.js");
+          const { createShadows } = await import("./terrain/shadows.js");
           const { placeSun } = await import("./terrain/sun.js"), sun = placeSun(elevation, 200);
           const made = createShadows({ at: () => [7, 0, 0] }, 4);
           while (!made.step(9, 9, sun, 1000));
@@ -240,7 +242,9 @@ def test_painters_of_other_pages_follow_the_sun(blank, still, address):
           const { sun } = terrain, refused = [];
           terrain.setSun("off");
           refused.push(terrain.sun);
-          for (const hour of [NaN, "noon", undefined]) try { terrain.setSun(hour); } catch (error) { refused.push(error.name); }
+          for (const hour of [NaN, "noon", undefined]) {
+            try { terrain.setSun(hour); } catch (error) { refused.push(error.name); }
+          }
           return [[captured, sun], btoa(Array.from(bytes, (v) => String.fromCharCode(v)).join("")), complete, refused];
         }""",
         PLACE,

@@ -25,7 +25,8 @@ import { setHorizon } from "./sky.js";
  *
  * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there;
  * light: null: colours as captured.
- * @typedef {{ end: number, low: number, overlay: number, light: import("../terrain/light.js").Lighting | null }} DrawOptions
+ * @typedef {{ end: number, low: number, overlay: number,
+ *   light: import("../terrain/light.js").Lighting | null }} DrawOptions
  * @typedef {ReturnType<typeof createSplats>} Splats
  */
 
@@ -183,7 +184,8 @@ export function createSplats(gl, manifest, heights) {
     relief,
     /** Free the textures. */
     end() {
-      for (const texture of [records, entries, nearEntries, places, hues, owners, relief, shadows?.texture ?? null]) gl.deleteTexture(texture);
+      for (const texture of [records, entries, nearEntries, places, hues, owners, relief]) gl.deleteTexture(texture);
+      if (shadows) gl.deleteTexture(shadows.texture);
     },
   };
 }

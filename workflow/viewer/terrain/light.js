@@ -10,8 +10,8 @@ import { findHour, luminance, measureLight, placeSun, sunAt } from "./sun.js";
  * @typedef {{ elevation: number, azimuth: number, source: string }} LightEntry
  * @typedef {import("./sun.js").Sun & { hour: number }} DaySun
  *
- * direct: light of ground that faces the sun; ambient: of the whole sky; both over that of level ground as captured; level:
- * what sRGB colours of open, level ground are multiplied by; the others are sRGB colours; shadows: null: none yet.
+ * direct: light of ground that faces the sun; ambient: of the whole sky; both over that of level ground as captured;
+ * level: what sRGB colours of open, level ground are multiplied by; the others are sRGB; shadows: null: none yet.
  * @typedef {{ sun: DaySun, direct: number[], ambient: number[], level: number[], zenith: number[], horizon: number[],
  *   ground: number[], sunColour: number[], shadows: import("./shadows.js").Shadows | null }} Lighting
  * @typedef {NonNullable<ReturnType<typeof createLight>>} Light
@@ -43,9 +43,14 @@ export function lightBelow({ sky, ground_colour: ground }, captured, sun) {
   const ambient = now.sky.map((v, k) => (exposure * v) / before.level[k]);
   const level = direct.map((v, k) => Math.min(v * Math.max(sun.direction[2], 0) + ambient[k], MOST));
   const above = now.sky.map((v, k) => (exposure * v) / before.sky[k]);
+<<<<<<< HEAD
   const haze = now.sky.map((v, k) => (exposure * (v + HAZE * now.direct[k])) / (before.sky[k] + HAZE * before.direct[k]));
   /** No brighter than it was captured. @param {number[]} ratio */
   const dim = (ratio) => ratio.map((v) => v / Math.max(luminance(ratio), 1));
+=======
+  const [hazeBefore, hazeNow] = [before, now].map((one) => one.sky.map((v, k) => v + HAZE * one.direct[k]));
+  const haze = hazeNow.map((v, k) => (exposure * v) / hazeBefore[k]);
+>>>>>>> lightjs
   const brightest = Math.max(...now.direct);
   return {
     sun, direct, ambient, level: level.map((v) => v ** (1 / GAMMA)), zenith: relight(sky.zenith, dim(above)),
@@ -86,7 +91,11 @@ export function createLight(manifest, heights) {
     get now() {
       return below && { ...below, shadows: shadows?.made ?? null };
     },
-    /** Work on shadows for some milliseconds. Returns: are those that an eye sees whole? @param {number[]} eye @param {number} milliseconds */
+    /**
+     * Work on shadows for some milliseconds. Returns: are those that an eye sees whole?
+     *
+     * @param {number[]} eye @param {number} milliseconds
+     */
     step: ([x, y], milliseconds) => !below || !shadows || shadows.step(x, y, below.sun, milliseconds),
     /** Make the shadows that an eye sees. @param {number[]} eye */
     async finish(eye) {
