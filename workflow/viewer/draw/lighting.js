@@ -28,14 +28,6 @@ uniform vec2 shadowUnder;        // the eye in that texture
 uniform float shadowScale, soft; // of places seen from the eye; margin at which the sun is whole
 float sunShare(vec2 at) {
   return clamp(0.5 + textureLod(shadows, shadowUnder + at * shadowScale, 0.0).r / (2.0 * soft), 0.0, 1.0);
-<<<<<<< HEAD
-=======
-}
-vec3 lit(vec3 colour, vec2 slope, float share) { // sRGB on ground of a slope; share: of the sun in sight
-  float n = inversesqrt(1.0 + dot(slope, slope)), lambert = max((toSun.z - dot(toSun.xy, slope)) * n, 0.0);
-  vec3 ratio = min(direct * (lambert * share) + ambient * (0.5 + 0.5 * n), ${MOST.toFixed(1)});
-  return clamp(colour * pow(ratio, vec3(${1 / GAMMA})), 0.0, 1.0);
->>>>>>> lightjs
 }`;
 
 /** What a vertex shader declares, by the kind of its surface. @param {string} kind */
@@ -43,13 +35,8 @@ export const lightCode = (kind) => (kind === "flat" ? LEVEL_CODE : SHADOW_CODE);
 
 /** Change of a Gaussian's colour; objects are upright, and lit as level ground at their foot. @param {string} kind */
 export const lightPaint = (kind) => (kind === "flat" ? "  one.paint.rgb = clamp(one.paint.rgb * levelLight, 0.0, 1.0);"
-<<<<<<< HEAD
   : `  shine = shineOn(place > 0u ? vec2(0.0) : rise.yz, sunShare(place > 0u ? cell * side + corner.xy : seen.xy));
   one.paint.rgb = clamp(one.paint.rgb * shine, 0.0, 1.0);`);
-=======
-  : `  float share = sunShare(place > 0u ? cell * side + corner.xy : seen.xy);
-  one.paint.rgb = lit(one.paint.rgb, place > 0u ? vec2(0.0) : rise.yz, share);`);
->>>>>>> lightjs
 
 /** Glow of the sky about the sun, see terrain/light.py. */
 export const GLOW = `

@@ -35,17 +35,10 @@ void main() {
 
 /** @param {import("./gl.js").GL} gl @param {import("../data/manifest.js").Manifest} manifest */
 export function createSky(gl, manifest) {
-<<<<<<< HEAD
   const { sky, heights } = manifest, kind = heights?.kind ?? "flat", empty = gl.createVertexArray();
   const sphere = heights?.kind === "sphere" ? heights : null;
   const plain = createProgram(gl, VERTEX, fragmentShader(kind));
   const sunny = manifest.light && !sphere ? createProgram(gl, VERTEX, fragmentShader(kind, true)) : plain;
-=======
-  const { sky, heights } = manifest, empty = gl.createVertexArray();
-  const sphere = heights?.kind === "sphere" ? heights : null;
-  const plain = createProgram(gl, VERTEX, fragmentShader(sphere !== null));
-  const sunny = manifest.light && !sphere ? createProgram(gl, VERTEX, fragmentShader(false, true)) : plain;
->>>>>>> lightjs
   const long = sky.sun ? Math.hypot(...sky.sun.direction) : 1;
   const own = sky.sun?.direction.map((v) => v / long) ?? [0, 0, 0];
   return {

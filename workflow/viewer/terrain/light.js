@@ -43,14 +43,10 @@ export function lightBelow({ sky, ground_colour: ground }, captured, sun) {
   const ambient = now.sky.map((v, k) => (exposure * v) / before.level[k]);
   const level = direct.map((v, k) => Math.min(v * Math.max(sun.direction[2], 0) + ambient[k], MOST));
   const above = now.sky.map((v, k) => (exposure * v) / before.sky[k]);
-<<<<<<< HEAD
-  const haze = now.sky.map((v, k) => (exposure * (v + HAZE * now.direct[k])) / (before.sky[k] + HAZE * before.direct[k]));
-  /** No brighter than it was captured. @param {number[]} ratio */
-  const dim = (ratio) => ratio.map((v) => v / Math.max(luminance(ratio), 1));
-=======
   const [hazeBefore, hazeNow] = [before, now].map((one) => one.sky.map((v, k) => v + HAZE * one.direct[k]));
   const haze = hazeNow.map((v, k) => (exposure * v) / hazeBefore[k]);
->>>>>>> lightjs
+  /** No brighter than it was captured. @param {number[]} ratio */
+  const dim = (ratio) => ratio.map((v) => v / Math.max(luminance(ratio), 1));
   const brightest = Math.max(...now.direct);
   return {
     sun, direct, ambient, level: level.map((v) => v ** (1 / GAMMA)), zenith: relight(sky.zenith, dim(above)),
