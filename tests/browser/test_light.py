@@ -41,15 +41,16 @@ BELOW = """async (cases) => {
 
 SHADED = """async ({ lights, shadows: { sun: [elevation, azimuth], hills, side, eye, points } }) => {
   // the shader's functions, run by transform feedback: of light, and of the texture of shadows
-  const { createShadowTexture, lightCode } = await import("./draw/lighting.js");
+  const { createShadowTexture, lightCode, shineCode } = await import("./draw/lighting.js");
   const { createHeights } = await import("./terrain/heights.js");
   const { createShadows } = await import("./terrain/shadows.js"), { placeSun } = await import("./terrain/sun.js");
   const gl = new OffscreenCanvas(1, 1).getContext("webgl2"), program = gl.createProgram();
   const vertex = `#version 300 es
+    ${shineCode(true)}
     ${lightCode("hills")}
     uniform vec3 given;
     out vec4 found;
-    void main() { found = vec4(lit(vec3(0.5), given.xy, given.z), sunShare(given.xy)); }`;
+    void main() { found = vec4(shineOn(given.xy, given.z), sunShare(given.xy)); }`;
   for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, "#version 300 es\\nvoid main() {}"]]) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, source);
@@ -78,7 +79,7 @@ SHADED = """async ({ lights, shadows: { sun: [elevation, azimuth], hills, side, 
     gl.uniform3fv(at("toSun"), placeSun(...sun).direction);
     gl.uniform3fv(at("direct"), direct);
     gl.uniform3fv(at("ambient"), ambient);
-    return slopes.map((slope, k) => run(...slope, visible[k]).slice(0, 3).map(v => (v / 0.5) ** 2.2));
+    return slopes.map((slope, k) => run(...slope, visible[k]).slice(0, 3).map(v => v ** 2.2));
   });
   const turns = [], low = placeSun(elevation, azimuth);
   do turns.push(performance.now()); while (!made.step(eye[0], eye[1], low, 0));
