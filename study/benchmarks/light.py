@@ -72,7 +72,7 @@ def trace(mesh: mi.Mesh, sun: Sun, top: float, sky: bool) -> np.ndarray:
             "type": "orthographic", "to_world": look @ mi.ScalarTransform4f().scale([SIDE / 2, SIDE / 2, 1]),
             "far_clip": 1e4,
             "sampler": {"type": "multijitter", "sample_count": SAMPLES},
-            "film": {"type": "hdrfilm", "width": pixels, "height": pixels, "rfilter": {"type": "box"}, "pixel_format": "rgb"},
+            "film": {"type": "hdrfilm", "width": pixels, "height": pixels, "rfilter": {"type": "box"}},
         },
     }  # fmt: skip
     if sky:

@@ -97,9 +97,8 @@ class Light:
         beams, skies = zip(*(measure_light(each.elevation) for each in (self.captured, self.sun)), strict=True)
         above = self.exposure * skies[1] / skies[0]
         level = self.exposure * (skies[1] + HAZE * beams[1]) / (skies[0] + HAZE * beams[0])
-        zenith, horizon = (
-            relight(np.array(colour), each / max(each @ LUMINANCE, 1.0)) for colour, each in ((sky.zenith, above), (sky.horizon, level))
-        )
+        pairs = (sky.zenith, above), (sky.horizon, level)
+        zenith, horizon = (relight(np.array(colour), each / max(each @ LUMINANCE, 1.0)) for colour, each in pairs)
         return Sky(zenith.tolist(), horizon.tolist())
 
     @property
