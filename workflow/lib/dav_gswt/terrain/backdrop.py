@@ -12,7 +12,7 @@ from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.terrain.choice import Vector
 from dav_gswt.terrain.draw_order import finer_share
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.far_ground import HAZE, FarColours, FarGround
+from dav_gswt.terrain.far_ground import HAZE, FarColours, FarGround, lit
 from dav_gswt.terrain.heights import FlatSurface, Slope, Sphere
 
 FADE = 0.5  # share of the reach at which the transition begins
@@ -59,7 +59,7 @@ class Backdrop:
             return Backdrop(zenith, horizon, ground, end, low)
         colours = FarColours(ground, horizon, end)
         rings = FarGround.around(eye, terrain.heights, colours)
-        return RoughBackdrop(zenith, horizon, ground, end, low, colours, rings)
+        return RoughBackdrop(zenith, horizon, lit(ground, np.zeros(2)), end, low, colours, rings)
 
     def colours_along(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:
         """Colours in directions of any length."""

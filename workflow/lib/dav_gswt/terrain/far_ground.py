@@ -13,10 +13,10 @@ from numpy import ndarray as Array
 from dav_gswt.terrain.choice import Floats, Vector
 from dav_gswt.terrain.heights import HeightField
 
-RINGS, AZIMUTHS = 96, 384
-NEAREST, FARTHEST = 0.4, 12.5  # radii of the first and the last ring, over the distance of the last tiles
+RINGS, AZIMUTHS = 64, 288
+NEAREST, FARTHEST = 0.5, 12.5  # radii of the first and the last ring, over the distance of the last tiles
 HAZE = 2.5  # over the same: distance that leaves 1/e of the ground's colour
-SPACING = 0.037  # from ring to ring, over the radius
+SPACING = 0.0525  # from ring to ring, over the radius
 SINK = 0.005  # share of the distance by which rings lie below tiles, which would not hide all of them
 
 
@@ -63,7 +63,7 @@ class FarGround:
         distance = np.hypot(radius, height)
         painted = colours.at(distance, slope)
         height -= SINK * radius * np.clip(5 - 5 * distance / end, 0, 1)
-        rows = [(v.reshape(RINGS, AZIMUTHS, -1)) for v in (height / radius, painted)]
+        rows = [v.reshape(RINGS, AZIMUTHS, -1) for v in (height / radius, painted)]
         tangents, painted = (np.concatenate([v, v[:, :1]], 1) for v in rows)
         return FarGround(radii, tangents[..., 0], painted)
 
@@ -90,9 +90,7 @@ class FarGround:
             if met.any():
                 a, b = self.radii[ring - 1] * near[met], self.radii[ring] * far[met]
                 across = (a / np.where(a == b, 1, a - b))[:, None]
-                one, other = (
-                    _interpolate(self.colours[k], west[met], share[met, None]) for k in (ring - 1, ring)
-                )
+                one, other = (_interpolate(self.colours[k], west[met], share[met, None]) for k in (ring - 1, ring))
                 painted[at[met]] = one + across * (other - one)
                 at, rise, west, share, far = (v[~met] for v in (at, rise, west, share, far))
             near = far
