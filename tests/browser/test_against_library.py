@@ -93,6 +93,21 @@ def test_the_page_draws_what_the_library_draws_from_an_oblique_eye(still, pair):
     assert_alike(still, pair, PLACES["oblique"])
 
 
+@pytest.mark.parametrize("pair", ["hills"], indirect=True)
+@pytest.mark.parametrize("yaw", [100.0, 280.0])
+def test_the_page_draws_the_library_s_hills_up_to_the_horizon(still, pair, yaw):
+    address, terrain, manifest = pair
+    place = dict(x=3.0, y=5.0, eye=12.0, yaw=yaw, pitch=4.0)
+    drawn = still(address, 160, 100).at(**place) / 255
+    camera, light = camera_at(terrain, place), light_of(manifest)
+    expected = stills.render_view(terrain, camera, manifest.sky, manifest.ground_colour, light=light)
+    error = ((drawn - expected) ** 2).mean((1, 2))
+    ends = terrain.reach * SIDE
+    fall = np.degrees(np.arctan((place["eye"] + 2 * HILLS.height) / ends))  # lower, all is nearer than the last tiles
+    far = error[: int(50 + 138.6 * np.tan(np.radians(4 + fall)))]
+    assert -10 * np.log10(far.mean()) > 38, "pixels at silhouettes differ"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("pair, place", CASES, indirect=["pair"])
 def test_the_page_draws_what_the_library_draws(still, pair, place):
