@@ -33,9 +33,9 @@ float sunShare(vec2 at) {
 /** What a vertex shader declares, by the kind of its surface. @param {string} kind */
 export const lightCode = (kind) => (kind === "flat" ? LEVEL_CODE : SHADOW_CODE);
 
-/** Change of a Gaussian's colour; objects are upright, and lit as level ground at their foot. @param {string} kind */
+/** Change of a Gaussian's colour; objects are lit as the ground below them. @param {string} kind */
 export const lightPaint = (kind) => (kind === "flat" ? "  one.paint.rgb = clamp(one.paint.rgb * levelLight, 0.0, 1.0);"
-  : `  shine = shineOn(place > 0u ? vec2(0.0) : rise.yz, sunShare(place > 0u ? cell * side + corner.xy : seen.xy));
+  : `  shine = shineOn(rise.yz, sunShare(seen.xy));
   one.paint.rgb = clamp(one.paint.rgb * shine, 0.0, 1.0);`);
 
 /** Glow of the sky about the sun, see terrain/light.py. */

@@ -2,8 +2,8 @@
 
 The colours of Gaussians contain the light of level ground below the captured sun. Ground that slopes, or lies below
 another sun, is multiplied by the ratio of its own light to that light, in linear light. What is smaller than the
-surface stays as it was photographed: ripples, and the shading of objects, which are lit like level ground at their
-foot. The viewer's `terrain/light.js` and its shader compute the same; tests/golden/light.json holds both to it.
+surface stays as it was photographed: ripples, and the shading of objects, which are lit like the ground below them.
+The viewer's `terrain/light.js` and its shader compute the same; tests/golden/light.json holds both to it.
 """
 
 from dataclasses import dataclass, replace
@@ -136,10 +136,6 @@ class PlacedLight:
     def ground_ratio(self, x: Floats, y: Floats) -> Float[Array, "n 3"]:
         """Ratio of the light of ground at points of the world."""
         return self.light.ratio(self.surface.at(x, y)[1], self.visible(x, y))
-
-    def object_ratio(self, x: Floats, y: Floats) -> Float[Array, "n 3"]:
-        """Ratio of the light of objects whose feet are at points of the world."""
-        return self.light.ratio(np.zeros((len(x), 2)), self.visible(x, y))
 
     def visible(self, x: Floats, y: Floats) -> Floats:
         """Share of the sun's disc that is above the horizon."""
