@@ -72,6 +72,9 @@ class GalleryPage(ConfigModel):
     scenes: Names = key("whose terrains are shown")
     walk: Name = key("the scene of the walk")
     flight: Flight = key("the walk")
+    hours: Annotated[list[float], Field(min_length=2, max_length=2)] = key(
+        "solar time of the first and the last frame, where the terrain has a sun"
+    )
     width: int = key("of a frame", unit="pixels", ge=16, le=1920)
     height: int = key("of a frame", unit="pixels", ge=16, le=1080)
     rate: int = key("frames a second", ge=1, le=60)

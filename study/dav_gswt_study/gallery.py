@@ -5,17 +5,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import level_distances
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.files import atomic_file, read_json
 from dav_gswt.images import image_files
 from dav_gswt.images.figures import encode_jpeg
 from dav_gswt.materials.store import read_report
 from dav_gswt.sweeps import MEGA, select_metrics
 from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.light import light_of
 from dav_gswt.terrain.page import name_of_scene
+from dav_gswt.terrain.stills import Shot, render_view, shot_camera
 from dav_gswt_study.markdown import format_number, format_table
 
 HEIGHT, GAP = 300, 4  # pixels: of a row of pictures, and between two of them
@@ -38,6 +41,14 @@ def suit_width(terrain: EndlessTerrain, width: int) -> EndlessTerrain:
     factor = min(1.0, width / level_distances.WIDTH)
     scaled = ([factor * value for value in values] for values in (terrain.switches, terrain.bands))
     return replace(terrain, **dict(zip(("switches", "bands"), scaled, strict=True)))
+
+
+def render_moment(
+    terrain: EndlessTerrain, shot: Shot, manifest: Manifest, hour: float, width: int, height: int
+) -> Float32[Array, "h w 3"]:
+    """A shot of the terrain at a solar time."""
+    camera = shot_camera(shot, terrain, manifest.eye_floor, width, height)
+    return render_view(terrain, camera, manifest.sky, manifest.ground_colour, light=light_of(manifest, hour))
 
 
 def animate_frames(frames: Sequence[Float[Array, "h w 3"]], rate: int, out: Path | str) -> None:

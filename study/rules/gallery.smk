@@ -40,7 +40,7 @@ rule draw_scene:
 
 
 rule draw_walk:
-    """A walk over the terrain, as one moving picture."""
+    """A walk over the terrain while the sun moves, as one moving picture."""
     input:
         unpack(height_map),
         unpack(painted_files),
@@ -57,6 +57,8 @@ rule draw_walk:
     params:
         size={key: GALLERY.get(key) for key in ("width", "height")},
         heights=lookup(dpath="heights", within=config),
+        sun=lookup(dpath="sun", within=config),
+        hours=GALLERY.get("hours"),
         classes=lookup(dpath="classes", within=config),
         flight=GALLERY.get("flight"),
         rate=GALLERY["rate"],

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from dav_gswt.bundle import store
 from dav_gswt.logs import logging_to, progress
-from dav_gswt.terrain import endless, stills
+from dav_gswt.terrain import endless, light
 from dav_gswt_study import gallery
 from dav_gswt_study.terrain import walk
 
@@ -13,6 +15,8 @@ with logging_to(snakemake.log[0]):
     bundle = store.read_bundle(Path(snakemake.input.manifest[0]).parent)
     terrain = endless.terrain_from_bundle(bundle, params.heights, params.classes)
     terrain = gallery.suit_width(terrain, params.size["width"])
-    shots = progress(walk.walk_shots(**params.flight), "render walk")
-    frames = [stills.render_shot(terrain, shot, bundle.manifest, **params.size) for shot in shots]
+    manifest = light.apply_light(bundle.manifest, params.sun, 0.0, terrain.heights)
+    shots = walk.walk_shots(**params.flight)
+    moments = progress(list(zip(shots, np.linspace(*params.hours, len(shots)).tolist(), strict=True)), "render walk")
+    frames = [gallery.render_moment(terrain, shot, manifest, hour, **params.size) for shot, hour in moments]
     gallery.animate_frames(frames, params.rate, snakemake.output.picture)
