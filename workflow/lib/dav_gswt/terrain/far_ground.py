@@ -93,7 +93,8 @@ class FarGround:
                 across = (a / np.where(a == b, 1, a - b))[:, None]
                 one, other = (_interpolate(self.colours[k], west[met], share[met, None]) for k in (ring - 1, ring))
                 painted[at[met]] = one + across * (other - one)
-                at, rise, west, share, far = (v[~met] for v in (at, rise, west, share, far))
+                at, west = at[~met], west[~met]
+                rise, share, far = rise[~met], share[~met], far[~met]
             near = far
         return painted.reshape(behind.shape)
 
