@@ -63,8 +63,15 @@ uint mixBits(uint h) {
   h = (h ^ h >> 13) * 0xc2b2ae35u;
   return h ^ h >> 16;
 }
-uint hashCell(ivec2 cell, uint seed) { // seed: of axis and salt
-  return mixBits(mixBits(uint(cell.x) * 0x8da6b343u ^ seed) + uint(cell.y) * 0xd8163841u);
+/* Gradients of the noise at the corners of a cell: south-west, south-east, north-west, north-east. Signed integers,
+   which software renderers turn into floats in one step; seed: of axis and salt */
+void findGradients(ivec2 cell, uint seed, out vec4 east, out vec4 north) {
+  uint column = uint(cell.x) * 0x8da6b343u, row = uint(cell.y) * 0xd8163841u;
+  uvec2 mixed = uvec2(mixBits(column ^ seed), mixBits(column + 0x8da6b343u ^ seed));
+  uvec2 south = mixed + row, far = south + 0xd8163841u;
+  uvec4 bits = uvec4(mixBits(south.x), mixBits(south.y), mixBits(far.x), mixBits(far.y));
+  east = vec4(ivec4(bits & 0xffffu)) / 32767.5 - 1.0;
+  north = vec4(ivec4(bits >> 16)) / 32767.5 - 1.0;
 }`;
 
 /** @param {{ before?: string, kept?: string }} octave k: code before it, and a factor of it */
@@ -79,18 +86,12 @@ vec3 surface(vec2 at) { // height and slope at a place seen from the eye
   for (int k = 0; k < octaves; k++) {${before}
     vec2 p = placeUnder[k] + at * scale[k], cell = floor(p), t = p - cell;
     vec2 fade = t * t * t * (t * (6.0 * t - 15.0) + 10.0), turn = 30.0 * t * t * (t * (t - 2.0) + 1.0);
-    vec3 noise = vec3(0.0);
-    for (int c = 0; c < 4; c++) {
-      ivec2 corner = ivec2(c & 1, c >> 1);
-      uint bits = hashCell(cellUnder[k] + ivec2(cell) + corner, uint(3 + k) * 0xcb1ab31fu ^ salt);
-      vec2 gradient = vec2(float(bits & 0xffffu), float(bits >> 16)) / 32767.5 - 1.0;
-      float plane = dot(gradient, t - vec2(corner));
-      bool east = corner.x == 1, north = corner.y == 1;
-      vec2 share = vec2(east ? fade.x : 1.0 - fade.x, north ? fade.y : 1.0 - fade.y);
-      float weight = share.x * share.y;
-      noise += vec3(weight * plane, weight * gradient.x + (east ? turn.x : -turn.x) * share.y * plane,
-        weight * gradient.y + share.x * (north ? turn.y : -turn.y) * plane);
-    }
+    vec4 east, north;
+    findGradients(cellUnder[k] + ivec2(cell), uint(3 + k) * 0xcb1ab31fu ^ salt, east, north);
+    vec4 planes = east * (t.x - vec4(0, 1, 0, 1)) + north * (t.y - vec4(0, 0, 1, 1));
+    vec4 across = vec2(1.0 - fade.x, fade.x).xyxy, along = vec2(1.0 - fade.y, fade.y).xxyy, weight = across * along;
+    vec3 noise = vec3(dot(weight, planes), dot(weight, east) + turn.x * dot(vec4(-1, 1, -1, 1) * along, planes),
+      dot(weight, north) + turn.y * dot(vec4(-1, -1, 1, 1) * across, planes));
     sum += ${kept}amplitude[k] * noise * vec3(1.0, scale[k], scale[k]);
   }
   return sum;
@@ -108,10 +109,8 @@ uniform vec3 waveColours[${waves * materials}];
 uniform uint waveSeeds[${waves}];
 float wave(ivec2 under, vec2 p, uint seed) {
   vec2 low = floor(p), t = p - low, fade = t * t * t * (t * (6.0 * t - 15.0) + 10.0);
-  ivec2 cell = under + ivec2(low);
-  uvec4 bits = uvec4(hashCell(cell, seed), hashCell(cell + ivec2(1, 0), seed), hashCell(cell + ivec2(0, 1), seed),
-    hashCell(cell + 1, seed));
-  vec4 east = vec4(bits & 0xffffu) / 32767.5 - 1.0, north = vec4(bits >> 16) / 32767.5 - 1.0;
+  vec4 east, north;
+  findGradients(under + ivec2(low), seed, east, north);
   vec4 planes = east * (t.x - vec4(0, 1, 0, 1)) + north * (t.y - vec4(0, 0, 1, 1));
   vec2 rows = mix(planes.xz, planes.yw, fade.x);
   return mix(rows.x, rows.y, fade.y);
