@@ -7,6 +7,7 @@ the sun's beam arrives. Prints a row for each surface and height of the sun.
 
 import csv
 import sys
+from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
@@ -72,7 +73,7 @@ def trace(mesh: mi.Mesh, sun: Sun, top: float, sky: bool) -> np.ndarray:
             "type": "orthographic", "to_world": look @ mi.ScalarTransform4f().scale([SIDE / 2, SIDE / 2, 1]),
             "far_clip": 1e4,
             "sampler": {"type": "multijitter", "sample_count": SAMPLES},
-            "film": {"type": "hdrfilm", "width": pixels, "height": pixels, "rfilter": {"type": "box"}, "pixel_format": "rgb"},
+            "film": {"type": "hdrfilm", "width": pixels, "height": pixels, "rfilter": {"type": "box"}},
         },
     }  # fmt: skip
     if sky:
@@ -118,7 +119,7 @@ def main(out: str | None) -> None:
                 ", ".join(f"{k} {v:.3f}" if isinstance(v, float) else f"{v}" for k, v in rows[-1].items()), flush=True
             )
     if out:
-        with open(out, "w", newline="", encoding="utf-8") as file:
+        with Path(out).open("w", newline="", encoding="utf-8") as file:
             table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
             table.writeheader()
             table.writerows({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)

@@ -16,7 +16,8 @@ GROUND = Ground(speckle=40, things=4)
 HILLS = Hills(3.0 * GROUND.side, 12.0 * GROUND.side, 3, 5)
 LIGHT = {"elevation": 40.0, "azimuth": 200.0, "source": "assumed"}
 PLACE = dict(x=3.0, y=5.0, eye=2.0, yaw=60.0, pitch=-12.0)
-CAPTURED = 6 + np.degrees(np.arctan2(np.hypot(np.cos(np.radians(20)), np.tan(np.radians(40))), np.sin(np.radians(200)))) / 15
+NORTH, UP, EAST = np.cos(np.radians(20)), np.tan(np.radians(40)), np.sin(np.radians(200))  # over cos 40
+CAPTURED = 6 + np.degrees(np.arctan2(np.hypot(NORTH, UP), EAST)) / 15  # hours
 
 BELOW = """async (cases) => {
   const { createSky } = await import("./draw/sky.js"), { lightBelow } = await import("./terrain/light.js");
@@ -40,15 +41,16 @@ BELOW = """async (cases) => {
 
 SHADED = """async ({ lights, shadows: { sun: [elevation, azimuth], hills, side, eye, points } }) => {
   // the shader's functions, run by transform feedback: of light, and of the texture of shadows
-  const { createShadowTexture, lightCode } = await import("./draw/lighting.js");
+  const { createShadowTexture, lightCode, shineCode } = await import("./draw/lighting.js");
   const { createHeights } = await import("./terrain/heights.js");
   const { createShadows } = await import("./terrain/shadows.js"), { placeSun } = await import("./terrain/sun.js");
   const gl = new OffscreenCanvas(1, 1).getContext("webgl2"), program = gl.createProgram();
   const vertex = `#version 300 es
+    ${shineCode(true)}
     ${lightCode("hills")}
     uniform vec3 given;
     out vec4 found;
-    void main() { found = vec4(lit(vec3(0.5), given.xy, given.z), sunShare(given.xy)); }`;
+    void main() { found = vec4(shineOn(given.xy, given.z), sunShare(given.xy)); }`;
   for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, "#version 300 es\\nvoid main() {}"]]) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, source);
@@ -77,7 +79,7 @@ SHADED = """async ({ lights, shadows: { sun: [elevation, azimuth], hills, side, 
     gl.uniform3fv(at("toSun"), placeSun(...sun).direction);
     gl.uniform3fv(at("direct"), direct);
     gl.uniform3fv(at("ambient"), ambient);
-    return slopes.map((slope, k) => run(...slope, visible[k]).slice(0, 3).map(v => (v / 0.5) ** 2.2));
+    return slopes.map((slope, k) => run(...slope, visible[k]).slice(0, 3).map(v => v ** 2.2));
   });
   const turns = [], low = placeSun(elevation, azimuth);
   do turns.push(performance.now()); while (!made.step(eye[0], eye[1], low, 0));
@@ -118,7 +120,8 @@ def test_ground_has_the_light_and_the_shadows_of_the_library(modules):
 def test_open_level_ground_keeps_its_colours_below_the_captured_sun(modules, elevation):
     level, margins, soft = modules.evaluate(
         """async (elevation) => {
-          const { lightBelow } = await import("./terrain/light.js"), { createShadows } = await import("./terrain/shadows.js");
+          const { lightBelow } = await import("./terrain/light.js");
+          const { createShadows } = await import("./terrain/shadows.js");
           const { placeSun } = await import("./terrain/sun.js"), sun = placeSun(elevation, 200);
           const made = createShadows({ at: () => [7, 0, 0] }, 4);
           while (!made.step(9, 9, sun, 1000));
@@ -240,7 +243,9 @@ def test_painters_of_other_pages_follow_the_sun(blank, still, address):
           const { sun } = terrain, refused = [];
           terrain.setSun("off");
           refused.push(terrain.sun);
-          for (const hour of [NaN, "noon", undefined]) try { terrain.setSun(hour); } catch (error) { refused.push(error.name); }
+          for (const hour of [NaN, "noon", undefined]) {
+            try { terrain.setSun(hour); } catch (error) { refused.push(error.name); }
+          }
           return [[captured, sun], btoa(Array.from(bytes, (v) => String.fromCharCode(v)).join("")), complete, refused];
         }""",
         PLACE,

@@ -81,7 +81,8 @@ async function start() {
       paint.brush.draw();
       paint.drawObjects();
       map?.draw();
-      if (viewer.scene) firstView.note(viewer.scene.walker, viewer.overlay > 0 || (viewer.scene.light?.chosen ?? null) !== null);
+      const { scene, overlay } = viewer;
+      if (scene) firstView.note(scene.walker, overlay > 0 || (scene.light?.chosen ?? null) !== null);
     },
     onWhole: firstView.showTerrain,
   });

@@ -12,6 +12,7 @@ from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.bundle.land_cover import LightEntry
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.terrain import endless, stills
+from dav_gswt.terrain.finite import Area, list_cells, place_block
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills, Sphere
 from dav_gswt.terrain.light import ASSUMED, CELL, SIZE, Light, apply_light, light_of, place_light, relight
 from dav_gswt.terrain.sun import Sun, find_hour, measure_light, sun_at
@@ -152,14 +153,19 @@ def test_a_page_takes_its_sun_from_the_config_or_the_photos(covered):
     assert type(info).from_dict(apply_light(by_photos, "auto", 2.0, surface).to_dict()).wind == 2
 
 
-def test_objects_are_lit_like_level_ground_at_their_foot(covered):
+def test_objects_are_lit_as_the_ground_below_them(covered):
     _, terrain = covered
-    light = Light(NOON, Sun(25.0, 80.0))
-    placed = place_light(light, terrain.heights, terrain.side, np.zeros(3))
-    x, y = np.random.default_rng(2).uniform(-9, 9, (2, 300))
-    level = light.ratio(np.zeros((300, 2)), placed.visible(x, y))
-    np.testing.assert_array_equal(placed.object_ratio(x, y), level)
-    assert np.abs(placed.ground_ratio(x, y) - level).max() > 0.1
+    cells = list_cells(terrain, Area(-4, -4, 8, 8))
+    found = terrain.scatter.instances_in(cells.i, cells.j)
+    assert len(found) > 3
+    light = place_light(Light(NOON, Sun(25.0, 80.0)), terrain.heights, terrain.side, np.zeros(3))
+    dark = place_block(terrain, cells, 0, np.zeros(3))()
+    bright = place_block(replace(terrain, light=light), cells, 0, np.zeros(3))()
+    things = slice(-len(found) * len(terrain.objects[0][0]), None)  # objects come last
+    x, y = dark.means[things, :2].astype(float).T
+    expected = relight(dark.base_colours[things], light.ground_ratio(x, y))
+    np.testing.assert_allclose(bright.base_colours[things], expected, atol=2e-3)
+    assert np.abs(expected - dark.base_colours[things]).max() > 0.05
 
 
 def test_the_grid_holds_the_hills_around(covered):

@@ -12,10 +12,11 @@ import { hazeOf, RELIEF, setSurface, setUnder } from "./splats.js";
  * @typedef {import("../terrain/camera.js").Camera} Camera
  */
 
-const RINGS = 96, AZIMUTHS = 384;
-const NEAREST = 0.4, FARTHEST = 12.5; // radii of the first ring, over the distance of the last tiles, and of the last
+const RINGS = 64, AZIMUTHS = 288;
+const NEAREST = 0.5, FARTHEST = 12.5; // radii of the first ring, over the distance of the last tiles, and of the last
 const SINK = 0.005; // share of the distance by which rings lie below tiles, which would not hide all of them
-const SECTORS = 32, WIDE = AZIMUTHS / SECTORS; // only those in view are drawn, an instance each
+const SECTORS = 48, WIDE = AZIMUTHS / SECTORS; // those in view are drawn, an instance each
+// two rows of a sector are 14 vertices: software renderers remember the last 16
 
 /** @param {"hills" | "image"} kind @param {boolean} lit below a sun that moves? */
 const vertexShader = (kind, lit) => `#version 300 es

@@ -33,9 +33,9 @@ float sunShare(vec2 at) {
 /** What a vertex shader declares, by the kind of its surface. @param {string} kind */
 export const lightCode = (kind) => (kind === "flat" ? LEVEL_CODE : SHADOW_CODE);
 
-/** Change of a Gaussian's colour; objects are upright, and lit as level ground at their foot. @param {string} kind */
+/** Change of a Gaussian's colour; objects are lit as the ground below them. @param {string} kind */
 export const lightPaint = (kind) => (kind === "flat" ? "  one.paint.rgb = clamp(one.paint.rgb * levelLight, 0.0, 1.0);"
-  : `  shine = shineOn(place > 0u ? vec2(0.0) : rise.yz, sunShare(place > 0u ? cell * side + corner.xy : seen.xy));
+  : `  shine = shineOn(rise.yz, sunShare(seen.xy));
   one.paint.rgb = clamp(one.paint.rgb * shine, 0.0, 1.0);`);
 
 /** Glow of the sky about the sun, see terrain/light.py. */
@@ -62,8 +62,10 @@ export function setLight(gl, uniforms, { sky, ground_colour: ground }, light) {
 /** The texture of shadows, in which all is in the sun at first. @param {GL} gl */
 export function createShadowTexture(gl) {
   const texture = createTexture(gl, gl.R16F, SIZE, SIZE);
-  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.LINEAR);
-  for (const way of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, way, gl.CLAMP_TO_EDGE);
+  for (const [name, value] of [
+    [gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR],
+    [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE],
+  ]) gl.texParameteri(gl.TEXTURE_2D, name, value);
   /** @param {Float32Array} margins */
   const fill = (margins) => gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, SIZE, SIZE, gl.RED, gl.FLOAT, margins);
   fill(new Float32Array(SIZE * SIZE).fill(1));

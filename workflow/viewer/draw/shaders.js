@@ -13,7 +13,7 @@ import { WIND } from "./wind.js";
 const AIR = 0.12; // height at which the sky of a planet is 1/e as bright, in radii
 /** Distance that leaves 1/e of the far ground's colour, over the distance of the last tiles; see terrain/far_ground.py. */
 export const FAR_HAZE = 2.5;
-const FAR_SPACING = 0.037; // of its points, over their distance
+const FAR_SPACING = 0.0525; // of its points, over their distance
 const UNCERTAINTY = OVERLAYS.indexOf("uncertainty");
 
 /** A record as a Gaussian; the other end of data/layout.js. */
@@ -68,8 +68,8 @@ uint hashCell(ivec2 cell, uint seed) { // seed: of axis and salt
   return mixBits(mixBits(uint(cell.x) * 0x8da6b343u ^ seed) + uint(cell.y) * 0xd8163841u);
 }`;
 
-/** @param {string} kept of each octave k */
-const hills = (kept = "") => `
+/** @param {{ before?: string, kept?: string }} octave k: code before it, and a factor of it */
+const hills = ({ before = "", kept = "" } = {}) => `
 uniform ivec2 cellUnder[${MAX_OCTAVES}]; // the noise's cell under the eye, octave by octave, and the place in it
 uniform vec2 placeUnder[${MAX_OCTAVES}];
 uniform float amplitude[${MAX_OCTAVES}], scale[${MAX_OCTAVES}];
@@ -77,7 +77,7 @@ uniform int octaves;
 uniform uint salt;
 vec3 surface(vec2 at) { // height and slope at a place seen from the eye
   vec3 sum = vec3(0.0);
-  for (int k = 0; k < octaves; k++) {
+  for (int k = 0; k < octaves; k++) {${before}
     vec2 p = placeUnder[k] + at * scale[k], cell = floor(p), t = p - cell;
     vec2 fade = t * t * t * (t * (6.0 * t - 15.0) + 10.0), turn = 30.0 * t * t * (t * (t - 2.0) + 1.0);
     vec3 noise = vec3(0.0);
@@ -173,7 +173,11 @@ const SURFACES = { flat: FLAT, hills: hills(), image: IMAGE };
 
 /** The surface without detail that points of the far ground cannot show. @param {"hills" | "image"} kind */
 export const farSurface = (kind) => (kind === "image" ? IMAGE
-  : HASH + hills(`clamp(2.0 - ${4 * FAR_SPACING} * length(at) * scale[k], 0.0, 1.0) * `));
+  : HASH + hills({
+    before: `
+    float share = min(2.0 - ${4 * FAR_SPACING} * length(at) * scale[k], 1.0);
+    if (share <= 0.0) break;`, kept: "share * ",
+  }));
 
 /** @param {import("../terrain/heights.js").HeightField["kind"]} kind @param {boolean} lit below a sun that moves? */
 export const backdropCode = (kind, lit) => (kind === "sphere" ? SPHERE_BACKDROP : kind === "flat" ? BACKDROP : roughBackdrop(lit));

@@ -40,6 +40,7 @@ export function createSky(gl, manifest) {
   const plain = createProgram(gl, VERTEX, fragmentShader(kind));
   const sunny = manifest.light && !sphere ? createProgram(gl, VERTEX, fragmentShader(kind, true)) : plain;
   const long = sky.sun ? Math.hypot(...sky.sun.direction) : 1;
+  const own = sky.sun?.direction.map((v) => v / long) ?? [0, 0, 0];
   return {
     /**
      * Fill the picture; low: sine of the angle below the horizon at which tiles end.
@@ -53,7 +54,7 @@ export function createSky(gl, manifest) {
       gl.disable(gl.BLEND);
       setAxes(gl, uniforms, camera);
       setLight(gl, uniforms, manifest, light);
-      gl.uniform3fv(uniforms.sun, light?.sun.direction ?? (sky.sun ? sky.sun.direction.map((v) => v / long) : [0, 0, 0]));
+      gl.uniform3fv(uniforms.sun, light?.sun.direction ?? own);
       gl.uniform3fv(uniforms.sunColour, light?.sunColour ?? sky.sun?.colour ?? [1, 1, 1]);
       gl.uniform2f(uniforms.halfTangent, camera.width / 2 / camera.focal, camera.height / 2 / camera.focal);
       gl.uniform1f(uniforms.low, low);

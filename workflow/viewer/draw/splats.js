@@ -159,7 +159,7 @@ export function createSplats(gl, manifest, heights) {
      */
     draw(camera, { end, low, overlay, light, wind }, from = 0, many = far.length + close.length) {
       if (!frame) return;
-      const blown = stems && wind ? wind : null, { use, uniforms } = programs[Number(light !== null) + 2 * Number(blown !== null)]();
+      const { use, uniforms } = programs[Number(light !== null) + (stems && wind ? 2 : 0)]();
       use();
       setView(gl, uniforms, heights, manifest.tile_side, camera, frame);
       setLight(gl, uniforms, manifest, light);
@@ -167,9 +167,9 @@ export function createSplats(gl, manifest, heights) {
         bind(SHADOWS, shadows.texture);
         shadows.set(uniforms, light.shadows, camera.eye);
       }
-      if (blown) {
+      if (stems && wind) {
         bind(STEMS, stems);
-        setWind(gl, uniforms, manifest, blown, camera.eye);
+        setWind(gl, uniforms, manifest, wind, camera.eye);
       }
       if (variation) setWavesUnder(gl, uniforms, variation, camera);
       if (heights.kind === "sphere") {
@@ -201,7 +201,8 @@ export function createSplats(gl, manifest, heights) {
     relief,
     /** Free the textures. */
     end() {
-      for (const texture of [records, entries, nearEntries, places, hues, owners, relief, stems, shadows?.texture ?? null]) gl.deleteTexture(texture);
+      for (const texture of [records, entries, nearEntries, places, hues, owners, relief, stems]) gl.deleteTexture(texture);
+      if (shadows) gl.deleteTexture(shadows.texture);
     },
   };
 }

@@ -1,5 +1,5 @@
 // Wind: what stands sways, the more the higher above its foot. Gusts are two waves of place and time. Orders of Gaussians
-// stay as they are, so the sway is a few hundredths of the height.
+// stay as they are, so the sway is small against the height.
 
 /**
  * @typedef {import("../data/manifest.js").Manifest} Manifest
@@ -8,7 +8,7 @@
  * @typedef {{ seconds: number, share: number }} Wind
  */
 
-const SWAY = 0.06; // of the height, in the strongest gust of a wind of 1
+const SWAY = 0.1; // of the height, in the strongest gust of a wind of 1
 const WAY = [0.8, 0.6]; // that the wind blows, to the east and to the north
 const WAVES = [ // of gusts: their length in eye floors, their way as cosine and sine of the angle to the wind's, seconds
   { length: 6, turn: [0.96, 0.28], period: 3.1, share: 0.6 }, { length: 1.7, turn: [0.8, -0.6], period: 1.3, share: 0.4 },

@@ -170,8 +170,8 @@ function createWorkerClient(bundle, { onRecords, onFrame, onError }) {
 const mean = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
 
 /**
- * Where the tiles of a picture end and its backdrop begins, and the light on both: `end`, `low` and `light` of the options
- * that renderers take.
+ * Where the tiles of a picture end and its backdrop begins, and the light on both: `end`, `low` and `light` of the
+ * options that renderers take.
  *
  * @param {Pick<OpenTerrain, "manifest" | "heights" | "light">} terrain
  * @param {FrameAnswer | null} frame the last one
@@ -183,7 +183,8 @@ export function backdropOptions({ manifest, heights, light }, frame, camera) {
     const reach = frame?.reach ?? findReach({ side: manifest.tile_side }, heights, camera.eye);
     return { ...findEnd(heights, camera.eye, reach), light: null };
   }
-  return { end: frame?.reach ?? farthest, low: Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest), light: light?.now ?? null };
+  const low = Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest);
+  return { end: frame?.reach ?? farthest, low, light: light?.now ?? null };
 }
 
 /** The cells of a frame, back to front. @param {FrameAnswer} frame @returns {DrawnCell[]} */

@@ -10,8 +10,8 @@ import { findHour, luminance, measureLight, placeSun, sunAt } from "./sun.js";
  * @typedef {{ elevation: number, azimuth: number, source: string }} LightEntry
  * @typedef {import("./sun.js").Sun & { hour: number }} DaySun
  *
- * direct: light of ground that faces the sun; ambient: of the whole sky; both over that of level ground as captured; level:
- * what sRGB colours of open, level ground are multiplied by; the others are sRGB colours; shadows: null: none yet.
+ * direct: light of ground that faces the sun; ambient: of the whole sky; both over that of level ground as captured;
+ * level: what sRGB colours of open, level ground are multiplied by; the others are sRGB; shadows: null: none yet.
  * @typedef {{ sun: DaySun, direct: number[], ambient: number[], level: number[], zenith: number[], horizon: number[],
  *   ground: number[], sunColour: number[], shadows: import("./shadows.js").Shadows | null }} Lighting
  * @typedef {NonNullable<ReturnType<typeof createLight>>} Light
@@ -22,6 +22,7 @@ import { findHour, luminance, measureLight, placeSun, sunAt } from "./sun.js";
 
 export const GAMMA = 2.2; // exponent that stands for the curve of sRGB
 export const MOST = 4; // times the captured light, of any ground
+const EXPOSED = 0.7; // share of a change of brightness, in stops, that the exposure makes up for
 const HAZE = 0.1; // share of the sun's beam in the light of the horizon
 const TURN = 8; // milliseconds of work on shadows between which others have a turn
 
@@ -37,16 +38,19 @@ const relight = (colour, ratio) => colour.map((v, k) => Math.min(Math.max(v * ra
  */
 export function lightBelow({ sky, ground_colour: ground }, captured, sun) {
   const before = measureLight(captured.elevation), now = measureLight(sun.elevation);
-  const exposure = Math.sqrt(luminance(before.level) / luminance(now.level)); // half of the change, in stops
+  const exposure = (luminance(before.level) / luminance(now.level)) ** EXPOSED;
   const direct = now.direct.map((v, k) => (exposure * v) / before.level[k]);
   const ambient = now.sky.map((v, k) => (exposure * v) / before.level[k]);
   const level = direct.map((v, k) => Math.min(v * Math.max(sun.direction[2], 0) + ambient[k], MOST));
   const above = now.sky.map((v, k) => (exposure * v) / before.sky[k]);
-  const haze = now.sky.map((v, k) => (exposure * (v + HAZE * now.direct[k])) / (before.sky[k] + HAZE * before.direct[k]));
+  const [hazeBefore, hazeNow] = [before, now].map((one) => one.sky.map((v, k) => v + HAZE * one.direct[k]));
+  const haze = hazeNow.map((v, k) => (exposure * v) / hazeBefore[k]);
+  /** No brighter than it was captured. @param {number[]} ratio */
+  const dim = (ratio) => ratio.map((v) => v / Math.max(luminance(ratio), 1));
   const brightest = Math.max(...now.direct);
   return {
-    sun, direct, ambient, level: level.map((v) => v ** (1 / GAMMA)), zenith: relight(sky.zenith, above),
-    horizon: relight(sky.horizon, haze), ground: relight(ground, level),
+    sun, direct, ambient, level: level.map((v) => v ** (1 / GAMMA)), zenith: relight(sky.zenith, dim(above)),
+    horizon: relight(sky.horizon, dim(haze)), ground: relight(ground, level),
     sunColour: now.direct.map((v) => (v / brightest) ** (1 / GAMMA)),
   };
 }
@@ -83,7 +87,11 @@ export function createLight(manifest, heights) {
     get now() {
       return below && { ...below, shadows: shadows?.made ?? null };
     },
-    /** Work on shadows for some milliseconds. Returns: are those that an eye sees whole? @param {number[]} eye @param {number} milliseconds */
+    /**
+     * Work on shadows for some milliseconds. Returns: are those that an eye sees whole?
+     *
+     * @param {number[]} eye @param {number} milliseconds
+     */
     step: ([x, y], milliseconds) => !below || !shadows || shadows.step(x, y, below.sun, milliseconds),
     /** Make the shadows that an eye sees. @param {number[]} eye */
     async finish(eye) {

@@ -5,15 +5,15 @@
  * @typedef {import("./sun.js").Sun} Sun
  * @typedef {import("./heights.js").HeightField} HeightField
  *
- * margins: tangent of the sun's elevation less that of the horizon towards it, rows from the south; first: world position
- * of the south-western point; soft: the margin at which the sun is whole.
+ * margins: tangent of the sun's elevation less that of the horizon towards it, rows from the south; first: world
+ * position of the south-western point; soft: the margin at which the sun is whole.
  * @typedef {{ margins: Float32Array, first: [number, number], cell: number, soft: number }} Shadows
  */
 
 export const SIZE = 256; // points along a side of the grid
 const CELL = 0.375; // their distance, in tile sides
 const SNAP = 32; // points by which the grid moves with the eye
-const STEPS = 40, FARTHEST = 64; // samples towards the sun, and the distance of the last in cells; that of the first is 1
+const STEPS = 40, FARTHEST = 64; // samples towards the sun, from 1 to so many cells away
 const BORDER = 16; // points along the edge of the grid over which shadows end
 const MOST = 2; // of a margin
 const SOFT = 0.02; // half the width of a shadow's edge, as a change of the sun's elevation in radians
@@ -46,8 +46,8 @@ function* sampleHeights(heights, first, cell) {
 }
 
 /**
- * Margins of the sun at the points of a grid of padded heights, in steps of a row. Along the edge of the grid the horizon
- * is lowered, so that shadows end softly there.
+ * Margins of the sun at the points of a grid of padded heights, in steps of a row. Along the edge of the grid the
+ * horizon is lowered, so that shadows end softly there.
  *
  * @param {Float64Array} heights @param {number} cell @param {Sun} sun
  * @returns {Generator<void, Float32Array>}
@@ -67,7 +67,8 @@ function* measureMargins(heights, cell, sun) {
       const south = (1 - u) * (1 - v), east = u * (1 - v), north = (1 - u) * v, both = u * v;
       for (let a = 0; a < SIZE; a++) {
         const at = row + a, k = at + to;
-        const seen = south * heights[k] + east * heights[k + 1] + north * heights[k + WIDE] + both * heights[k + WIDE + 1];
+        const seen = south * heights[k] + east * heights[k + 1]
+          + north * heights[k + WIDE] + both * heights[k + WIDE + 1];
         horizon[a] = Math.max(horizon[a], (seen - heights[at]) * scale);
       }
     }
@@ -82,8 +83,8 @@ function* measureMargins(heights, cell, sun) {
 }
 
 /**
- * Shadows of a surface about an eye, made in steps; the last whole ones stay until the next are. The grid lies on multiples
- * of its cells in the world. Heights are kept while only the sun moves.
+ * Shadows of a surface about an eye, made in steps; the last whole ones stay until the next are. The grid lies on
+ * multiples of its cells in the world. Heights are kept while only the sun moves.
  *
  * @param {HeightField} heights @param {number} side of a tile
  */

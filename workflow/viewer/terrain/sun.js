@@ -1,6 +1,6 @@
-// The sun and the clear sky: their light in three bands, and the sun's path over a day. Angles in degrees: elevation above
-// the horizon, azimuth clockwise from north. The same numbers as dav_gswt/terrain/sun.py; tests/golden/light.json holds
-// both to it.
+// The sun and the clear sky: their light in three bands, and the sun's path over a day. Angles in degrees: elevation
+// above the horizon, azimuth clockwise from north. The same numbers as dav_gswt/terrain/sun.py; tests/golden/light.json
+// holds both to it.
 
 const RAYLEIGH = [0.0496, 0.0987, 0.2267]; // optical depths of air at 0.65, 0.55 and 0.45 micrometres
 const AEROSOL = [0.0805, 0.1, 0.1298]; // of clear, dry haze
@@ -22,8 +22,8 @@ export function placeSun(elevation, azimuth) {
 }
 
 /**
- * Irradiance across the sun's beam, of level ground by the sky, and by both, over that outside the atmosphere: red, green,
- * blue. A clear sky after Bird and Hulstrom (1981), with the air mass of Kasten and Young (1989).
+ * Irradiance across the sun's beam, of level ground by the sky, and by both, over that outside the atmosphere: red,
+ * green, blue. A clear sky after Bird and Hulstrom (1981), with the air mass of Kasten and Young (1989).
  *
  * @param {number} elevation
  */
@@ -53,7 +53,8 @@ export function findHour({ direction: [x, y, z] }) {
  */
 export function sunAt({ direction: [, y, z] }, hour) {
   const far = Math.hypot(y, z), first = Math.asin(Math.min(Math.sin(LOWEST * DEGREE) / (z / far), 1));
-  const asked = ((hour - SUNRISE) / (SUNSET - SUNRISE)) * Math.PI, angle = Math.min(Math.max(asked, first), Math.PI - first);
+  const asked = ((hour - SUNRISE) / (SUNSET - SUNRISE)) * Math.PI;
+  const angle = Math.min(Math.max(asked, first), Math.PI - first);
   const east = Math.cos(angle), north = (Math.sin(angle) * y) / far, up = (Math.sin(angle) * z) / far;
   return {
     hour: SUNRISE + (angle / Math.PI) * (SUNSET - SUNRISE), direction: [east, north, up],

@@ -37,7 +37,12 @@ export function createFirstView({ onStep }) {
     showHint() {
       hint.hidden = begin === null;
     },
-    /** A picture was drawn. @param {import("./walker.js").Walker} place @param {boolean} other than the still: an overlay, another sun */
+    /**
+     * A picture was drawn.
+     *
+     * @param {import("./walker.js").Walker} place
+     * @param {boolean} other than the still: an overlay, another sun
+     */
     note(place, other) {
       if (other) showTerrain();
       const start = begin;

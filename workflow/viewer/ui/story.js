@@ -24,11 +24,14 @@ const MOST = 10_000; // photos
 const COMPASS = ["north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"];
 /** @type {Record<string, string>} */
 const SOURCES = {
-  config: "as the settings say", exif: "by the places and times of the photos", relief: "judged by the shading of the ground",
-  assumed: "which is assumed: the photos do not tell",
+  config: "as the settings say", exif: "as the places and times of the photos tell",
+  relief: "judged by the shading of the ground", assumed: "which is assumed: the photos do not tell",
 };
 
-/** @param {() => import("../terrain/light.js").LightEntry | undefined} findLight @param {(error: unknown) => void} onError */
+/**
+ * @param {() => import("../terrain/light.js").LightEntry | undefined} findLight
+ * @param {(error: unknown) => void} onError
+ */
 export function createStoryPanel(findLight, onError) {
   const body = element("storyBody", HTMLElement);
   return createPanel("story", {
@@ -54,13 +57,13 @@ function describe(story) {
   return [drawPlan(story), listRounds(story), text, showPhotos(story)];
 }
 
-/** Which sun the colours contain, and what stays as it was in the photos. @param {import("../terrain/light.js").LightEntry} [light] */
+/** Which sun the colours contain, and what stays. @param {import("../terrain/light.js").LightEntry} [light] */
 function describeLight(light) {
   if (!light) return [];
   const { elevation, azimuth, source } = light, text = document.createElement("p");
   text.textContent = `The photos show light of a sun ${Math.round(elevation)}° high in the `
     + `${COMPASS[Math.round(azimuth / 45) % COMPASS.length]}, ${SOURCES[source]}. `
-    + "The time of day changes sky, hills and their shadows; ripples, stones, and the shade on objects stay as photographed.";
+    + "The time of day changes sky, hills and their shadows; ripples, stones and the shade on objects stay.";
   return [text];
 }
 

@@ -26,8 +26,7 @@ export function createWind() {
     },
     /** Switch it, and try again what was too slow. @param {boolean} wanted */
     switch(wanted) {
-      on = wanted;
-      slow = false;
+      [on, slow, pictures] = [wanted, false, 0];
     },
     /** A picture without wind is shown. */
     still() {
@@ -58,6 +57,7 @@ export function createWind() {
 /** The wind's button. @param {import("./viewer.js").Viewer} viewer */
 export function listenToWind(viewer) {
   element("windButton", HTMLButtonElement).addEventListener("click", () => viewer.showWind(!viewer.wind.on));
+  calm.addEventListener("change", () => viewer.showWind(viewer.wind.on));
 }
 
 /** Show whether it blows. @param {Wind} wind @param {import("../data/manifest.js").Manifest} manifest */

@@ -50,7 +50,7 @@ class CapturedSun:
 def locate_sun(time: datetime, latitude: float, longitude: float) -> tuple[float, float]:
     """Elevation and azimuth (clockwise from north) of the sun's centre, at a place north and east; all in degrees.
 
-    The Astronomical Almanac's formula (Michalsky 1988): within 0.02 degrees from 1950 to 2050. Refraction, which lifts
+    The Astronomical Almanac's formula (Michalsky 1988): within 0.01 degrees from 1950 to 2050. Refraction, which lifts
     the sun by 0.25 degrees at 3 degrees above the horizon, is left out. time: with its zone.
     """
     days = (time - datetime(2000, 1, 1, 12, tzinfo=UTC)).total_seconds() / 86400

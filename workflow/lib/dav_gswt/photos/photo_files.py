@@ -125,8 +125,9 @@ def read_utc_time(path: Path | str, longitude: float) -> PhotoTime | None:
         return None
     else:
         offset = _read_time(tags, "EXIF OffsetTimeOriginal", "%z")
-        zone = offset.utcoffset() / timedelta(hours=1) if offset else float(round(longitude / 15))
-        utc, known = local - timedelta(hours=zone), "offset" if offset else "assumed"
+        east = offset.utcoffset() if offset else None
+        zone = float(round(longitude / 15)) if east is None else east / timedelta(hours=1)
+        utc, known = local - timedelta(hours=zone), "assumed" if east is None else "offset"
     return PhotoTime(utc.replace(tzinfo=UTC), known, zone) if utc.year >= FIRST_YEAR else None
 
 

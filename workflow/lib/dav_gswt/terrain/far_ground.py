@@ -14,10 +14,10 @@ from dav_gswt.terrain.choice import Floats, Vector
 from dav_gswt.terrain.heights import HeightField
 from dav_gswt.terrain.light import Light, relight
 
-RINGS, AZIMUTHS = 96, 384
-NEAREST, FARTHEST = 0.4, 12.5  # radii of the first and the last ring, over the distance of the last tiles
+RINGS, AZIMUTHS = 64, 288
+NEAREST, FARTHEST = 0.5, 12.5  # radii of the first and the last ring, over the distance of the last tiles
 HAZE = 2.5  # over the same: distance that leaves 1/e of the ground's colour
-SPACING = 0.037  # from ring to ring, over the radius
+SPACING = 0.0525  # from ring to ring, over the radius
 SINK = 0.005  # share of the distance by which rings lie below tiles, which would not hide all of them
 
 
@@ -64,7 +64,7 @@ class FarGround:
         distance = np.hypot(radius, height)
         painted = colours.at(distance, slope)
         height -= SINK * radius * np.clip(5 - 5 * distance / end, 0, 1)
-        rows = [(v.reshape(RINGS, AZIMUTHS, -1)) for v in (height / radius, painted)]
+        rows = [v.reshape(RINGS, AZIMUTHS, -1) for v in (height / radius, painted)]
         tangents, painted = (np.concatenate([v, v[:, :1]], 1) for v in rows)
         return FarGround(radii, tangents[..., 0], painted)
 

@@ -87,7 +87,7 @@ def _place_objects(terrain: EndlessTerrain, cells: GridCells, level: int, corner
     row = np.repeat(np.arange(len(found)), [len(field) for field in fields])
     feet, way = place_feet(terrain, found) - corner, turn_rows(np.radians(found.turn))
     field = turn_and_scale(concatenate_fields(fields), way[row], found.size[row], feet[row])
-    yield colour_objects(terrain, field, found, row)
+    yield colour_objects(terrain, field, found, row, corner[:2].tolist())
 
 
 def place_feet(terrain: EndlessTerrain, found: Instances) -> Float[Array, "n 3"]:

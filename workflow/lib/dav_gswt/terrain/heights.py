@@ -62,7 +62,7 @@ class HeightField:
         """h and its derivatives by x and y at points of the world."""
         return np.zeros(len(x)), np.zeros((len(x), 2))
 
-    def smooth_at(self, x: Floats, y: Floats, spacing: Float[Array, "#n"]) -> tuple[Floats, Float[Array, "n 2"]]:
+    def smooth_at(self, x: Floats, y: Floats, spacing: Floats | float) -> tuple[Floats, Float[Array, "n 2"]]:
         """`at` without detail that points at this spacing cannot show, where the surface can leave that out."""
         return self.at(x, y)
 
@@ -126,9 +126,9 @@ class Hills(HeightField, kind="hills"):
         return -self.height, self.height, STEEPEST * rise / self.wavelength
 
     def at(self, x: Floats, y: Floats) -> tuple[Floats, Float[Array, "n 2"]]:
-        return self.smooth_at(x, y, np.zeros(1))
+        return self.smooth_at(x, y, 0.0)
 
-    def smooth_at(self, x: Floats, y: Floats, spacing: Float[Array, "#n"]) -> tuple[Floats, Float[Array, "n 2"]]:
+    def smooth_at(self, x: Floats, y: Floats, spacing: Floats | float) -> tuple[Floats, Float[Array, "n 2"]]:
         """An octave has its full height up to four points a cell, and none below two."""
         octaves = np.arange(self.octaves)[:, None]
         cells = 2.0**octaves / self.wavelength

@@ -2,8 +2,8 @@
 
 The colours of Gaussians contain the light of level ground below the captured sun. Ground that slopes, or lies below
 another sun, is multiplied by the ratio of its own light to that light, in linear light. What is smaller than the
-surface stays as it was photographed: ripples, and the shading of objects, which are lit like level ground at their
-foot. The viewer's `terrain/light.js` and its shader compute the same; tests/golden/light.json holds both to it.
+surface stays as it was photographed: ripples, and the shading of objects, which are lit like the ground below them.
+The viewer's `terrain/light.js` and its shader compute the same; tests/golden/light.json holds both to it.
 """
 
 from dataclasses import dataclass, replace
@@ -32,6 +32,7 @@ BORDER = 16  # points along the edge of the grid over which shadows end
 MOST_MARGIN = 2.0
 SOFT = 0.02  # half the width of a shadow's edge, as a change of the sun's elevation in radians
 STEEPEST = 80.0  # elevation, of which the tangent is taken: above, MOST_MARGIN would be no whole sun
+EXPOSED = 0.7  # share of a change of brightness, in stops, that the exposure makes up for
 GLOW, GLOW_WIDTH = 0.35, 6  # brightness of the sky about a sun at the horizon, and the exponent of its cosine
 HAZE = 0.1  # share of the sun's beam in the light of the horizon
 
@@ -67,9 +68,9 @@ class Light:
 
     @property
     def exposure(self) -> float:
-        """Factor of all light: half the change of brightness, in stops, is exposed away."""
+        """Factor of all light, as a camera changes it with the brightness of level ground."""
         before, after = (level_light(each.elevation) @ LUMINANCE for each in (self.captured, self.sun))
-        return float(np.sqrt(before / after))
+        return float((before / after) ** EXPOSED)
 
     @cached_property
     def terms(self) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
@@ -92,13 +93,12 @@ class Light:
         return self.ratio(np.zeros(2))
 
     def change_sky(self, sky: Sky) -> Sky:
-        """The sky below the sun."""
+        """The sky below the sun; the exposure makes it no brighter than it was captured."""
         beams, skies = zip(*(measure_light(each.elevation) for each in (self.captured, self.sun)), strict=True)
         above = self.exposure * skies[1] / skies[0]
         level = self.exposure * (skies[1] + HAZE * beams[1]) / (skies[0] + HAZE * beams[0])
-        zenith, horizon = (
-            relight(np.array(colour), each) for colour, each in ((sky.zenith, above), (sky.horizon, level))
-        )
+        pairs = (sky.zenith, above), (sky.horizon, level)
+        zenith, horizon = (relight(np.array(colour), each / max(each @ LUMINANCE, 1.0)) for colour, each in pairs)
         return Sky(zenith.tolist(), horizon.tolist())
 
     @property
@@ -136,10 +136,6 @@ class PlacedLight:
     def ground_ratio(self, x: Floats, y: Floats) -> Float[Array, "n 3"]:
         """Ratio of the light of ground at points of the world."""
         return self.light.ratio(self.surface.at(x, y)[1], self.visible(x, y))
-
-    def object_ratio(self, x: Floats, y: Floats) -> Float[Array, "n 3"]:
-        """Ratio of the light of objects whose feet are at points of the world."""
-        return self.light.ratio(np.zeros((len(x), 2)), self.visible(x, y))
 
     def visible(self, x: Floats, y: Floats) -> Floats:
         """Share of the sun's disc that is above the horizon."""

@@ -2,6 +2,7 @@
 between levels.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -82,16 +83,20 @@ def _colour_ground(
 
 
 def colour_objects(
-    terrain: EndlessTerrain, field: GaussianField, found: Instances, row: Int[Array, "n"]
+    terrain: EndlessTerrain, field: GaussianField, found: Instances, row: Int[Array, "n"], corner: Sequence[float]
 ) -> GaussianField:
-    """Gaussians of objects with the colours of the ground at their feet. row: the object of each."""
-    if terrain.variation is None and terrain.light is None:
-        return field
-    x, y = (found.i + found.u) * terrain.side, (found.j + found.v) * terrain.side
+    """Gaussians of objects, varied as the ground at their feet and lit as the ground below them.
+
+    row: the object of each. corner: world position that the field's positions count from.
+    """
     if terrain.variation is not None:
+        x, y = (found.i + found.u) * terrain.side, (found.j + found.v) * terrain.side
         material = np.array([each.material for each in terrain.object_entries])[found.number]
         field = tint_field(field, terrain.variation.at(x, y, material)[row])
-    return field if terrain.light is None else shade_field(field, terrain.light.object_ratio(x, y)[row])
+    if terrain.light is None:
+        return field
+    x, y = (field.means[:, axis].astype(float) + corner[axis] for axis in (0, 1))
+    return shade_field(field, terrain.light.ground_ratio(x, y))
 
 
 def order_gaussians(parts: dict[int, GaussianField], direction: Vector) -> Part:
@@ -187,4 +192,4 @@ def place_objects(terrain: EndlessTerrain, found: Instances, cell: tuple[int, in
     field, level = concatenate_parts(parts)
     row = np.repeat(sequence, [len(levels) for _, levels in parts])
     field = turn_and_scale(field, turn_rows(angle)[row], found.size[row], feet[row])
-    return colour_objects(terrain, field, found, row), level
+    return colour_objects(terrain, field, found, row, (cell[0] * side, cell[1] * side)), level
