@@ -110,11 +110,17 @@ def test_an_address_tells_the_wind(call, part, on):
 
 
 @pytest.mark.slow
-def test_a_page_at_rest_draws_in_the_wind_unless_it_is_off_or_less_motion_is_asked_for(visit, windy):
-    seen = visit(64, 48)
+def test_a_page_at_rest_draws_in_the_wind_unless_it_is_off_or_less_motion_is_asked_for(visit, page_of):
+    few = page_of(Ground(discs=4, things=4, levels=1), edit=edit)
+    with served(few) as address:
+        check_a_page_at_rest(visit(240, 160), f"{address}#3,5,1,60,-90")
+
+
+def check_a_page_at_rest(seen: Visit, address: str) -> None:
+    """Looking down on few Gaussians: any device draws them in time."""
     seen.page.add_init_script(COUNT_CALLS)
     seen.page.emulate_media(reduced_motion="reduce")
-    seen.open(windy)
+    seen.open(address)
     seen.until("davgswt.state.whole")
 
     def draws() -> int:

@@ -9,8 +9,8 @@ const LONGEST = 34; // milliseconds of a picture, and on average between picture
 const TRIAL = 20; // pictures of that average
 const MAX_STEP = 250; // milliseconds of one picture at most, as after a pause
 
-/** Has the system asked for less motion? */
-const calm = matchMedia("(prefers-reduced-motion: reduce)");
+const query = matchMedia("(prefers-reduced-motion: reduce)");
+let calm = query.matches; // less motion is asked for; asking the query itself would keep Chromium from telling of a change
 
 /** @typedef {ReturnType<typeof createWind>} Wind */
 
@@ -46,7 +46,7 @@ export function createWind() {
         mean += (step - mean) / Math.min(pictures, TRIAL);
         if (pictures > TRIAL && mean > LONGEST) slow = true;
       }
-      const blows = on && !calm.matches && !slow && sways && took <= LONGEST && (whole || (moving && before > 0));
+      const blows = on && !calm && !slow && sways && took <= LONGEST && (whole || (moving && before > 0));
       share = Math.min(1, Math.max(0, before + (blows ? 1 / RISE : -1 / FALL) * (step / 1000)));
       seconds += step / 1000;
       return before > 0 || share > 0;
@@ -57,12 +57,15 @@ export function createWind() {
 /** The wind's button. @param {import("./viewer.js").Viewer} viewer */
 export function listenToWind(viewer) {
   element("windButton", HTMLButtonElement).addEventListener("click", () => viewer.showWind(!viewer.wind.on));
-  calm.addEventListener("change", () => viewer.showWind(viewer.wind.on));
+  query.addEventListener("change", ({ matches }) => {
+    calm = matches;
+    viewer.showWind(viewer.wind.on);
+  });
 }
 
 /** Show whether it blows. @param {Wind} wind @param {import("../data/manifest.js").Manifest} manifest */
 export function showWindButton({ on }, manifest) {
   const button = element("windButton", HTMLButtonElement);
-  button.hidden = !manifest.wind || calm.matches;
+  button.hidden = !manifest.wind || calm;
   button.setAttribute("aria-pressed", String(on));
 }
