@@ -18,6 +18,7 @@ import { createStoryPanel } from "./ui/story.js";
 import { listenToTools } from "./ui/tools.js";
 import { listenToTour } from "./ui/tour.js";
 import { explainError, Viewer } from "./ui/viewer.js";
+import { listenToWind } from "./ui/wind.js";
 
 document.documentElement.classList.add("running"); // hides the hint that nothing happens
 const hud = createHud(), menu = createPanel("menu");
@@ -59,6 +60,7 @@ async function start() {
       new ResizeObserver(redraw).observe(canvas);
       listenToTools(viewer, paint.keep, walker);
       listenToDaylight(viewer);
+      listenToWind(viewer);
       map = createMinimap(viewer);
       if (still) return;
       runFrameLoop(viewer);

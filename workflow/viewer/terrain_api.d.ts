@@ -95,8 +95,11 @@ export interface Sun {
 
 /** Draws the last update on a WebGL2 context. */
 export interface Painter {
-  /** backdrop: sky and far ground first (default); overlay: "picture" (default) or another name of the page's menu. */
-  draw(camera: Camera, options?: { backdrop?: boolean; overlay?: string }): void;
+  /**
+   * backdrop: sky and far ground first (default); overlay: "picture" (default) or another name of the page's menu;
+   * seconds: time of the wind; default: still air.
+   */
+  draw(camera: Camera, options?: { backdrop?: boolean; overlay?: string; seconds?: number }): void;
   /** Free its textures. */
   end(): void;
 }

@@ -203,11 +203,16 @@ export function createPainter(gl, terrain, onEnd) {
       renderer.splats.setFrame(answer);
     },
     painter: {
-      /** @param {import("../terrain/camera.js").Camera} camera @param {{ backdrop?: boolean, overlay?: string }} [options] */
-      draw(camera, { backdrop = true, overlay = OVERLAYS[0] } = {}) {
+      /**
+       * @param {import("../terrain/camera.js").Camera} camera
+       * @param {{ backdrop?: boolean, overlay?: string, seconds?: number }} [options]
+       */
+      draw(camera, { backdrop = true, overlay = OVERLAYS[0], seconds } = {}) {
         const view = checkCamera(camera), number = OVERLAYS.indexOf(overlay);
         if (number < 0) throw new RangeError(`overlay: ${overlay} is none of ${OVERLAYS.join(", ")}`);
-        const options = { ...backdropOptions(terrain, frame, view), overlay: number };
+        if (seconds !== undefined && !Number.isFinite(seconds)) throw new TypeError("seconds: not a finite number");
+        const wind = seconds === undefined ? null : { seconds, share: 1 };
+        const options = { ...backdropOptions(terrain, frame, view), overlay: number, wind };
         resetState(gl);
         gl.viewport(0, 0, view.width, view.height);
         if (backdrop) renderer.draw(view, options);

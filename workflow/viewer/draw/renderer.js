@@ -18,6 +18,7 @@ import { createSplats } from "./splats.js";
 const FIRST = 64; // blocks of the first slice of a picture
 const GOAL = 40; // milliseconds of a slice: somebody who walks on waits for one
 const GROW = 2; // times the blocks of the slice before, at most
+const TURN = 1000 / 60; // milliseconds by which a slice may be finished before that is seen
 const MOST = 250; // slices of a picture: where each waits long whatever its size, a picture still ends
 
 /**
@@ -63,8 +64,9 @@ export function createSlicedPicture(gl, sky, splats) {
   const framebuffer = gl.createFramebuffer();
   /** @type {{ texture: WebGLTexture, width: number, height: number } | null} */
   let target = null;
-  /** @type {{ camera: Camera, options: DrawOptions, at: number, many: number, start: number } | null} */
+  /** @type {{ camera: Camera, options: DrawOptions, at: number, many: number, start: number, worked: number } | null} */
   let job = null;
+  let took = Infinity;
   /** @type {WebGLSync | null} */
   let fence = null;
   const forgetFence = () => {
@@ -90,6 +92,10 @@ export function createSlicedPicture(gl, sky, splats) {
   }
 
   return {
+    /** Milliseconds of work, at least, of the last whole picture. */
+    get took() {
+      return took;
+    },
     /** How much of the picture is drawn, 0 to 1; null: none is under way. */
     get share() {
       return job && job.at / Math.max(1, splats.length);
@@ -104,15 +110,21 @@ export function createSlicedPicture(gl, sky, splats) {
       gl.activeTexture(gl.TEXTURE0);
       fit(camera.width, camera.height);
       drawInto(camera, () => sky.draw(camera, options));
-      job = { camera, options, at: 0, many: FIRST, start: 0 };
+      job = { camera, options, at: 0, many: FIRST, start: 0, worked: 0 };
     },
     /** Draw the next slice if the GPU has finished the last. Returns: is the picture whole? @param {number} now */
     advance(now) {
       if (!job || !hasPassed(gl, fence)) return false;
-      if (fence) job.many = Math.max(splats.length / MOST, job.many * Math.min(GROW, GOAL / Math.max(1, now - job.start)));
+      if (fence) {
+        job.many = Math.max(splats.length / MOST, job.many * Math.min(GROW, GOAL / Math.max(1, now - job.start)));
+        job.worked += Math.max(0, now - job.start - TURN);
+      }
       forgetFence();
       const { camera, options, at } = job, many = Math.ceil(job.many);
-      if (at >= splats.length) return true;
+      if (at >= splats.length) {
+        took = job.worked;
+        return true;
+      }
       drawInto(camera, () => splats.draw(camera, options, at, many));
       fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
       gl.flush();

@@ -8,6 +8,7 @@ import { MAX_OCTAVES } from "../terrain/heights.js";
 import { FACES } from "../terrain/sphere.js";
 import { lightCode, lightPaint, shineCode } from "./lighting.js";
 import { OBJECTS, OVERLAYS } from "./overlays.js";
+import { WIND } from "./wind.js";
 
 const AIR = 0.12; // height at which the sky of a planet is 1/e as bright, in radii
 /** Distance that leaves 1/e of the far ground's colour, over the distance of the last tiles; see terrain/far_ground.py. */
@@ -215,6 +216,12 @@ const VARY = `  vec2 spot = place > 0u ? cell * side + corner.xy : seen.xy; // a
   uint soil = texelFetch(owners, ivec2(0, int(row / ${ROW}u)), 0).x >> 8u;
   one.paint.rgb = clamp(one.paint.rgb + variation(spot, int(soil)), 0.0, 1.0);`;
 
+const BEND = `  float bent = bend(texelFetch(stems, ivec2(0, int(row / ${ROW}u)), 0).xy, one.centre.z);
+`;
+
+const SWAY = `
+  if (bent > 0.0) seen.xy += bent * sway(place > 0u ? cell * side + corner.xy : seen.xy); // an object as a whole`;
+
 /** Sky that thins out with height, and far ground, as dav_gswt/terrain/sphere_backdrop.py has them. */
 export const SPHERE_BACKDROP = `
 uniform vec3 zenith, horizon, ground;
@@ -274,8 +281,9 @@ const PLACE_ON_SPHERE = `
  * @param {import("../terrain/heights.js").HeightField["kind"]} kind
  * @param {import("../terrain/variation.js").Variation | null} varied
  * @param {boolean} lit
+ * @param {boolean} windy
  */
-export const vertexShader = (kind, varied, lit) => `#version 300 es
+export const vertexShader = (kind, varied, lit, windy) => `#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2D;
@@ -296,7 +304,7 @@ ${DECODE}
 ${backdropCode(kind, lit)}
 ${kind === "hills" || varied ? HASH : ""}
 ${kind === "sphere" ? SPHERE : SURFACES[kind]}
-${varied ? variationCode(varied.waves.length, varied.waves[0].colours.length) : ""}${lit ? lightCode(kind) : ""}
+${varied ? variationCode(varied.waves.length, varied.waves[0].colours.length) : ""}${lit ? lightCode(kind) : ""}${windy ? WIND : ""}
 mat3 rotation(vec4 q) { // of length 1
   float w = q.x, x = q.y, y = q.z, z = q.w;
   return mat3(
@@ -319,7 +327,7 @@ void main() {
 ${kind === "sphere" ? SPHERE_CODE : PLANE_CODE}
   uint row = entry & ${(1 << CODE_SHIFT) - 1}u;
   Gaussian one = decodeRecord(texelFetch(records, ivec2(int(row & ${ROW - 1}u), int(row / ${ROW}u)), 0));
-${kind === "sphere" ? PLACE_ON_SPHERE : PLACE_ON_PLANE}
+${windy ? BEND : ""}${kind === "sphere" ? PLACE_ON_SPHERE : PLACE_ON_PLANE}${windy ? SWAY : ""}
   vec3 p = vec3(dot(right, seen), dot(up, seen), dot(ahead, seen));
   if (!(p.z > near)) return;
   float distance = length(seen), opacity = one.paint.a;

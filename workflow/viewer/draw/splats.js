@@ -14,6 +14,7 @@ import { createShadowTexture, setLight } from "./lighting.js";
 import { OBJECTS, overlayColours } from "./overlays.js";
 import { FAR_HAZE, FRAGMENT, vertexShader } from "./shaders.js";
 import { setHorizon } from "./sky.js";
+import { measureStem, setWind } from "./wind.js";
 
 /**
  * @typedef {import("./gl.js").GL} GL
@@ -24,9 +25,9 @@ import { setHorizon } from "./sky.js";
  * @typedef {Record<string, WebGLUniformLocation | null>} Uniforms
  *
  * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there;
- * light: null: colours as captured.
- * @typedef {{ end: number, low: number, overlay: number,
- *   light: import("../terrain/light.js").Lighting | null }} DrawOptions
+ * light: null: colours as captured; wind: absent: none.
+ * @typedef {{ end: number, low: number, overlay: number, light: import("../terrain/light.js").Lighting | null,
+ *   wind?: import("./wind.js").Wind | null }} DrawOptions
  * @typedef {ReturnType<typeof createSplats>} Splats
  */
 
@@ -35,20 +36,20 @@ const FULL = "The terrain does not fit into this machine's graphics memory. Clos
 const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
 const QUADS = Uint16Array.from({ length: 6 * PAGE }, (_, k) => 4 * Math.floor(k / 6) + [0, 1, 2, 2, 1, 3][k % 6]);
 export const RELIEF = 2;
-const RECORDS = 0, ENTRIES = 1, HUES = 3, PLACES = 4, OWNERS = 5, SHADOWS = 6; // texture units
+const RECORDS = 0, ENTRIES = 1, HUES = 3, PLACES = 4, OWNERS = 5, SHADOWS = 6, STEMS = 7; // texture units
 
 /** @param {GL} gl @param {Manifest} manifest @param {HeightField} heights */
 export function createSplats(gl, manifest, heights) {
   const variation = createVariation(manifest);
-  const programs = [false, true].map((lit) => once(() => {
-    const program = createProgram(gl, vertexShader(heights.kind, variation, lit), FRAGMENT), { uniforms } = program;
+  const programs = [0, 1, 2, 3].map((k) => once(() => { // 1: in the light of a sun, 2: in the wind
+    const program = createProgram(gl, vertexShader(heights.kind, variation, k % 2 > 0, k > 1), FRAGMENT), { uniforms } = program;
     program.use();
     setConstants(gl, uniforms, manifest, heights);
     if (variation) setWaves(gl, uniforms, variation);
     return program;
   }));
   const isLit = manifest.light !== undefined && heights.kind !== "sphere";
-  programs[Number(isLit)](); // the other one when it is used
+  programs[Number(isLit)](); // the others when they are used
   const tallest = Math.max(recordRows(manifest), orderPages(manifest) / PAGES_A_ROW);
   if (tallest > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new PageError(FULL);
   const records = createTexture(gl, gl.RGBA32UI, ROW, recordRows(manifest));
@@ -62,7 +63,8 @@ export function createSplats(gl, manifest, heights) {
   const shadows = isLit && heights.kind !== "flat" ? createShadowTexture(gl) : null;
   const hues = createTexture(gl, gl.RGBA8, 256, 1), owners = createTexture(gl, gl.R32UI, 1, recordRows(manifest));
   const each = manifest.tiles.length / manifest.materials.length;
-  let shownOverlay = -1;
+  const stems = manifest.wind && heights.kind !== "sphere" ? createTexture(gl, gl.RG32F, 1, recordRows(manifest)) : null;
+  let shownOverlay = -1, sways = false;
   if (gl.getError() === gl.OUT_OF_MEMORY) throw new PageError(FULL);
 
   /** @param {number} unit @param {WebGLTexture} texture */
@@ -90,13 +92,19 @@ export function createSplats(gl, manifest, heights) {
     /**
      * Copy a chunk's records to their rows.
      *
-     * @param {{ tile: number, rows: Uint32Array, records: Uint32Array }} chunk
+     * @param {{ tile: number, level: number, rows: Uint32Array, records: Uint32Array }} chunk
      */
-    addRecords({ tile, rows, records: words }) {
+    addRecords({ tile, level, rows, records: words }) {
       const object = manifest.objects?.[tile - manifest.tiles.length], material = object?.material ?? Math.floor(tile / each);
       const owner = Uint32Array.of((object ? OBJECTS : material) + 256 * material);
       bind(OWNERS, owners);
       for (const row of rows) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, 1, 1, gl.RED_INTEGER, gl.UNSIGNED_INT, owner);
+      if (stems) {
+        const stem = measureStem(manifest, { tile, level, records: words });
+        sways ||= stem[1] > 0;
+        bind(STEMS, stems);
+        for (const row of rows) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, 1, 1, gl.RG, gl.FLOAT, Float32Array.from(stem));
+      }
       bind(RECORDS, records);
       const wordsARow = 4 * ROW;
       for (let k = 0; k < rows.length; k++) {
@@ -132,6 +140,11 @@ export function createSplats(gl, manifest, heights) {
       frame = answer;
     },
 
+    /** Does anything that has arrived sway in the wind? */
+    get sways() {
+      return sways;
+    },
+
     /** Blocks of the last frame. */
     get length() {
       return far.length + close.length;
@@ -144,15 +157,19 @@ export function createSplats(gl, manifest, heights) {
      * @param {number} [from] the first block
      * @param {number} [many] of them; all of a picture, in slices or at once, are drawn in order
      */
-    draw(camera, { end, low, overlay, light }, from = 0, many = far.length + close.length) {
+    draw(camera, { end, low, overlay, light, wind }, from = 0, many = far.length + close.length) {
       if (!frame) return;
-      const { use, uniforms } = programs[Number(light !== null)]();
+      const { use, uniforms } = programs[Number(light !== null) + (stems && wind ? 2 : 0)]();
       use();
       setView(gl, uniforms, heights, manifest.tile_side, camera, frame);
       setLight(gl, uniforms, manifest, light);
       if (light && shadows) {
         bind(SHADOWS, shadows.texture);
         shadows.set(uniforms, light.shadows, camera.eye);
+      }
+      if (stems && wind) {
+        bind(STEMS, stems);
+        setWind(gl, uniforms, manifest, wind, camera.eye);
       }
       if (variation) setWavesUnder(gl, uniforms, variation, camera);
       if (heights.kind === "sphere") {
@@ -184,7 +201,7 @@ export function createSplats(gl, manifest, heights) {
     relief,
     /** Free the textures. */
     end() {
-      for (const texture of [records, entries, nearEntries, places, hues, owners, relief]) gl.deleteTexture(texture);
+      for (const texture of [records, entries, nearEntries, places, hues, owners, relief, stems]) gl.deleteTexture(texture);
       if (shadows) gl.deleteTexture(shadows.texture);
     },
   };
@@ -206,6 +223,7 @@ function setConstants(gl, uniforms, manifest, heights) {
   gl.uniform1i(uniforms.places, PLACES);
   gl.uniform1i(uniforms.owners, OWNERS);
   gl.uniform1i(uniforms.shadows, SHADOWS);
+  gl.uniform1i(uniforms.stems, STEMS);
   gl.uniform1i(uniforms.levels, manifest.levels.length);
   gl.uniform1f(uniforms.side, manifest.tile_side);
   gl.uniform1f(uniforms.near, NEAR * manifest.eye_floor);

@@ -1,5 +1,5 @@
-// The page's address: the place, the overlay, the sun and what is painted:
-// `#x,y,eye,yaw,pitch&show=level&sun=14.5&paint=...`.
+// The page's address: the place, the overlay, the sun, still air and what is painted:
+// `#x,y,eye,yaw,pitch&show=level&sun=14.5&wind=0&paint=...`.
 
 import { OVERLAYS } from "../draw/overlays.js";
 import { PLACE_KEYS } from "./walker.js";
@@ -53,20 +53,23 @@ export function parseSun(hash) {
   return Number.isFinite(hour) ? hour : null;
 }
 
+/** Does the wind blow? @param {string} hash */
+export const parseWind = (hash) => partOf(hash, "wind") !== "0";
+
 /** @param {string} hash @param {string} name */
 const partOf = (hash, name) => hash.split(`&${name}=`)[1]?.split("&")[0] ?? "";
 
 /**
- * The address's part for a place, what is shown there, the sun and what is painted.
+ * The address's part for a place, what is shown there, the sun, the wind and what is painted.
  *
  * @param {Walker} walker
  * @param {number} overlay 0: the terrain as it is
  * @param {string} paint "": nothing
- * @param {import("../terrain/light.js").ChosenSun} [sun]
+ * @param {import("../terrain/light.js").ChosenSun} [sun] @param {boolean} [wind]
  */
-export function formatAddress(walker, overlay, paint, sun = null) {
+export function formatAddress(walker, overlay, paint, sun = null, wind = true) {
   const light = sun === null ? "" : `&sun=${typeof sun === "number" ? Number(sun.toFixed(2)) : sun}`;
-  return `${formatPlace(walker)}${overlay ? `&show=${OVERLAYS[overlay]}` : ""}${light}${paint && `&paint=${paint}`}`;
+  return `${formatPlace(walker)}${overlay ? `&show=${OVERLAYS[overlay]}` : ""}${light}${wind ? "" : "&wind=0"}${paint && `&paint=${paint}`}`;
 }
 
 /** @param {string} text */
@@ -107,6 +110,7 @@ export function syncAddress(viewer, paint) {
     viewer.setPlace(parsePlace(ours));
     viewer.showOverlay(parseOverlay(ours));
     viewer.showSun(parseSun(ours));
+    viewer.showWind(parseWind(ours));
     paint.follow(parsePaint(ours)).catch((error) => viewer.fail(error));
   });
 }

@@ -39,6 +39,15 @@ export function runFrameLoop(viewer) {
     else if (viewer.loaded && !viewer.stale && viewer.shaded) resting.step(scene, now);
   };
 
+  /** Go on with the wind; a whole picture is drawn again in it. @param {Scene} scene @param {number} gap @param {boolean} moving */
+  const blow = ({ renderer, frame }, gap, moving) => {
+    const { whole } = resting;
+    if (!renderer || (frame?.patient && !whole)) return; // a picture at rest is under way
+    const due = viewer.wind.step(gap, renderer.picture.took, { sways: renderer.splats.sways, whole, moving });
+    if (due && whole) viewer.drawFrame(1, viewer.wind.now);
+    else if (due) viewer.dirty = true;
+  };
+
   /** @param {number} now */
   const next = (now) => {
     requestAnimationFrame(next);
@@ -48,13 +57,14 @@ export function runFrameLoop(viewer) {
     const { walker, renderer } = scene, stepped = stepWalker(walker, Math.min(gap, MAX_STEP) / 1000);
     const toured = tour.step(walker, scene.heights, gap / 1000);
     if (stepped || toured) viewer.dirty = viewer.stale = true;
-    const may = mayDraw(scene, now);
+    const may = mayDraw(scene, now), moving = viewer.stale;
     ask(scene, now, may);
+    blow(scene, gap, moving);
     // the frame of a picture at rest may take the GPU seconds: it is drawn in slices alone
     const due = viewer.dirty && may && !scene.frame?.patient;
     if (!due || !drew) pacing.reset();
     else if (pacing.addFrame(gap, scene.frame?.count ?? 0)) viewer.stale = true;
-    if (due) viewer.drawFrame(pacing.scale);
+    if (due) viewer.drawFrame(pacing.scale, viewer.wind.now);
     if (due && !viewer.loaded) renderer?.preview.addPicture();
     drew = due;
   };
@@ -73,6 +83,7 @@ export function createResting(viewer) {
   /** @param {import("../draw/renderer.js").Renderer} renderer @param {Scene} scene */
   function finish({ picture, rest }, { frame }) {
     viewer.show(picture);
+    viewer.wind.still();
     rest.finish(budget, frame?.shrink === 1);
     if (!rest.whole || frame?.missing.length) return; // a chunk that arrives begins anew
     viewer.hud.showRefining(null);

@@ -9,13 +9,14 @@ import { createRenderer } from "../draw/renderer.js";
 import { backdropOptions, listDrawnCells, openTerrain, readTerrain } from "../scene/open_terrain.js";
 import { cameraAt } from "../terrain/camera.js";
 import { tileUnder } from "../terrain/cells.js";
-import { formatAddress, parseOverlay, parsePlace, parseSun } from "./address.js";
+import { formatAddress, parseOverlay, parsePlace, parseSun, parseWind } from "./address.js";
 import { showDaylight } from "./daylight.js";
 import { element } from "./dom.js";
 import { createResting } from "./frame_loop.js";
 import { createPainting } from "./painting.js";
 import { createTour } from "./tour.js";
 import { createWalker, moveTo } from "./walker.js";
+import { createWind, showWindButton } from "./wind.js";
 
 /**
  * @typedef {import("../data/source.js").Source} Source
@@ -55,6 +56,7 @@ export class Viewer {
   pacing = createFramePacing();
   stats = createFrameStats();
   tour = createTour();
+  wind = createWind();
   resting = createResting(this);
   /** @type {Walker | null} */
   #walker = null; // the one that the controls move, through all bundles
@@ -110,11 +112,13 @@ export class Viewer {
     if (first) {
       this.overlay = parseOverlay(location.hash);
       terrain.light?.choose(parseSun(location.hash));
+      this.wind.switch(parseWind(location.hash));
       this.options.onFirstScene(walker);
     }
     element("tools", HTMLElement).hidden = false;
     this.#showLegend();
     showDaylight(terrain.light);
+    showWindButton(this.wind, manifest);
     this.drawFrame(); // sky and far ground at once
     await this.options.onScene(this.scene, first);
     if (first) await this.options.onSize(sizeOf(manifest));
@@ -149,14 +153,18 @@ export class Viewer {
     this.scene.client.ask(this.camera(this.scene), budget, patient);
   }
 
-  /** Draw the picture now, of the worker's last frame. @param {number} [scale] of the resolution */
-  drawFrame(scale = 1) {
+  /**
+   * Draw the picture now, of the worker's last frame.
+   *
+   * @param {number} [scale] of the resolution @param {import("../draw/wind.js").Wind | null} [wind]
+   */
+  drawFrame(scale = 1, wind = null) {
     const { scene } = this;
     if (!scene?.renderer) return;
     const start = performance.now(), camera = this.camera(scene, scale);
     this.#fit(camera);
     this.gl.viewport(0, 0, camera.width, camera.height);
-    scene.renderer.draw(camera, this.drawOptions(scene, camera));
+    scene.renderer.draw(camera, { ...this.drawOptions(scene, camera), wind });
     this.dirty = false;
     this.stats.addTime("render", performance.now() - start);
     this.stats.addFrame(this.#fresh);
@@ -250,6 +258,12 @@ export class Viewer {
     this.redraw();
   }
 
+  /** @param {boolean} on */
+  showWind(on) {
+    this.wind.switch(on);
+    if (this.scene) showWindButton(this.wind, this.scene.manifest);
+  }
+
   #showLegend() {
     this.hud.legend.show(this.overlay, this.scene?.manifest ?? null);
     element("overlay", HTMLSelectElement).selectedIndex = this.overlay;
@@ -257,7 +271,7 @@ export class Viewer {
 
   /** The address of this place. @param {string} paint of what is painted */
   address(paint) {
-    return this.scene ? formatAddress(this.scene.walker, this.overlay, paint, this.scene.light?.chosen) : "";
+    return this.scene ? formatAddress(this.scene.walker, this.overlay, paint, this.scene.light?.chosen, this.wind.on) : "";
   }
 
   /** The finest picture of this place as a PNG file, when it is drawn. @returns {Promise<Blob>} */
