@@ -16,7 +16,7 @@ with logging_to(snakemake.log[0]):
     terrain = endless.terrain_from_bundle(bundle, params.heights, params.classes)
     terrain = gallery.suit_width(terrain, params.size["width"])
     manifest = light.apply_light(bundle.manifest, params.sun, 0.0, terrain.heights)
-    shots = walk.walk_shots(**params.flight)
-    moments = progress(list(zip(shots, np.linspace(*params.hours, len(shots)).tolist(), strict=True)), "render walk")
+    shots, (first, last) = walk.walk_shots(**params.flight), params.hours
+    moments = progress(list(zip(shots, np.linspace(first, last, len(shots)).tolist(), strict=True)), "render walk")
     frames = [gallery.render_moment(terrain, shot, manifest, hour, **params.size) for shot, hour in moments]
     gallery.animate_frames(frames, params.rate, snakemake.output.picture)
