@@ -146,7 +146,7 @@ def test_a_page_takes_its_sun_from_the_config_or_the_photos(covered):
     assert apply_light(by_photos, {"elevation": 12.0, "azimuth": 3.0}, 0.0, surface).light == LightEntry(
         12.0, 3.0, "config"
     )
-    none = apply_light(by_photos, "off", 0.0, surface)
+    none = apply_light(by_photos, "none", 0.0, surface)
     assert none.light is None and none.wind is None
     planet = apply_light(by_photos, "auto", 1.0, Sphere(9.0, 1.0, 13))
     assert planet.light is None and planet.wind is None

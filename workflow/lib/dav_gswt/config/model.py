@@ -72,10 +72,10 @@ class Config(ConfigModel):
         le=4,
     )
     heights: Surface = key("the surface that the tiles are placed on", Hills(kind="hills"))
-    sun: SunPosition | Auto | Literal["off"] = key(
+    sun: SunPosition | Auto | Literal["none"] = key(
         "the sun that shone on the photos. The page moves it over the day, with light and shadow on hills. `auto`: "
         "from the time and place in EXIF, or from light and dark on the ground's relief; else 45 degrees high in the "
-        "south-west. `off`: the light stays as photographed. Neither on a sphere nor in exports",
+        "south-west. `none`: the light stays as photographed. Neither on a sphere nor in exports",
         "auto",
     )
     wind: float = key("how far plants sway on the page; 0: none", 1, ge=0, le=4)

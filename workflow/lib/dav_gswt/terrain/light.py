@@ -47,7 +47,7 @@ def apply_light(manifest: Manifest, sun: Any, wind: float, surface: HeightField)
     if sun == "auto":
         light = manifest.light or ASSUMED
     else:
-        light = None if sun == "off" else LightEntry(sun["elevation"], sun["azimuth"], "config")
+        light = None if sun == "none" else LightEntry(sun["elevation"], sun["azimuth"], "config")
     return replace(manifest, light=light, wind=wind or None)
 
 

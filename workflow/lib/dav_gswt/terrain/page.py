@@ -80,7 +80,7 @@ def write_page(
     surface: HeightField | None = None,
     rule: Sequence[dict[str, Any]] = NOISE,
     front: Front | None = None,
-    sun: Any = "off",
+    sun: Any = "none",
     wind: float = 0.0,
 ) -> None:
     """Copy viewer, manifest and parts to `out_dir`, atomically: an older page stays until the new one is complete.
