@@ -106,7 +106,8 @@ def test_wind_blows_over_whole_pictures_on_fast_devices(modules, gap, took, turn
 
 @pytest.mark.parametrize("part", ["", "&wind=0", "&wind=1", "&wind=", "&wind=%"])
 def test_an_address_tells_the_wind(call, part):
-    assert call("ui/address.js", "parseWind", f"#3,5,2{part}&paint=AbC") == (part != "&wind=0")
+    on = part != "&wind=0"
+    assert call("ui/address.js", "parseWind", f"#3,5,2{part}&paint=AbC") == on
     place = dict(x=3, y=-5, eye=2, yaw=20, pitch=-30.5, floor=0.5, radius=0)
     assert ("&wind=0&" in call("ui/address.js", "formatAddress", place, 2, "AbC", None, on)) == (not on)
 
