@@ -23,7 +23,7 @@ def address(page_of):
 
 @pytest.mark.parametrize("change", [{}, {"yaw": 61}, {"x": 9.5, "pitch": -8}], ids=["same", "turn", "far"])
 def test_a_frame_is_four_draw_calls_and_uploads_less_than_an_index_a_gaussian(visit, address, change):
-    """Sky, far hills, cells, the block about the eye. Gaussians stay on the card: blocks and the near order are uploaded."""
+    """Sky, far hills, cells, the near block. Gaussians stay on the card: blocks and the near order are uploaded."""
     counted = visit(320, 200)
     counted.page.add_init_script(COUNT_CALLS)
     counted.open(f"{address}?still")
