@@ -1,8 +1,8 @@
 """Light and shadow of hills beside a ray tracer: `light.py [OUT.csv]`.
 
 Mitsuba renders the same height field straight from above, of one albedo, below the sun and the sky of `terrain.sun`.
-Brightness is compared after a blur of half a tile, over that of open level ground; shadows are where less than half of
-the sun's beam arrives. Prints a row for each surface and height of the sun.
+Brightness is divided by the brightness of open level ground and blurred over half a tile. A point is in shadow if it
+receives less than half of the sun's beam. Prints a row for each surface and height of the sun.
 """
 
 import csv
@@ -29,7 +29,7 @@ def list_surfaces() -> dict[str, HeightField]:
     steps = np.random.default_rng(3).normal(size=(256, 256))
     steps = np.floor(3 * gaussian_filter(steps, 10, mode="wrap") / 0.03).clip(-6, 6).astype(np.float32)
     return {
-        "default hills": surface_from_config({"kind": "hills", "height": "auto", "wavelength": "auto"}, 1.0),
+        "default hills": surface_from_config({"kind": "hills", "height": "auto", "wavelength": "auto"}, 1.0, 1.0),
         "steep hills": Hills(24.0, 20.0),
         "terraces": HeightMap(steps, 128.0),
     }
@@ -83,7 +83,7 @@ def trace(mesh: mi.Mesh, sun: Sun, top: float, sky: bool) -> np.ndarray:
 
 
 def compare(surface: HeightField, mesh: mi.Mesh, elevation: float) -> dict[str, float]:
-    """Brightness and shadows of the page's light beside those of the ray tracer."""
+    """Compare brightness and shadows of the page's light with the ray tracer's."""
     sun = Sun(elevation, AZIMUTH)
     level = level_light(elevation)
     top = surface.bounds[1]

@@ -4,15 +4,17 @@ import json
 from pathlib import Path
 
 import numpy as np
+from fixtures.shader_functions import OPEN_SHADER
 
 from dav_gswt.terrain import sphere
 
 FOLDER = Path(__file__).parents[1] / "golden"
 
-WEIGHTS = """async ({ levels, opacities }) => {
-  // the shaders' functions, run by transform feedback: four floats a point
+WEIGHTS = (
+    "async ({ levels, opacities }) => {"
+    + OPEN_SHADER
+    + """
   const { CROSSFADE, LEVEL_WEIGHTS } = await import("./draw/shaders.js");
-  const gl = new OffscreenCanvas(1, 1).getContext("webgl2"), program = gl.createProgram();
   const vertex = `#version 300 es
     ${LEVEL_WEIGHTS} ${CROSSFADE}
     uniform float x, y;
@@ -21,22 +23,7 @@ WEIGHTS = """async ({ levels, opacities }) => {
       found = levels > 0 ? vec4(levelWeight(0, x), levelWeight(1, x), levelWeight(2, x), levelWeight(3, x))
         : vec4(crossfadeOpacity(x, y));
     }`;
-  const fragment = "#version 300 es\\nvoid main() {}";
-  for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-    const shader = gl.createShader(kind);
-    gl.shaderSource(shader, source);
-    gl.compileShader(shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
-    gl.attachShader(program, shader);
-  }
-  gl.transformFeedbackVaryings(program, ["found"], gl.SEPARATE_ATTRIBS);
-  gl.linkProgram(program);
-  gl.useProgram(program);
-  gl.bindBuffer(gl.TRANSFORM_FEEDBACK_BUFFER, gl.createBuffer());
-  gl.bufferData(gl.TRANSFORM_FEEDBACK_BUFFER, 16, gl.STREAM_READ);
-  gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, gl.getParameter(gl.TRANSFORM_FEEDBACK_BUFFER_BINDING));
-  gl.enable(gl.RASTERIZER_DISCARD);
-  const at = (name) => gl.getUniformLocation(program, name), out = new Float32Array(4);
+  const { gl, at, run: runShader } = openShader(vertex);
   const padded = (list) => Float32Array.from({ length: 8 }, (_, k) => list[k] ?? 0);
   const run = (count, x, y, { switches = [], bands = [] } = {}) => {
     gl.uniform1i(at("levels"), count);
@@ -44,15 +31,12 @@ WEIGHTS = """async ({ levels, opacities }) => {
     gl.uniform1f(at("y"), y);
     gl.uniform1fv(at("switches[0]"), padded(switches));
     gl.uniform1fv(at("bands[0]"), padded(bands));
-    gl.beginTransformFeedback(gl.POINTS);
-    gl.drawArrays(gl.POINTS, 0, 1);
-    gl.endTransformFeedback();
-    gl.getBufferSubData(gl.TRANSFORM_FEEDBACK_BUFFER, 0, out);
-    return [...out];
+    return runShader();
   };
   return [levels.map(l => run(l.switches.length, l.distance, 0, l).slice(0, l.switches.length)),
     opacities.map(o => run(0, o.opacity, o.weight)[0])];
 }"""
+)
 
 
 def golden(name):

@@ -8,6 +8,7 @@ import pytest
 from fixtures.browser import served
 from fixtures.bundles import Ground
 from fixtures.page_visit import Visit
+from fixtures.shader_functions import OPEN_SHADER
 
 from dav_gswt.terrain.heights import Hills
 
@@ -23,9 +24,9 @@ BELOW = """async (cases) => {
   const { createSky } = await import("./draw/sky.js"), { lightBelow } = await import("./terrain/light.js");
   const { findHour, placeSun, sunAt } = await import("./terrain/sun.js");
   const gl = new OffscreenCanvas(1, 1).getContext("webgl2"), bytes = new Uint8Array(4);
-  return cases.map(({ captured: [elevation, azimuth], hour, zenith, horizon, colours, rays }) => {
+  return cases.map(({ captured: [elevation, azimuth], north, hour, zenith, horizon, colours, rays }) => {
     const captured = placeSun(elevation, azimuth), manifest = { sky: { zenith, horizon }, ground_colour: [0, 0, 0] };
-    const light = lightBelow(manifest, captured, sunAt(captured, hour));
+    const light = lightBelow(manifest, captured, sunAt(captured, hour, north));
     const sky = createSky(gl, { ...manifest, light: {} });
     const shown = rays.map((ahead, k) => { // a picture of one pixel, which sees along the ray
       const [zenith, horizon, ground] = [colours[k], colours[k], colours[k]];
@@ -34,45 +35,29 @@ BELOW = """async (cases) => {
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
       return [...bytes.subarray(0, 3)].map(v => v / 255);
     });
-    return { ...light, shown, captured_hour: findHour(captured), sun: [light.sun.elevation, light.sun.azimuth],
+    return { ...light, shown, captured_hour: findHour(captured, north), sun: [light.sun.elevation, light.sun.azimuth],
       new_zenith: light.zenith, new_horizon: light.horizon, sun_colour: light.sunColour };
   });
 }"""
 
-SHADED = """async ({ lights, shadows: { sun: [elevation, azimuth], hills, side, eye, points } }) => {
+SHADED = (
+    """async ({ lights, shadows: { sun: [elevation, azimuth], hills, side, eye, points } }) => {"""
+    + OPEN_SHADER
+    + """
   // the shader's functions, run by transform feedback: of light, and of the texture of shadows
   const { createShadowTexture, lightCode, shineCode } = await import("./draw/lighting.js");
   const { createHeights } = await import("./terrain/heights.js");
   const { createShadows } = await import("./terrain/shadows.js"), { placeSun } = await import("./terrain/sun.js");
-  const gl = new OffscreenCanvas(1, 1).getContext("webgl2"), program = gl.createProgram();
   const vertex = `#version 300 es
     ${shineCode(true)}
     ${lightCode("hills")}
     uniform vec3 given;
     out vec4 found;
     void main() { found = vec4(shineOn(given.xy, given.z), sunShare(given.xy)); }`;
-  for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, "#version 300 es\\nvoid main() {}"]]) {
-    const shader = gl.createShader(kind);
-    gl.shaderSource(shader, source);
-    gl.compileShader(shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
-    gl.attachShader(program, shader);
-  }
-  gl.transformFeedbackVaryings(program, ["found"], gl.SEPARATE_ATTRIBS);
-  gl.linkProgram(program);
-  gl.useProgram(program);
-  gl.bindBuffer(gl.TRANSFORM_FEEDBACK_BUFFER, gl.createBuffer());
-  gl.bufferData(gl.TRANSFORM_FEEDBACK_BUFFER, 16, gl.STREAM_READ);
-  gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, gl.getParameter(gl.TRANSFORM_FEEDBACK_BUFFER_BINDING));
-  gl.enable(gl.RASTERIZER_DISCARD);
-  const at = (name) => gl.getUniformLocation(program, name), out = new Float32Array(4);
+  const { gl, at, run: runShader } = openShader(vertex);
   const run = (...given) => {
     gl.uniform3fv(at("given"), given);
-    gl.beginTransformFeedback(gl.POINTS);
-    gl.drawArrays(gl.POINTS, 0, 1);
-    gl.endTransformFeedback();
-    gl.getBufferSubData(gl.TRANSFORM_FEEDBACK_BUFFER, 0, out);
-    return [...out];
+    return runShader();
   };
   const texture = createShadowTexture(gl), made = createShadows(createHeights({ kind: "hills", ...hills }), side);
   const ratios = lights.map(({ direct, ambient, sun, slopes, visible }) => {
@@ -94,6 +79,7 @@ SHADED = """async ({ lights, shadows: { sun: [elevation, azimuth], hills, side, 
   });
   return { ratios, drawn, exact, turns: turns.length };
 }"""
+)
 
 
 def test_the_light_below_a_sun_is_that_of_the_library(modules):
@@ -246,6 +232,9 @@ def test_painters_of_other_pages_follow_the_sun(blank, still, address):
           for (const hour of [NaN, "noon", undefined]) {
             try { terrain.setSun(hour); } catch (error) { refused.push(error.name); }
           }
+          const { chooseSun } = await import("./api/parts.js"), dark = { light: null };
+          for (const none of [null, "off"]) chooseSun(dark, none); // as it is already
+          try { chooseSun(dark, 12); } catch (error) { refused.push(error.name); }
           return [[captured, sun], btoa(Array.from(bytes, (v) => String.fromCharCode(v)).join("")), complete, refused];
         }""",
         PLACE,
@@ -253,4 +242,4 @@ def test_painters_of_other_pages_follow_the_sun(blank, still, address):
     assert complete and (Visit.decode(160, 100, drawn) == picture).all()
     assert (sun[0]["elevation"], sun[0]["azimuth"]) == (40, 200) and sun[0]["hour"] == pytest.approx(CAPTURED)
     assert sun[1]["hour"] == 17 and sun[1]["azimuth"] > 240
-    assert refused == [None, "TypeError", "TypeError", "TypeError"]
+    assert refused == [None, "TypeError", "TypeError", "TypeError", "TypeError"]

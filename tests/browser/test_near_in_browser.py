@@ -61,7 +61,7 @@ def looks(surface, rng) -> list[tuple[np.ndarray, cameras.Camera]]:
 
 @pytest.mark.parametrize("entry", SURFACES.values(), ids=SURFACES)
 def test_whatever_may_show_is_sorted(modules, field, rng, entry):
-    surface = surface_from_config(entry, SIDE)
+    surface = surface_from_config(entry, SIDE, 1.0)
     views = looks(surface, rng)
     given = {
         "surface": {"octaves": 4, "salt": 0} | entry,

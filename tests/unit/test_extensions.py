@@ -9,7 +9,7 @@ import pytest
 from dav_gswt.capture.agents import AGENTS
 from dav_gswt.export.formats import FORMATS
 from dav_gswt.geometry.poses import Pose
-from dav_gswt.terrain.heights import SURFACES
+from dav_gswt.terrain.heights import SURFACES, surface_from_config
 from dav_gswt.views.policies import POLICIES
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.terms import TERMS
@@ -70,7 +70,7 @@ def test_an_exporter(extension, tmp_path):
 
 def test_a_surface(extension):
     extension("A surface")
-    waves = SURFACES["waves"].from_config({"height": 0.5, "wavelength": 4.0}, side=2.0)
+    waves = surface_from_config({"kind": "waves", "height": 0.5, "wavelength": 4.0}, 2.0, 1.0)
     y = np.linspace(-9, 9, 50)
     height, slope = waves.at(0 * y, y)
     ahead, _ = waves.at(0 * y, y + 1e-6)

@@ -67,7 +67,7 @@ def sample_pairs(sets: dict[str, PlacedTiles], asked: dict) -> list[Item]:
     setups, used, found = list(product(GROUNDS, crops.VIEWS)), set(), []
     side = next(iter(sets.values())).terrain.side
     for number, (ground, view) in enumerate(progress(setups, "draw pairs")):
-        surface = heights.surface_from_config(GROUNDS[ground], side)
+        surface = heights.surface_from_config(GROUNDS[ground], side, 1.0)
         placed = {name: (each, replace(each.terrain, heights=surface)) for name, each in sets.items()}
         look = Setup(view, ground, asked["size"], placed)
         rng = np.random.default_rng([asked["seed"], number])

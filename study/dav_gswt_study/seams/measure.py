@@ -91,7 +91,7 @@ def measure_crops(placed: PlacedTiles, straight: PlacedTiles, weights: Weights |
     rows = []
     views = [(ground, view) for ground in GROUNDS for view in crops.VIEWS]
     for ground, view in progress(views, "measure seams"):
-        surface = heights.surface_from_config(GROUNDS[ground], placed.terrain.side)
+        surface = heights.surface_from_config(GROUNDS[ground], placed.terrain.side, 1.0)
         draped, beside = (replace(sample.terrain, heights=surface) for sample in (placed, straight))
         rng = np.random.default_rng([seed, 7])
         samples = [

@@ -70,7 +70,7 @@ def time_page(bundle_dir: Path | str, viewer_dir: Path | str, manifest: dict, se
     that something new had come for from the worker.
     Raises: InputError: see `browser.chromium`, `page.write_page`.
     """
-    surface, rows = heights.surface_from_config(settings.heights, manifest["tile_side"]), []
+    surface, rows = heights.surface_from_config(settings.heights, manifest["tile_side"], manifest["eye_floor"]), []
     places = [_shot_to_place(shot, manifest) for shot in settings.shots()]
     first = ",".join(f"{places[0][key]:.6g}" for key in ("x", "y", "eye", "yaw", "pitch"))
     with tempfile.TemporaryDirectory() as folder, browser.chromium() as chromium:

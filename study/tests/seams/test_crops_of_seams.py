@@ -17,7 +17,7 @@ _, WALKER, TOP = crops.VIEWS
 
 @pytest.mark.parametrize("view, surface", [(WALKER, HILLS), (TOP, {"kind": "flat"})])
 def test_a_crop_is_the_terrain_s_own_picture(placed, view, surface, rng):
-    terrain = replace(placed.terrain, heights=heights.surface_from_config(surface, placed.terrain.side))
+    terrain = replace(placed.terrain, heights=heights.surface_from_config(surface, placed.terrain.side, 1.0))
     some = (crops.find_cut(placed, terrain, view, place.at) for place in places.sample_cuts(placed, rng))
     crop, met = next(filter(None, some))
     expected = stills.render_view(terrain, crop.camera, rendering.SKY, placed.colour)
@@ -63,7 +63,7 @@ def test_a_border_broken_on_purpose_is_found(placed, change, rng):
 
 
 def test_the_middle_of_a_crop_is_its_place_on_the_ground(placed, rng):
-    terrain = replace(placed.terrain, heights=heights.surface_from_config(HILLS, placed.terrain.side))
+    terrain = replace(placed.terrain, heights=heights.surface_from_config(HILLS, placed.terrain.side, 1.0))
     some = places.sample_borders(placed, rng)
     for view in crops.VIEWS:
         crop = next(filter(None, (crops.make_crop(placed, terrain, view, place.at) for place in some)))

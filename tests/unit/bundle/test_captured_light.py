@@ -26,6 +26,7 @@ LOCATED = replace(
     georeference=Georeference(47.1, 8.0, 430.0, 300.0, metres_per_unit=1.0),
     sun=CapturedSun(34.5, 280.0, "2024-06-23T16:00:00Z", "gps", 0.0, 0.1),
 )
+ASSUMED = LightEntry(45.0, 225.0, "assumed")
 C, S = np.cos(np.radians(8)), np.sin(np.radians(8))
 
 
@@ -41,31 +42,39 @@ def materials(tmp_path_factory):
 
 
 def test_exif_counts_before_relief_and_is_turned_from_north_to_the_tiles(materials):
-    assert find_light(LOCATED, materials / "sun", {}) == LightEntry(34.5, 340.0, "exif")
-    # the turn takes places of the tile to those of the exemplar, 8 degrees counter-clockwise of them
-    assert find_light(LOCATED, None, {"pattern": {"turn": [[C, -S], [S, C]]}}) == LightEntry(34.5, 348.0, "exif")
+    assert find_light(LOCATED, materials / "sun", {}) == LightEntry(34.5, 340.0, "exif", 300.0)
+    # a place of the tile lies in the exemplar turned by 8 degrees, counter-clockwise
+    assert find_light(LOCATED, None, {"pattern": {"turn": [[C, -S], [S, C]]}}) == LightEntry(34.5, 348.0, "exif", 292.0)
 
 
-def test_relief_tells_the_sun_in_the_world_and_nothing_tells_none(materials):
+def test_relief_reveals_the_sun_in_the_world_and_otherwise_it_is_assumed_in_the_south_west(materials):
     assert find_light(FRAME, materials / "sun", {}) == LightEntry(45.0, 315.0, "relief")
-    assert find_light(FRAME, materials / "none", {}) is None
-    assert find_light(FRAME, None, {}) is None
+    assert find_light(FRAME, materials / "none", {}) == ASSUMED
+    assert find_light(FRAME, None, {}) == ASSUMED
+    assert find_light(replace(LOCATED, sun=None), None, {}) == LightEntry(45.0, 285.0, "assumed", 300.0)
 
 
 def test_a_report_of_materials_without_the_key_tells_no_sun(materials, tmp_path):
     values = json.loads((materials / "sun" / NAME).read_text())
     del values["sun"]
     (tmp_path / NAME).write_text(json.dumps(values))
-    assert find_light(FRAME, tmp_path, {}) is None
+    assert find_light(FRAME, tmp_path, {}) == ASSUMED
 
 
 def test_a_manifest_holds_the_light_where_it_is_known_and_refuses_what_cannot_be(tmp_path):
-    light = LightEntry(34.5, 340.0, "exif")
+    light = LightEntry(34.5, 340.0, "exif", 300.0)
     for name, own in (("lit", light), ("unknown", None)):
         build.write_bundle(cover_content(), tmp_path / name, build.BundleOptions(tau=0.5, light=own), {})
         assert read_manifest(tmp_path / name).light == own
     values = [json.loads((tmp_path / name / "davgswt.json").read_text()) for name in ("lit", "unknown")]
     assert values[0].pop("light") == vars(light) and values[0] == values[1]
-    for wrong in ({"elevation": 2.9}, {"elevation": 91.0}, {"azimuth": 360.0}, {"azimuth": -1.0}, {"source": "moon"}):
+    for wrong in (
+        {"elevation": 2.9},
+        {"elevation": 91.0},
+        {"azimuth": 360.0},
+        {"azimuth": -1.0},
+        {"source": "moon"},
+        {"north": 360.0},
+    ):
         with pytest.raises(InputError, match=f"light.{next(iter(wrong))}"):
             Manifest.from_dict(values[1] | {"light": vars(light) | wrong})

@@ -9,6 +9,7 @@ from dav_gswt.photos.captured_sun import find_sun
 
 GOLDEN = Georeference(39.742476, -105.1786, 1830.0, 0.0, metres_per_unit=1.0)  # of test_sun, at 19:30:30 UTC
 SUN = pytest.approx((39.87, 194.34), abs=0.02)
+UNSET_GPS = {"GPSDateStamp": "1980:01:06", "GPSTimeStamp": (0.0, 0.0, 0.0)}
 NO_GPS = {"GPSDateStamp": "2003:10:17", "GPSTimeStamp": (99.0, 0.0, 0.0)}
 
 
@@ -33,8 +34,9 @@ def shot(path, **tags):
         ({"DateTimeOriginal": "2003:10:17 12:30:30"}, "assumed", -7),
         ({"DateTimeOriginal": "2003:10:17 12:30:30", "OffsetTimeOriginal": "   :  "}, "assumed", -7),
         ({"DateTimeOriginal": "2003:10:17 12:30:30"} | NO_GPS, "assumed", -7),
+        ({"DateTimeOriginal": "2003:10:17 12:30:30"} | UNSET_GPS, "assumed", -7),
     ],
-    ids=["GPS", "with a zone", "without a zone", "a blank zone", "no hour of GPS"],
+    ids=["GPS", "with a zone", "without a zone", "a blank zone", "no hour of GPS", "GPS before its first fix"],
 )
 def test_the_time_is_by_gps_or_local_in_the_zone_that_exif_or_else_the_longitude_gives(tmp_path, tags, clock, zone):
     wrong = {"DateTimeOriginal": "2003:10:17 03:00:00"}  # a camera's clock counts after GPS
@@ -61,6 +63,9 @@ def test_of_photos_hours_apart_the_middle_one_counts(tmp_path, caplog):
         ({}, "no photo says when"),
         ({"DateTimeOriginal": "1980:01:01 12:00:00"}, "no photo says when"),
         ({"DateTimeOriginal": "0001:01:01 00:00:00"}, "no photo says when"),
+        ({"DateTimeOriginal": "9999:12:31 23:59:59"}, "no photo says when"),
+        ({"DateTimeOriginal": "9999:12:31 23:59:59", "OffsetTimeOriginal": "-05:00"}, "no photo says when"),
+        ({"GPSDateStamp": "9999:12:31", "GPSTimeStamp": (23.0, 59.0, 59.0)}, "no photo says when"),
         (NO_GPS, "no photo says when"),
         ({"DateTimeOriginal": "2003:10:17 23:00:00"}, "at 2003-10-18T06:00:00Z the sun stood -"),
     ],

@@ -64,13 +64,13 @@ def test_bounds_hold(surface):
 def test_surfaces_are_those_of_the_config(tmp_path):
     """Hills are measured in tile sides; EXR keeps floats as they are, beyond 1 and below 0 too."""
     hills = {"kind": "hills", "height": 2, "wavelength": 10}
-    assert heights.surface_from_config(hills, 0.3) == Hills(0.6, 3.0, 4, 0)
-    assert heights.surface_from_config({"kind": "flat"}, 0.3) == FlatSurface()
-    assert heights.surface_from_config({"kind": "sphere", "radius": 10.0}, 0.3).radius == 3
+    assert heights.surface_from_config(hills, 0.3, 1.0) == Hills(0.6, 3.0, 4, 0)
+    assert heights.surface_from_config({"kind": "flat"}, 0.3, 1.0) == FlatSurface()
+    assert heights.surface_from_config({"kind": "sphere", "radius": 10.0}, 0.3, 1.0).radius == 3
     values = np.array([[0.0, 1.0, 2.5], [-3.0, 0.25, 7.0]], np.float32)
     image_files.write_exr(tmp_path / "map.exr", {"Y": values})
     entry = {"kind": "image", "file": str(tmp_path / "map.exr"), "width": 6.0, "height": 10.0}
-    surface = heights.surface_from_config(entry, 2.8)
+    surface = heights.surface_from_config(entry, 2.8, 1.0)
     np.testing.assert_allclose(surface.pixels, 10 * values, rtol=1e-6)
     assert surface.width == 6.0
 
@@ -103,4 +103,4 @@ def test_a_bad_height_map_is_refused_by_name(tmp_path, monkeypatch, values, no_d
     monkeypatch.setattr(heights, "MAX_SIDE", 4)
     entry = {"kind": "image", "file": str(write_map(tmp_path, values, no_data)), "width": 6.0, "height": 1e6}
     with pytest.raises(InputError, match=rf"map\.tif: .*{said}"):
-        heights.surface_from_config(entry, 2.8)
+        heights.surface_from_config(entry, 2.8, 1.0)

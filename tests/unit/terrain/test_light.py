@@ -14,7 +14,7 @@ from dav_gswt.bundle.manifest import Sky
 from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.finite import Area, list_cells, place_block
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills, Sphere
-from dav_gswt.terrain.light import ASSUMED, CELL, SIZE, Light, apply_light, light_of, place_light, relight
+from dav_gswt.terrain.light import CELL, SIZE, Light, apply_light, light_of, place_light, relight
 from dav_gswt.terrain.sun import Sun, find_hour, measure_light, sun_at
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "light.json").read_text())
@@ -24,11 +24,11 @@ NOON = Sun(60.0, 180.0)
 def test_numbers_are_those_shared_with_the_page():
     for case in GOLDEN["lights"]:
         captured, sky = Sun(*case["captured"]), Sky(case["zenith"], case["horizon"])
-        sun = sun_at(captured, case["hour"])
+        sun = sun_at(captured, case["hour"], case["north"])
         light = Light(captured, sun)
         changed = light.change_sky(sky)
         for name, value in {
-            "captured_hour": find_hour(captured),
+            "captured_hour": find_hour(captured, case["north"]),
             "sun": [sun.elevation, sun.azimuth],
             "direct": light.terms[0],
             "ambient": light.terms[1],
@@ -46,6 +46,13 @@ def test_numbers_are_those_shared_with_the_page():
     x, y = np.array(shade["points"]).T
     np.testing.assert_allclose(placed.visible(x, y), shade["visible"], rtol=0, atol=1e-6)
     assert 0.2 < np.mean(shade["visible"]) < 0.8
+
+
+@pytest.mark.parametrize("hour, known", [(7.0, False), (float("nan"), True), (float("inf"), True)])
+def test_an_hour_needs_a_sun_and_must_be_finite(covered, hour, known):
+    manifest = replace(covered[0], light=LightEntry(30.0, 100.0, "exif") if known else None)
+    with pytest.raises(ValueError, match="hour: "):
+        light_of(manifest, hour)
 
 
 def test_open_level_ground_keeps_its_colours_below_the_captured_sun():
@@ -141,7 +148,12 @@ def test_a_page_takes_its_sun_from_the_config_or_the_photos(covered):
     info, terrain = covered
     by_photos = replace(info, light=LightEntry(30.0, 100.0, "exif"))
     surface = terrain.heights
-    assert apply_light(info, "auto", 1.0, surface).light == ASSUMED
+    assert apply_light(info, "auto", 1.0, surface).light == LightEntry(45.0, 225.0, "assumed")
+    turned = replace(info, light=LightEntry(30.0, 100.0, "exif", 33.0))
+    south = apply_light(turned, {"elevation": 45.0, "azimuth": 180.0}, 0.0, surface)
+    assert south.light == LightEntry(45.0, 147.0, "config", 33.0)
+    assert find_hour(Sun(45.0, 147.0), 33.0) == pytest.approx(12)
+    np.testing.assert_allclose(light_of(south, 12.0).sun.direction, Sun(45.0, 147.0).direction, atol=1e-12)
     assert apply_light(by_photos, "auto", 1.0, surface).light == by_photos.light
     assert apply_light(by_photos, {"elevation": 12.0, "azimuth": 3.0}, 0.0, surface).light == LightEntry(
         12.0, 3.0, "config"

@@ -170,15 +170,15 @@ function decodeRecords(records, count, encoding) {
 export function describeSun({ light }) {
   if (!light?.now) return null;
   const { hour, elevation, azimuth, direction } = light.now.sun;
-  return { hour, elevation, azimuth, direction: /** @type {[number, number, number]} */ ([...direction]) };
+  return { hour, elevation, azimuth: (azimuth + light.north) % 360, direction: /** @type {[number, number, number]} */ ([...direction]) };
 }
 
 /** @param {Pick<OpenTerrain, "light">} terrain @param {number | null | "off"} hour */
 export function chooseSun({ light }, hour) {
   const isSun = hour === null || hour === "off" || Number.isFinite(hour);
   if (!isSun) throw new TypeError(`hour: ${hour} is not a finite number, null or "off"`);
-  if (!light) throw new TypeError("hour: this terrain has no sun");
-  light.choose(hour);
+  if (!light && typeof hour === "number") throw new TypeError("hour: this terrain has no sun");
+  light?.choose(hour);
 }
 
 /**

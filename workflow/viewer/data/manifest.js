@@ -66,7 +66,7 @@ const KEYS = new Set(`format version unit tile_side salt eye_floor ground_colour
   wavelength octaves radius cells rows columns width materials name share first_tile classes
   rule weight wavelengths biases material low high soft jitter amplitude rise slope most ground
   clearance painted objects density probability scatter turn size variation colours gains
-  light elevation azimuth source wind`.split(/\s+/));
+  light elevation azimuth source north wind`.split(/\s+/));
 
 /**
  * What each part of a manifest must be, given the whole; the parts before it are sound.
@@ -107,7 +107,8 @@ const PARTS = {
   heights: (heights, m) => heights === undefined || (isSurface(heights, m.tile_side)
     && !(heights.kind === "sphere" && (m.classes || m.objects))),
   light: (light) => light === undefined || (isCoordinate(light?.elevation) && light.elevation >= LOWEST
-    && light.elevation <= 90 && isSize(light.azimuth) && light.azimuth < 360 && SUNS.has(light.source)),
+    && light.elevation <= 90 && isSize(light.azimuth) && light.azimuth < 360 && SUNS.has(light.source)
+    && (light.north === undefined || (isSize(light.north) && light.north < 360))),
   wind: (wind) => wind === undefined || (isSize(wind) && wind <= STRONGEST),
 };
 

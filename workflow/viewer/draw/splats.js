@@ -49,7 +49,7 @@ export function createSplats(gl, manifest, heights) {
     return program;
   }));
   const isLit = manifest.light !== undefined && heights.kind !== "sphere";
-  programs[Number(isLit)](); // the others when they are used
+  programs[Number(isLit)](); // other programs are compiled at their first use
   const tallest = Math.max(recordRows(manifest), orderPages(manifest) / PAGES_A_ROW);
   if (tallest > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new PageError(FULL);
   const records = createTexture(gl, gl.RGBA32UI, ROW, recordRows(manifest));

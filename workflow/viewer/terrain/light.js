@@ -7,11 +7,12 @@ import { findHour, luminance, measureLight, placeSun, sunAt } from "./sun.js";
 
 /**
  * A manifest's `light`: the captured sun, and where it is known from.
- * @typedef {{ elevation: number, azimuth: number, source: string }} LightEntry
+ * @typedef {{ elevation: number, azimuth: number, source: string, north?: number }} LightEntry
  * @typedef {import("./sun.js").Sun & { hour: number }} DaySun
  *
- * direct: light of ground that faces the sun; ambient: of the whole sky; both over that of level ground as captured;
- * level: what sRGB colours of open, level ground are multiplied by; the others are sRGB; shadows: null: none yet.
+ * direct: sunlight on ground that faces the sun; ambient: skylight on level ground; both relative to the captured light
+ * of level ground. level: factor of the sRGB colours of open, level ground. Other colours are sRGB. shadows: null: not
+ * made yet.
  * @typedef {{ sun: DaySun, direct: number[], ambient: number[], level: number[], zenith: number[], horizon: number[],
  *   ground: number[], sunColour: number[], shadows: import("./shadows.js").Shadows | null }} Lighting
  * @typedef {NonNullable<ReturnType<typeof createLight>>} Light
@@ -62,7 +63,8 @@ export function lightBelow({ sky, ground_colour: ground }, captured, sun) {
  */
 export function createLight(manifest, heights) {
   if (!manifest.light || heights.kind === "sphere") return null;
-  const captured = placeSun(manifest.light.elevation, manifest.light.azimuth), capturedHour = findHour(captured);
+  const { elevation, azimuth, north = 0 } = manifest.light, captured = placeSun(elevation, azimuth);
+  const capturedHour = findHour(captured, north);
   const shadows = heights.kind === "flat" ? null : createShadows(heights, manifest.tile_side);
   /** @type {ChosenSun} */
   let chosen = null;
@@ -71,7 +73,7 @@ export function createLight(manifest, heights) {
 
   /** @param {ChosenSun} sun */
   function choose(sun) {
-    const placed = typeof sun === "number" ? sunAt(captured, sun) : { ...captured, hour: capturedHour };
+    const placed = typeof sun === "number" ? sunAt(captured, sun, north) : { ...captured, hour: capturedHour };
     chosen = typeof sun === "number" ? placed.hour : sun;
     below = sun === "off" ? null : lightBelow(manifest, captured, placed);
   }
@@ -80,6 +82,7 @@ export function createLight(manifest, heights) {
   const light = {
     choose,
     capturedHour,
+    north,
     get chosen() {
       return chosen;
     },

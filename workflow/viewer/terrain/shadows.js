@@ -5,7 +5,7 @@
  * @typedef {import("./sun.js").Sun} Sun
  * @typedef {import("./heights.js").HeightField} HeightField
  *
- * margins: tangent of the sun's elevation less that of the horizon towards it, rows from the south; first: world
+ * margins: tangent of the sun's elevation minus the tangent of the horizon's, rows from the south; first: world
  * position of the south-western point; soft: the margin at which the sun is whole.
  * @typedef {{ margins: Float32Array, first: [number, number], cell: number, soft: number }} Shadows
  */

@@ -1,6 +1,6 @@
-// The sun and the clear sky: their light in three bands, and the sun's path over a day. Angles in degrees: elevation
-// above the horizon, azimuth clockwise from north. The same numbers as dav_gswt/terrain/sun.py; tests/golden/light.json
-// holds both to it.
+// The sun and the clear sky: their light in three bands, and the sun's path over a day. Angles are in degrees: elevation
+// above the horizon, azimuth clockwise from the terrain's +y; `north` is the azimuth of +y, clockwise from true north.
+// The same numbers as dav_gswt/terrain/sun.py; tests/golden/light.json holds both to it.
 
 const RAYLEIGH = [0.0496, 0.0987, 0.2267]; // optical depths of air at 0.65, 0.55 and 0.45 micrometres
 const AEROSOL = [0.0805, 0.1, 0.1298]; // of clear, dry haze
@@ -39,26 +39,25 @@ export function measureLight(elevation) {
 /** @param {number[]} colour in linear light */
 export const luminance = (colour) => colour.reduce((sum, v, k) => sum + LUMINANCE[k] * v, 0);
 
-/** Solar time of the captured sun on the path of `sunAt`. @param {Sun} captured */
-export function findHour({ direction: [x, y, z] }) {
+/** Solar time of the captured sun on the path of `sunAt`. @param {Sun} captured @param {number} north */
+export function findHour({ elevation, azimuth }, north) {
+  const [x, y, z] = placeSun(elevation, azimuth + north).direction;
   return SUNRISE + (Math.atan2(Math.hypot(y, z), x) / Math.PI) * (SUNSET - SUNRISE);
 }
 
 /**
- * The sun at a solar time, on the path through the captured sun that begins due east and ends due west: that of an
- * equinox. Hours at which it would be lower than LOWEST give the nearest one at which it is not.
+ * The sun at a solar time, on the path of an equinox: through the captured sun, from due east to due west. Hours at which it would be lower than LOWEST give the nearest one at which it is not.
  *
- * @param {Sun} captured @param {number} hour
+ * @param {Sun} captured @param {number} hour @param {number} north
  * @returns {Sun & { hour: number }}
  */
-export function sunAt({ direction: [, y, z] }, hour) {
+export function sunAt(captured, hour, north) {
+  const [, y, z] = placeSun(captured.elevation, captured.azimuth + north).direction;
   const far = Math.hypot(y, z), first = Math.asin(Math.min(Math.sin(LOWEST * DEGREE) / (z / far), 1));
   const asked = ((hour - SUNRISE) / (SUNSET - SUNRISE)) * Math.PI;
   const angle = Math.min(Math.max(asked, first), Math.PI - first);
-  const east = Math.cos(angle), north = (Math.sin(angle) * y) / far, up = (Math.sin(angle) * z) / far;
-  return {
-    hour: SUNRISE + (angle / Math.PI) * (SUNSET - SUNRISE), direction: [east, north, up],
-    elevation: Math.atan2(up, Math.hypot(east, north)) / DEGREE,
-    azimuth: (Math.atan2(east, north) / DEGREE + 360) % 360,
-  };
+  const east = Math.cos(angle), ahead = (Math.sin(angle) * y) / far, up = (Math.sin(angle) * z) / far;
+  const azimuth = (Math.atan2(east, ahead) / DEGREE - north + 720) % 360;
+  const hourOf = SUNRISE + (angle / Math.PI) * (SUNSET - SUNRISE);
+  return { hour: hourOf, ...placeSun(Math.atan2(up, Math.hypot(east, ahead)) / DEGREE, azimuth) };
 }

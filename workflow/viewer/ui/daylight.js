@@ -30,7 +30,6 @@ export function listenToDaylight(viewer) {
     viewer.hud.say(now === "off" ? "The light is on." : "The light is off: colours are as photographed.");
   };
   slider.addEventListener("input", () => viewer.showSun(slider.valueAsNumber));
-  slider.addEventListener("dblclick", () => viewer.showSun(null));
   element("capturedSun", HTMLButtonElement).addEventListener("click", () => viewer.showSun(null));
   element("lightButton", HTMLButtonElement).addEventListener("click", toggle);
   listenToKeys({ KeyK: toggle });

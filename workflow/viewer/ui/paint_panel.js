@@ -168,23 +168,22 @@ function addDensity(box, name, painting, object) {
   const row = document.createElement("div"), label = document.createElement("label"), step = 1 / DENSITY_STEPS;
   const on = document.createElement("input"), title = document.createElement("span");
   const input = document.createElement("input"), output = document.createElement("output");
-  let last = 1; // density before the object was switched off
+  let last = 1; // the last density at which it was shown
   Object.assign(on, { type: "checkbox", title: "Show this object" });
-  Object.assign(input, { type: "range", min: 0, max: MAX_DENSITY, step, ariaLabel: `Density of ${name}` });
+  Object.assign(input, { type: "range", min: 0, max: MAX_DENSITY, step });
+  input.setAttribute("aria-label", `Density of ${name}`);
   [title.textContent, title.className, row.className] = [name, "name", "density"];
   label.append(on, document.createElement("canvas"), title);
   row.append(label, input, output);
   box.append(row);
-  on.addEventListener("change", () => {
-    if (!on.checked) last = painting.densities[object];
-    painting.setDensity(object, on.checked ? last : 0, true);
-  });
+  on.addEventListener("change", () => painting.setDensity(object, on.checked ? last : 0, true));
   for (const kind of ["input", "change"]) { // the second when it is let go
     input.addEventListener(kind, () => painting.setDensity(object, Number(input.value), kind === "change"));
   }
   return () => {
     const value = painting.densities[object];
     on.checked = value > 0;
+    if (value > 0) last = value;
     output.textContent = `${value.toFixed(2)}×`;
     if (document.activeElement !== input || Math.abs(Number(input.value) - value) > step) input.value = String(value);
   };

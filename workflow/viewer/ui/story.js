@@ -60,9 +60,9 @@ function describe(story) {
 /** Which sun the colours contain, and what stays. @param {import("../terrain/light.js").LightEntry} [light] */
 function describeLight(light) {
   if (!light) return [];
-  const { elevation, azimuth, source } = light, text = document.createElement("p");
+  const { elevation, azimuth, source, north = 0 } = light, text = document.createElement("p");
   text.textContent = `The photos show light of a sun ${Math.round(elevation)}° high in the `
-    + `${COMPASS[Math.round(azimuth / 45) % COMPASS.length]}, ${SOURCES[source]}. `
+    + `${COMPASS[Math.round((azimuth + north) / 45) % COMPASS.length]}, ${SOURCES[source]}. `
     + "The time of day changes sky, hills and their shadows; ripples, stones and the shade on objects stay.";
   return [text];
 }

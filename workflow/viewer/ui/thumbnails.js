@@ -21,7 +21,7 @@ export async function drawThumbnails(terrain, canvases) {
   const { tiles, objects = [] } = terrain.manifest;
   const { gaussians } = createChunkReader(terrain, Promise.resolve(true), () => {});
   for (const [k, canvas] of canvases.entries()) {
-    const chunks = objects[k].chunks.toSorted((a, b) => a.level - b.level);
+    const chunks = [...objects[k].chunks].sort((a, b) => a.level - b.level);
     const { level } = chunks.find(({ count }) => count <= MOST) ?? chunks[chunks.length - 1];
     const pixels = drawGaussians(await gaussians(tiles.length + k, level));
     Object.assign(canvas, { width: SIZE, height: SIZE });
@@ -70,6 +70,6 @@ export function drawGaussians({ count, centres, deviations, turns, colours }) {
       }
     }
   }
-  // colours above are multiplied with their opacity, those of a canvas are not
+  // the colours above are premultiplied, a canvas needs straight alpha
   return Uint8ClampedArray.from(picture, (v, n) => 255 * (n % 4 === 3 ? v : v / (picture[n | 3] || 1)));
 }

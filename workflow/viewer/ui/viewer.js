@@ -52,7 +52,7 @@ export class Viewer {
   overlay = 0;
   dirty = true; // the picture must be drawn again
   stale = true; // the worker must be asked again
-  shaded = true; // shadows are those of the place
+  shaded = true; // the shadows fit the place
   pacing = createFramePacing();
   stats = createFrameStats();
   tour = createTour();

@@ -154,9 +154,14 @@ class WaveEntry(Entry):
 class LightEntry(Entry):
     """The captured sun, whose light the colours contain: degrees above the horizon and clockwise from the tiles' +y.
 
-    source: the config, the photos' EXIF, the shading of the relief, or nothing (a guess).
+    source: the config, the photos' EXIF, the shading of the relief, or nothing (a guess). north: azimuth of +y itself,
+    clockwise from true north; 0 if north is not known.
     """
 
     elevation: Annotated[float, Field(ge=3, le=90)]
     azimuth: Annotated[float, Field(ge=0, lt=360)]
     source: Literal["config", "exif", "relief", "assumed"]
+    north: Annotated[float, Field(ge=0, lt=360)] = 0.0
+
+
+ASSUMED_SUN = 45.0, 225.0  # elevation, and azimuth from north, of a sun that nothing reveals: in the south-west

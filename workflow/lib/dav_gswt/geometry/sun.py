@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
+LOWEST = 3.0  # elevation in degrees. A lower sun casts no clear shadows, or the clock is wrong
 APART = 2.0  # hours between photos, from which their light differs
 Clock = Literal["gps", "offset", "assumed"]  # the surest first
 

@@ -53,7 +53,6 @@ class SunRecord:
 
     elevation: float
     azimuth: float
-    explained: float
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ def write_materials(found: FoundMaterials, folder: Path | str, provenance: dict[
             [ObjectRecord(each.name, each.material, each.radius, each.height, each.density) for each in found.objects],
             list(found.left_out),
             provenance,
-            sun and SunRecord(round(sun.elevation, 2), round(sun.azimuth, 2) % 360, round(sun.explained, 3)),
+            sun and SunRecord(round(sun.elevation, 2), round(sun.azimuth, 2) % 360),
         )
         write_json(part / NAME, asdict(report))
 

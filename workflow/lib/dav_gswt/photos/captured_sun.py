@@ -7,18 +7,17 @@ from pathlib import Path
 from typing import get_args
 
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.geometry.sun import CapturedSun, Clock, locate_sun
+from dav_gswt.geometry.sun import LOWEST, CapturedSun, Clock, locate_sun
 from dav_gswt.photos.photo_files import read_utc_time
 
 _log = logging.getLogger(__name__)
 
-LOWEST = 3.0  # degrees above the horizon: a lower sun is that of a wrong clock or of no shadows
-
 
 def find_sun(paths: Iterable[Path], place: Georeference) -> CapturedSun | None:
-    """The sun at the middle one of the photos' times; None, with the reason in the log, where it is not known.
+    """Find the sun at the median time of the photos. If it is not known, return None and log the reason.
 
-    Of times that are known in several ways, those of the way of most photos count, and of as many the surest.
+    If the photos know their times in different ways (`Clock`), only the most frequent way is used, and among equally
+    frequent ones the most reliable.
     """
     times = [time for path in paths if (time := read_utc_time(path, place.longitude))]
     if not times:

@@ -25,7 +25,7 @@ FILM_DIAGONAL = 43.2666  # mm, of a 36 x 24 mm frame: "35 mm equivalent" compare
 WIDEST = 1.55  # photos wider than a 3:2 sensor are cropped from a 4:3 sensor, whose diagonal the equivalent refers to
 UNITS = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # FocalPlaneResolutionUnit in millimetres
 EXIF_TIME = "%Y:%m:%d %H:%M:%S"
-FIRST_YEAR = 1990  # of photos whose time is believed: cameras without a clock say 1970 or 1980
+YEARS = range(1990, 2101)  # in which photos are taken: cameras whose clock was never set report 1970 or 1980
 UNSAFE = re.compile(
     r"[\s#{}<>]+"
 )  # COLMAP's lists end a name at a blank and skip lines with #; Snakemake has {} and <>
@@ -111,24 +111,24 @@ class PhotoTime:
 
 
 def read_utc_time(path: Path | str, longitude: float) -> PhotoTime | None:
-    """When the photo was taken; None where EXIF does not say, or a year before FIRST_YEAR.
+    """When the photo was taken; None if EXIF does not say.
 
-    GPS has UTC. Else EXIF has local time; where it names no zone, that of the longitude is assumed. Daylight saving is
-    not known.
+    GPS time is UTC. Otherwise EXIF has local time. If it names no zone, the zone follows from the longitude, without
+    daylight saving. Years outside YEARS are clocks that were never set, or damaged.
     """
     tags = _read_tags(path)
     date, clock = _read_time(tags, "GPS GPSDate", "%Y:%m:%d"), _read_numbers(tags, "GPS GPSTimeStamp")
     local, zone = _read_time(tags, "EXIF DateTimeOriginal", EXIF_TIME), 0.0
-    if date and len(clock) == 3 and 0 <= (seconds := np.dot(clock, [3600, 60, 1])) < 86400:
+    if date and date.year in YEARS and len(clock) == 3 and 0 <= (seconds := np.dot(clock, [3600, 60, 1])) < 86400:
         utc, known = date + timedelta(seconds=float(seconds)), "gps"
-    elif local is None or local.year < FIRST_YEAR:
+    elif local is None or local.year not in YEARS:
         return None
     else:
         offset = _read_time(tags, "EXIF OffsetTimeOriginal", "%z")
         east = offset.utcoffset() if offset else None
         zone = float(round(longitude / 15)) if east is None else east / timedelta(hours=1)
         utc, known = local - timedelta(hours=zone), "assumed" if east is None else "offset"
-    return PhotoTime(utc.replace(tzinfo=UTC), known, zone) if utc.year >= FIRST_YEAR else None
+    return PhotoTime(utc.replace(tzinfo=UTC), known, zone)
 
 
 def _read_time(tags: dict, name: str, form: str) -> datetime | None:

@@ -71,7 +71,7 @@ class FarGround:
     def paint(
         self, directions: Float[Array, "*shape 3"], behind: Float32[Array, "*shape 3"]
     ) -> Float32[Array, "*shape 3"]:
-        """Colours of the rings in directions of any length; those of `behind` where there is no ring.
+        """Colours of the rings in directions of any length. Rays that meet no ring keep the colours `behind`.
 
         Between four points of two rings the tangent is interpolated by azimuth; a ray meets the nearest such piece
         whose tangents lie on both sides of its own.

@@ -67,7 +67,7 @@ class HeightField:
         return self.at(x, y)
 
     @classmethod
-    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float = 0.0) -> "HeightField":
+    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float) -> "HeightField":
         """The surface of the config's `heights`; see `surface_from_config`. Raises: InputError: it cannot be made."""
         return cls()
 
@@ -81,7 +81,7 @@ class HeightField:
         return parse_record(dict(entry), cls)
 
 
-def surface_from_config(entry: Mapping[str, Any], side: float, eye: float = 0.0) -> HeightField:
+def surface_from_config(entry: Mapping[str, Any], side: float, eye: float) -> HeightField:
     """The surface that the config's `heights` describes.
 
     Args:   side: of a tile, the unit of hills and of the sphere. eye: lowest height of the eye, for hills of no size.
@@ -149,7 +149,7 @@ class Hills(HeightField, kind="hills"):
         return [self.height * share / sum(shares) for share in shares]
 
     @classmethod
-    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float = 0.0) -> "Hills":
+    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float) -> "Hills":
         wavelength = entry["wavelength"]
         if wavelength == "auto":
             wavelength = min(max(WAVELENGTH[0] * eye / side, WAVELENGTH[1]), WAVELENGTH[2])
@@ -191,7 +191,7 @@ class HeightMap(HeightField, kind="image"):
         return height, slope * per_unit
 
     @classmethod
-    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float = 0.0) -> "HeightMap":
+    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float) -> "HeightMap":
         with np.errstate(over="ignore"):  # what becomes infinite is refused
             pixels = read_height_map(path := locate_path(entry["file"])) * np.float32(entry["height"])
         fault, bad = f"times heights.height is beyond {FARTHEST:g} units", ~(np.abs(pixels) <= FARTHEST)
@@ -242,7 +242,7 @@ class Sphere(HeightField, kind="sphere"):
         return np.tan((np.stack([a, b], -1) / self.cells - 0.5) * QUARTER)
 
     @classmethod
-    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float = 0.0) -> "Sphere":
+    def from_config(cls, entry: Mapping[str, Any], side: float, eye: float) -> "Sphere":
         return make_sphere(entry["radius"], side)
 
     def describe(self) -> tuple[dict[str, Any], bytes]:

@@ -15,19 +15,18 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 from scipy.ndimage import map_coordinates
 
-from dav_gswt.bundle.land_cover import LightEntry
+from dav_gswt.bundle.land_cover import ASSUMED_SUN, LightEntry
 from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.terrain.choice import Floats, Vector
 from dav_gswt.terrain.heights import FlatSurface, HeightField, Sphere
 from dav_gswt.terrain.sun import LUMINANCE, Sun, level_light, measure_light, sun_at
 
-ASSUMED = LightEntry(45.0, 225.0, "assumed")  # the captured sun where nothing is known: high in the south-west
 GAMMA = 2.2  # exponent that stands for the curve of sRGB
 MOST = 4.0  # times the captured light, of any ground
 SIZE, CELL = 256, 0.375  # points along a side of the horizon's grid, and their distance in tile sides
 SNAP = 32  # points by which the grid moves with the eye
-STEPS, FARTHEST = 40, 64.0  # samples towards the sun, and the distance of the last in cells; that of the first is 1
+STEPS, FARTHEST = 40, 64.0  # samples towards the sun, from 1 to this many cells away
 BORDER = 16  # points along the edge of the grid over which shadows end
 MOST_MARGIN = 2.0
 SOFT = 0.02  # half the width of a shadow's edge, as a change of the sun's elevation in radians
@@ -40,28 +39,34 @@ HAZE = 0.1  # share of the sun's beam in the light of the horizon
 def apply_light(manifest: Manifest, sun: Any, wind: float, surface: HeightField) -> Manifest:
     """The manifest of a page: the bundle's with the captured sun and the wind of the config.
 
-    sun: the config's `sun`. A planet has neither: its colours stay as captured.
+    sun: the config's `sun`, whose azimuth is from north. A planet has neither: its colours stay as captured.
     """
     if isinstance(surface, Sphere):
         return replace(manifest, light=None, wind=None)
-    if sun == "auto":
-        light = manifest.light or ASSUMED
-    else:
-        light = None if sun == "none" else LightEntry(sun["elevation"], sun["azimuth"], "config")
+    light = manifest.light or LightEntry(*ASSUMED_SUN, "assumed")
+    if sun == "none":
+        light = None
+    elif sun != "auto":
+        light = LightEntry(sun["elevation"], (sun["azimuth"] - light.north) % 360, "config", light.north)
     return replace(manifest, light=light, wind=wind or None)
 
 
 def light_of(manifest: Manifest, hour: float | None = None) -> "Light | None":
-    """The light of a page at a solar time; None: as captured. None is returned where the page has no sun."""
+    """The light of a page at a solar time, by default of the captured sun; None if the page has no sun.
+
+    Raises: ValueError: an hour that is not finite, or without a sun.
+    """
+    if hour is not None and not (np.isfinite(hour) and manifest.light):
+        raise ValueError(f"hour: {hour} is not a finite number" if manifest.light else "hour: this terrain has no sun")
     if manifest.light is None:
         return None
     captured = Sun(manifest.light.elevation, manifest.light.azimuth)
-    return Light(captured, captured if hour is None else sun_at(captured, hour))
+    return Light(captured, captured if hour is None else sun_at(captured, hour, manifest.light.north))
 
 
 @dataclass(frozen=True)
 class Light:
-    """The light below a sun on ground whose colours contain that of the captured one."""
+    """The light of a sun, for ground whose colours contain the light of the captured sun."""
 
     captured: Sun
     sun: Sun
@@ -74,13 +79,13 @@ class Light:
 
     @cached_property
     def terms(self) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
-        """Light of the sun on ground that faces it, and of the whole sky, over that of level ground as captured."""
+        """Sunlight on ground that faces the sun, and skylight on level ground, over the captured light of level ground."""
         direct, sky = measure_light(self.sun.elevation)
         scale = self.exposure / level_light(self.captured.elevation)
         return direct * scale, sky * scale
 
     def ratio(self, slope: Float[Array, "*n 2"], visible: Float[Array, "*n"] | float = 1.0) -> Float[Array, "*n 3"]:
-        """Light of ground, over that of level ground as captured. visible: share of the sun's disc."""
+        """Light of ground relative to the captured light of level ground. visible: share of the sun's disc."""
         direct, ambient = self.terms
         east, north, up = self.sun.direction
         n = 1 / np.sqrt(1 + (slope**2).sum(-1))
@@ -93,7 +98,7 @@ class Light:
         return self.ratio(np.zeros(2))
 
     def change_sky(self, sky: Sky) -> Sky:
-        """The sky below the sun; the exposure makes it no brighter than it was captured."""
+        """The sky with this sun. The exposure does not make it brighter than it was captured."""
         beams, skies = zip(*(measure_light(each.elevation) for each in (self.captured, self.sun)), strict=True)
         above = self.exposure * skies[1] / skies[0]
         level = self.exposure * (skies[1] + HAZE * beams[1]) / (skies[0] + HAZE * beams[0])
@@ -181,7 +186,7 @@ def sun_tangent(sun: Sun) -> float:
 
 
 def measure_margin(heights: Float[Array, "n n"], cell: float, sun: Sun) -> Float[Array, "n n"]:
-    """Tangent of the sun's elevation less that of the horizon towards it, at each point of a grid of heights.
+    """Tangent of the sun's elevation minus the tangent of the horizon's, at each point of a grid of heights.
 
     heights: rows from the south. Along the edge of the grid the horizon is lowered, so that shadows end softly there.
     """

@@ -106,7 +106,7 @@ def render_view(
     if camera.orthographic:
         raise ValueError("the terrain is drawn for a pinhole camera")
     eye, here, surface = camera.centre, replace(camera, translation=np.zeros(3)), terrain.heights
-    if light:
+    if light and not isinstance(surface, Sphere):
         terrain = replace(terrain, light=place_light(light, surface, terrain.side, eye))
     sphere = surface if isinstance(surface, Sphere) else None
     cells = visible_on_sphere(terrain, sphere, camera) if sphere else visibility.visible_cells(terrain, camera)

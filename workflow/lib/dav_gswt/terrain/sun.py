@@ -1,7 +1,8 @@
 """The sun and the clear sky: their light in three bands, and the sun's path over a day.
 
-The viewer's `terrain/sun.js` computes the same; tests/golden/light.json holds both to it. Units: x east, y north, z up;
-elevation in degrees above the horizon, azimuth in degrees clockwise from north.
+The viewer's `terrain/sun.js` computes the same; tests/golden/light.json holds both to it. Elevations are in degrees
+above the horizon, azimuths in degrees clockwise from the terrain's +y. `north` is the azimuth of +y itself, clockwise
+from true north.
 """
 
 from dataclasses import dataclass
@@ -10,11 +11,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.geometry.sun import LOWEST  # below, the light no longer changes, and the day leaves such hours out
+
 RAYLEIGH = np.array([0.0496, 0.0987, 0.2267])  # optical depths of air at 0.65, 0.55 and 0.45 micrometres
 AEROSOL = np.array([0.0805, 0.1, 0.1298])  # optical depths of clear, dry haze
 FORWARD = 0.756  # share of the light scattered by haze that reaches the ground
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-LOWEST = 3.0  # elevation below which the light no longer changes, and which the day leaves out
 SUNRISE, SUNSET = 6.0, 18.0  # hours
 
 
@@ -50,23 +52,23 @@ def level_light(elevation: float) -> Float[Array, "3"]:
     return direct * np.sin(np.radians(max(elevation, LOWEST))) + sky
 
 
-def find_hour(captured: Sun) -> float:
+def find_hour(captured: Sun, north: float = 0.0) -> float:
     """Solar time of the captured sun on the path of `sun_at`."""
-    x, y, z = captured.direction
+    x, y, z = Sun(captured.elevation, captured.azimuth + north).direction
     return float(SUNRISE + np.arctan2(np.hypot(y, z), x) / np.pi * (SUNSET - SUNRISE))
 
 
-def sun_at(captured: Sun, hour: float) -> Sun:
+def sun_at(captured: Sun, hour: float, north: float = 0.0) -> Sun:
     """The sun at a solar time, on the path through the captured sun that begins due east and ends due west.
 
     It is the path of an equinox at the latitude where the captured sun lies on it. Hours at which the sun would be
     lower than LOWEST give the nearest one at which it is not.
     """
-    _, y, z = captured.direction
+    _, y, z = Sun(captured.elevation, captured.azimuth + north).direction
     noon = np.array([0.0, y, z]) / np.hypot(y, z)
     rise = min(np.sin(np.radians(LOWEST)) / noon[2], 1.0)
     first = np.arcsin(rise)
     angle = np.clip((hour - SUNRISE) / (SUNSET - SUNRISE) * np.pi, first, np.pi - first)
-    east, north, up = np.cos(angle) * np.array([1.0, 0.0, 0.0]) + np.sin(angle) * noon
-    azimuth = np.degrees(np.arctan2(east, north)) % 360.0
-    return Sun(float(np.degrees(np.arctan2(up, np.hypot(east, north)))), float(azimuth))
+    x, y, z = np.cos(angle) * np.array([1.0, 0.0, 0.0]) + np.sin(angle) * noon
+    azimuth = (np.degrees(np.arctan2(x, y)) - north) % 360.0
+    return Sun(float(np.degrees(np.arctan2(z, np.hypot(x, y)))), float(azimuth))
