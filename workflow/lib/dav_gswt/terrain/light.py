@@ -79,7 +79,7 @@ class Light:
 
     @cached_property
     def terms(self) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
-        """Sunlight on ground that faces the sun, and skylight on level ground, over the captured light of level ground."""
+        """Sunlight on ground that faces the sun, and skylight on level ground, over captured light of level ground."""
         direct, sky = measure_light(self.sun.elevation)
         scale = self.exposure / level_light(self.captured.elevation)
         return direct * scale, sky * scale
