@@ -1,7 +1,6 @@
 # Targets of the study, which the project's Makefile includes.
-OPENSPLAT ?= opensplat
 STUDY := PYTHONPATH=study:tests:workflow $(BIN)/python
-.PHONY: test-study lint-study bench-study compare claims prior
+.PHONY: test-study lint-study docs-study claims prior
 
 # about 15 minutes: the tests of the study
 test-study: .venv/installed-test
@@ -15,18 +14,16 @@ lint-study: lint-viewer # which installs biome and TypeScript
 	@cd tests/browser && node_modules/.bin/biome lint --error-on-warnings --config-path=../../study/checks ../../study/forced_choice
 	@tests/browser/node_modules/.bin/tsc --project study/checks/tsconfig.json
 
-# OpenSplat's fit beside ours, of the same photos; OPENSPLAT: the program, which you build yourself
-compare: .venv/installed
-	@$(BIN)/snakemake -s study/Snakefile --cores $(CORES) --config 'study={compare: {opensplat: "$(OPENSPLAT)"}}' -- compare
+docs: docs-study
 
-# study/docs/results/claims.md, from the tables of study/docs/data, and study/docs/config.md, from the config models
+# study/docs/config.md: the keys of study/config.yaml, from the config models
+docs-study: .venv/installed
+	@$(STUDY) -m dav_gswt_study.config_reference
+
+# study/docs/results/claims.md, from the tables of study/docs/data
 claims: .venv/installed
 	@$(STUDY) -m dav_gswt_study.claims
-	@$(STUDY) -m dav_gswt_study.config_reference
 
 # hours: the weights that come with the project were made so
 prior: .venv/installed
 	@$(BIN)/snakemake -s study/Snakefile --cores $(CORES) -- study/results/prior/terrain.safetensors
-
-bench-study: .venv/installed-test
-	@for bench in study/benchmarks/*.py; do PYTHONPATH=study:benchmarks:tests:tests/browser $(BIN)/python $$bench || exit 1; done

@@ -2,14 +2,13 @@
 
 `PYTHONPATH=study:benchmarks python study/benchmarks/gpu.py PHOTOS` with the folder results/copr_dunes/photos, made
 before on any machine (`snakemake --cores 2 results/copr_dunes/photos/ground.json`); --only PART ... for some parts,
---dry-run to see what would be done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json and gpu.md have
+--dry-run to see what would be done. Needs the extra `cuda`; without a GPU it says so. results/gpu.json has
 what was found so far, in earlier calls, too.
 """
 
 import argparse
 import json
 import os
-import re
 import statistics
 import subprocess
 import sys
@@ -31,7 +30,6 @@ from dav_gswt.reconstruction.fitting.plan import FitPlan, FitSettings, Schedule
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 
 ROOT = Path(__file__).resolve().parents[2]
-TESTS = "tests/unit/raster", "tests/unit/test_arrays.py", "tests/unit/reconstruction/fitting/test_device_descent.py"
 DUNES = FitSettings(fit_size=768, spacing=1.5, max_gaussians=500_000, steps=300, steps_per_photo=20)
 HUNDRED = replace(DUNES, fit_size=1024)
 DECIBELS = 34, 35
@@ -48,23 +46,11 @@ class Part:
 
 
 PARTS = {
-    "tests": Part("tests of the backend", 150, {"failed": 0}),
     "step": Part("a step of a fit against its kernels", 60, {"step_over_kernels": 1.5}),
     "dunes": Part("copr_dunes to 34 and 35 dB beside gsplat's trainer", 180, {f"share_{d}": 0.5 for d in DECIBELS}),
     "start": Part("what precedes the first step", 60, {"seconds": 8}),
     "hundred": Part("a fit to 100 photos of 1024 pixels", 120, {"seconds": 60}),
 }
-
-
-def measure_tests() -> dict:
-    """How many tests pass, fail and are left out."""
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *TESTS]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=PARTS["tests"].seconds - 10)
-    print(done.stdout[-3000:], file=sys.stderr)
-    matches = {word: re.search(rf"(\d+) {word}", done.stdout) for word in ("passed", "failed", "skipped", "error")}
-    counts = {word: int(found[1]) if found else 0 for word, found in matches.items()}
-    failed = counts["failed"] + counts.pop("error")
-    return counts | {"failed": max(failed, int(done.returncode != 0))}
 
 
 def measure_step(
@@ -128,7 +114,7 @@ def measure_fit(photos, settings: FitSettings, rival: bool = False) -> dict:
     """Seconds of a fit and how good it gets, and when it reaches DECIBELS. rival: beside gsplat's trainer."""
     from dav_gswt_study import fit_profile
 
-    curves = {"ours": fit_profile.profile_fit(photos, settings, every=LOOKS).curve}
+    curves = {"ours": fit_profile.profile_fit(photos, settings, every=LOOKS)}
     if rival:
         from dav_gswt_study.gsplat_fit import profile_gsplat
 
@@ -147,7 +133,7 @@ def measure_start(photos, settings: FitSettings) -> dict:
     import cProfile
     import pstats
 
-    from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
+    from dav_gswt.reconstruction.coarse import fit_coarse_field
 
     class FirstStepDone(Exception):
         pass
@@ -155,10 +141,9 @@ def measure_start(photos, settings: FitSettings) -> dict:
     def stop(step: int, now: state.State) -> None:
         raise FirstStepDone
 
-    given = StartViews(photos.frame, photos.train, photos.model.points, photos.model.colours, photos.margin)
     profile, begun = cProfile.Profile(), time.perf_counter()
     with suppress(FirstStepDone), profile:
-        fit_coarse_field(given, settings, np.random.default_rng(0), trainer.FitOptions(callback=stop))
+        fit_coarse_field(photos.start_views(), settings, np.random.default_rng(0), trainer.FitOptions(callback=stop))
     seconds = time.perf_counter() - begun
     stats = pstats.Stats(profile).stats  # pyright: ignore[reportAttributeAccessIssue]
     own = {f"{Path(at[0]).stem}.{at[2]}": round(row[3], 2) for at, row in stats.items() if "dav_gswt" in at[0]}
@@ -168,8 +153,6 @@ def measure_start(photos, settings: FitSettings) -> dict:
 
 def measure(name: str, folder: Path | None) -> dict:
     """Do a part here."""
-    if name == "tests":
-        return measure_tests()
     if name == "step":
         return measure_step()
     from dav_gswt_study.fit_profile import read_photo_set
@@ -190,17 +173,6 @@ def run_part(name: str, folder: Path | None) -> dict:
     except subprocess.TimeoutExpired:
         return {"stopped_after": PARTS[name].seconds}
     return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else {"exit_status": done.returncode}
-
-
-def write_table(found: dict[str, dict], path: Path) -> None:
-    """What was found, beside its targets, as Markdown."""
-    lines = ["| part | figure | found | target |", "|---|---|---|---|"]
-    for name, figures in found.items():
-        for key, value in figures.items():
-            if not isinstance(value, dict):
-                shown = f"{value:.4g}" if isinstance(value, int | float) else value
-                lines.append(f"| {PARTS[name].what} | {key} | {shown} | {PARTS[name].targets.get(key, '')} |")
-    path.write_text("\n".join(lines) + "\n")
 
 
 def main() -> None:
@@ -224,8 +196,7 @@ def main() -> None:
         for name in given.only:
             found[name] = run_part(name, given.photos)
             write_json(path, found)
-            write_table(found, ROOT / "results/gpu.md")
-        print((ROOT / "results/gpu.md").read_text())
+        print(json.dumps(found, indent=2))
 
 
 if __name__ == "__main__":

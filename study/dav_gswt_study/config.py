@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
 from dav_gswt.config.load import check_config, check_model
 from dav_gswt.config.model import Policy
-from dav_gswt.config.settings import Heights, Preset
+from dav_gswt.config.settings import Heights
 from dav_gswt_study import experiments
 
 Seeds = Annotated[list[Seed], Field(min_length=1)]
@@ -193,17 +193,6 @@ class Tradeoff(ConfigModel):
     knobs: dict[Name, Knob] = key("by name")
 
 
-class Comparison(Preset):
-    """`make compare OPENSPLAT=<program>`: other programs' fits beside ours, of the same photos."""
-
-    scene: Name = key("whose photos are fitted")
-    margin: float = key("ground fitted around the exemplar, as a share of its side", ge=0, le=100)
-    opensplat: str = key("the program, as one calls it", "opensplat")
-    gsplat_steps: int = key("steps of gsplat's trainer, on a GPU", ge=1, le=100_000)
-    seconds: float = key("that it may take", gt=0, le=100_000)
-    every: int = key("steps after which a field is compared with the test photos", ge=1, le=100_000)
-
-
 class PresetCosts(ConfigModel):
     """`snakemake preset_costs`: what presets cost and what they are worth, with all else as the config has it."""
 
@@ -245,7 +234,6 @@ class StudyConfig(ConfigModel):
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
     view_benchmark: ViewBenchmark | None = key("policies", None)
-    compare: Comparison | None = key("another program's fit beside ours", None)
     seams: Seams | None = key("seams", None)
     forced_choice: ForcedChoice | None = key("the study with people", None)
     sweeps: dict[Name, Sweep] = key("by name", {})

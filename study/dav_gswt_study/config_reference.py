@@ -1,10 +1,10 @@
-"""Write the reference of the study's keys: `make claims`."""
+"""Write the reference of the study's keys: `make docs`."""
 
 from reference import describe_tables, write_files  # workflow/reference.py
 
 from dav_gswt_study.config import StudyConfig
 
-HEAD = "# The study's keys\n\nKeys of `study:`, in `study/config.yaml`. Made by `make claims`."
+HEAD = "# The study's keys\n\nKeys of `study:`, in `study/config.yaml`. Made by `make docs`."
 
 
 def make_reference() -> dict[str, str]:

@@ -30,12 +30,12 @@ WINDOW = 11  # pixels of SSIM's window, a Gaussian of sigma 1.5
 
 
 def profile_gsplat(photos: PhotoSet, steps: int, every: int, seed: int = 0, device: str = "cuda") -> list[dict]:
-    """Train on the training photos, looking at the first group of test views every so many steps.
+    """Train on the training photos, looking at the test views every so many steps.
 
     Returns: rows as of `fit_profile.profile_fit`. Time spent on measuring is not counted.
     """
     torch.manual_seed(seed)
-    tests, measuring, curve = next(iter(photos.tests.values())), 0.0, []
+    measuring, curve = 0.0, []
     start = time.perf_counter()
     centres = np.array([view.camera.centre for view in photos.train])
     size = float(1.1 * np.linalg.norm(centres - centres.mean(0), axis=1).max())
@@ -64,7 +64,7 @@ def profile_gsplat(photos: PhotoSet, steps: int, every: int, seed: int = 0, devi
             torch.cuda.synchronize()
             begun = time.perf_counter()
             row = {"seconds": begun - start - measuring, "step": step + 1, "gaussians": len(given["means"])}
-            curve.append(row | measure_quality(lambda v, degree=degree: _show(given, v.camera, degree), tests))
+            curve.append(row | measure_quality(lambda v, degree=degree: _show(given, v.camera, degree), photos.tests))
             measuring += time.perf_counter() - begun
     return curve
 

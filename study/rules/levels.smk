@@ -66,12 +66,7 @@ rule gather_scenes:
     input:
         tables=lambda wildcards: list(gathered_cells(wildcards)),
     output:
-        table=report(
-            "study/results/tables/{gathered}.csv",
-            caption="../report/gathered.rst",
-            category="Tables",
-            labels={"table": "{gathered}"},
-        ),
+        table="study/results/tables/{gathered}.csv",
     log:
         "<logs>/tables/gather_{gathered}.log",
     wildcard_constraints:

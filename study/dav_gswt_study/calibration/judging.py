@@ -17,7 +17,6 @@ from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground, read_ground
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.pose_maps import PoseMaps
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import PHOTO_WIDTH, ground_mask, scoring_camera
 from dav_gswt.views.uncertainty import combine_terms
@@ -46,26 +45,26 @@ def calibrate_scores(
     judged: CalibrationTarget,
     some: Candidates,
     views: list[TrainingView],
-    scored: tuple[Scores, PoseMaps],
+    scores: Scores,
     lam: float,
     seed: int,
 ) -> tuple[dict, list[dict]]:
     """Compare scores with true errors. Returns the content of calibration.json, and a row per candidate.
 
-    some, views: candidates and their true pictures. scored: scores and maps. lam: weight of LPIPS in u.
+    some, views: candidates and their true pictures. lam: weight of LPIPS in u.
     """
-    row = {name: i for i, name in enumerate(scored[0].names)}
-    terms, shown = _select_terms(*scored, [row[pose.name] for pose, _ in some], lam)
+    row = {name: i for i, name in enumerate(scores.names)}
+    terms = _select_terms(scores, [row[pose.name] for pose, _ in some], lam)
     terms |= geometric_baselines(
         [pose for pose, _ in some], [pose_of_camera("", v.camera, judged.frame) for v in judged.taken]
     )
     corrected = judged.frame.kind == "photos"  # photos differ in exposure
-    error, error_maps = measure_errors(judged.field, judged.grid, views, judged.size, corrected)
+    error = measure_errors(judged.field, judged.grid, views, judged.size, corrected)
     table = [
         {"pose": pose.name, "error": error[i]} | {name: values[i] for name, values in terms.items()}
         for i, (pose, _) in enumerate(some)
     ]
-    return agreement.summarise(terms, shown, error, error_maps, seed), table
+    return agreement.summarise(terms, error, seed), table
 
 
 def choose_candidates(
@@ -97,44 +96,36 @@ def geometric_baselines(some: list[Pose], taken: list[Pose]) -> dict[str, Float6
     return {"low": np.array([90.0 - pose.elevation for pose in some]), "far": apart}
 
 
-def _select_terms(
-    scores: Scores, maps: PoseMaps, rows: list[int], lam: float
-) -> tuple[dict[str, Float64[Array, "n"]], dict[str, Float32[Array, "n _ _"]]]:
-    """Terms and maps of some rows; with a prior u is among the terms."""
+def _select_terms(scores: Scores, rows: list[int], lam: float) -> dict[str, Float64[Array, "n"]]:
+    """Terms of some rows; with a prior u is among them."""
     terms = {name: values[rows] for name, values in scores.terms.items()}
-    shown = {"opacity": maps.opacity[rows]}
     if "w2_sq" in scores.terms:
-        assert maps.w2_sq is not None  # it is written beside the term
-        u = combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales)
-        terms, shown = terms | {"u": u[rows]}, shown | {"w2_sq": maps.w2_sq[rows]}
-    return terms, shown
+        terms["u"] = combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales)[rows]
+    return terms
 
 
 def measure_errors(
     field: GaussianField, grid: Ground, views: list[TrainingView], size: int, corrected: bool = False
-) -> tuple[Float64[Array, "n"], list[Float32[Array, "_ _"]]]:
+) -> Float64[Array, "n"]:
     """Measure the RMSE between renders and true views, over the pixels that look at the modelled exemplar.
+
+    NaN where no pixel counts.
 
     Args:   size: longer side of the photos that the field was fitted to, pixels. The field is rendered at that size,
             then shrunk; at a smaller size splats are blurred to a pixel's width.
             corrected: fit gain and offset of each channel to the view first (photos differ in exposure).
-    Returns: of each view the error (NaN where no pixel counts), and its map: root mean square over the channels, NaN
-            where a pixel does not count.
     """
-    error, maps = np.full(len(views), np.nan), []
+    error = np.full(len(views), np.nan)
     for i, view in enumerate(views):
         weight = view.weight * ground_mask(grid, view.camera)
         mask = weight > 0
-        squares = np.full(mask.shape, np.nan)
         if mask.any():
             picture = _render_at_size(field, view.camera, size)
             if corrected:
                 picture = np.clip(metrics.correct_colours(picture, view.image, weight), 0, 1)
             apart = picture[mask].astype(np.float64) - view.image[mask]
-            squares[mask] = (apart**2).mean(-1)
-            error[i] = np.sqrt(squares[mask].mean())
-        maps.append(np.sqrt(squares).astype(np.float32))
-    return error, maps
+            error[i] = np.sqrt((apart**2).mean())
+    return error
 
 
 def _render_at_size(field: GaussianField, camera: Camera, size: int) -> Float32[Array, "h w 3"]:

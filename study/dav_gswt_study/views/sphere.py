@@ -6,7 +6,6 @@ candidates spread evenly over it lie evenly in the figure. Source: DAV-GSWT, fig
 
 from dataclasses import dataclass
 from math import ceil
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
@@ -102,7 +101,7 @@ def draw_figure(rounds: list[Round], label: str):
         f"from above: azimuth around; elevation 90° in the middle, {RING}° less at each ring, {rim}° at the outermost"
     )
     key = {"frameon": False, "fontsize": 11, "title_fontsize": 11}
-    figure.legend(handles=_legend_handles(), loc="outside lower center", ncols=3, title=about, **key)
+    figure.legend(*panels.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, title=about, **key)
     return figure
 
 
@@ -126,11 +125,12 @@ def _draw_panel(axes, one: Round, rim: int, colours: dict) -> None:
     axes.grid(color="0.8", linewidth=0.8)
     axes.set_axisbelow(True)
     dot = min(LARGEST, CROWDED * BESIDE / max(1, len(one.values)))
-    axes.scatter(*one.candidates.T, c=one.values, s=dot, linewidths=0, **colours)
-    axes.scatter(*one.taken.T, s=min(60, max(30, 2 * dot)), **PHOTO)
+    axes.scatter(*one.candidates.T, c=one.values, s=dot, linewidths=0, label="candidate", **colours)
+    axes.scatter(*one.taken.T, s=min(60, max(30, 2 * dot)), label="photo taken", **PHOTO)
     numbered = len(one.chosen) <= NUMBERED
     stars, star = one.candidates[one.chosen], min(260, max(120, 8 * dot)) if numbered else 70
-    axes.scatter(*stars.T, c=one.values[one.chosen], s=star, zorder=3, **STAR, **colours)
+    said = "chosen, numbered in order"
+    axes.scatter(*stars.T, c=one.values[one.chosen], s=star, zorder=3, label=said, **STAR, **colours)
     if numbered and one.chosen:
         for order, at in enumerate(stars, 1):
             label = axes.annotate(f"{order}", at, (8, 0), textcoords="offset points", va="center", zorder=4, **NUMBER)
@@ -138,14 +138,3 @@ def _draw_panel(axes, one: Round, rim: int, colours: dict) -> None:
     chosen = f"{len(one.chosen)} of {len(one.values)} poses" if one.chosen else "no pose"
     photos = "1 photo" if len(one.taken) == 1 else f"{len(one.taken)} photos"
     axes.set_title(f"round {one.number}: {chosen}, after {photos}", fontsize=12)
-
-
-def _legend_handles() -> list:
-    from matplotlib.lines import Line2D
-
-    edge: dict[str, Any] = {"linestyle": "", "markeredgecolor": "black", "markerfacecolor": "none"}
-    return [
-        Line2D([], [], marker="o", markersize=7, color="0.5", linestyle="", label="candidate"),
-        Line2D([], [], marker="s", markersize=8, markeredgewidth=1.6, label="photo taken", **edge),
-        Line2D([], [], marker="*", markersize=15, markeredgewidth=1.2, label="chosen, numbered in order", **edge),
-    ]

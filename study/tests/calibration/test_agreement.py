@@ -1,5 +1,4 @@
-"""Agreement of scores with errors: ranks, sparsification, and conformal intervals."""
-
+import json
 import math
 
 import numpy as np
@@ -64,3 +63,46 @@ def test_intervals_hold_their_level_on_held_out_samples_whatever_u_is_worth(info
     # 100 calibrate: expected coverage ceil(101 x 0.9) / 101 = 0.901; its standard error over 100 trials is 0.006
     assert np.mean(covered) == pytest.approx(91 / 101, abs=0.02)
     assert not informative or np.mean(widths) > 0.8  # intervals widen with u where errors do
+
+
+def test_a_score_that_knows_the_errors_and_one_that_knows_nothing():
+    rng = np.random.default_rng(0)
+    error = rng.exponential(1, 300)
+    scores = {"oracle": error**2, "reversed": -error, "nothing": rng.normal(size=300)}
+    found = un.evaluate_scores(scores, error, seed=0)
+    assert list(found) == ["oracle", "reversed", "nothing"]
+    assert found["oracle"]["spearman"] == pytest.approx(1) and found["oracle"]["ause"] == pytest.approx(0, abs=1e-12)
+    assert found["reversed"]["spearman"] == pytest.approx(-1) and abs(found["nothing"]["spearman"]) < 0.15
+    # leaving out at random changes nothing: about chance, by as much as 300 poses scatter
+    assert found["nothing"]["ause"] == pytest.approx(found["nothing"]["ause_chance"], abs=0.1)
+    assert found["reversed"]["ause"] > found["reversed"]["ause_chance"] > 0.3
+    for one in found.values():
+        # the mean over splits is 0.9 or, by the rank, up to 1 / 76 more; 200 splits scatter by 0.003
+        assert one["coverage"] == pytest.approx(0.907, abs=0.02)
+    assert found["oracle"]["width"] < 0.5 * found["nothing"]["width"]
+
+
+def test_nothing_is_said_of_too_few_poses_or_a_constant_and_what_is_not_a_number_is_refused():
+    ranked = {"spearman", "ause", "ause_chance"}
+    for count, said in ((7, set()), (8, ranked), (33, ranked), (34, ranked | {"coverage", "width"})):
+        error = np.random.default_rng(2).exponential(1, count)
+        (found,) = un.evaluate_scores({"a": np.arange(count, dtype=float)}, error, 0).values()
+        assert len(found) == 5 and {key for key, value in found.items() if value is not None} == said
+    error = np.arange(50.0)
+    found = un.evaluate_scores({"a": np.ones(50), "b": error}, error, 0)
+    assert set(found["a"].values()) == {None} and None not in found["b"].values()
+    with pytest.raises(ValueError, match="not finite"):
+        un.evaluate_scores({"a": np.where(error == 3, np.nan, error)}, error, 0)
+
+
+def test_a_result_leaves_out_poses_without_error_and_is_json():
+    rng = np.random.default_rng(7)
+    error = rng.uniform(0.1, 1, 12)
+    score = error.copy()
+    error[3], score[3] = np.nan, 99.0
+    found = un.summarise({"a": score, "b": -score}, error, seed=0)
+    assert found["poses"] == 11 and found["error_mean"] == pytest.approx(np.nanmean(error)) and found["level"] == 0.9
+    assert found["scores"]["a"]["spearman"] == pytest.approx(1) == -found["scores"]["b"]["spearman"]
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+    none = un.summarise({"a": score[3:4]}, error[3:4], seed=0)
+    assert none["poses"] == 0 and none["error_mean"] is None and set(none["scores"]["a"].values()) == {None}

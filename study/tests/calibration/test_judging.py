@@ -31,14 +31,12 @@ def judge(replayed, count=12):
     judged, folder = replayed
     found = scoring.score_poses(judged.field, judged.grid, pool(), judged.taken, judged.frame, None)
     some = judging.choose_candidates(pool(), found.scores, folder, count)
-    return judging.calibrate_scores(judged, *some, (found.scores, found.maps), 0.1, 0)
+    return judging.calibrate_scores(judged, *some, found.scores, 0.1, 0)
 
 
 def test_a_score_that_knows_where_the_field_is_wrong_ranks_well(replayed):
     found, table = judge(replayed)
     assert found["poses"] == 12 and set(found["scores"]) == {"opacity", "coverage", "low", "far"}
-    assert found["scores"]["opacity"]["pixel_spearman"] > 0.2
-    assert found["scores"]["opacity"]["pixel_ause"] < 0.75 * found["scores"]["opacity"]["pixel_ause_chance"]
     assert table[0]["pose"] == "p0.png" and len({row["pose"] for row in table}) == 12
     assert all(row["error"] > 0.02 for row in table)
 

@@ -33,25 +33,20 @@ def test_rmse_is_the_root_mean_square_over_channels_and_the_pixels_that_count(vi
     columns = np.arange(SIDE) < 20
     off = np.where(counts & columns, np.float32(0.3), np.where(counts, np.float32(0), np.float32(0.7)))
     wrong = replace(view, image=view.image + off[..., None] * np.float32([0, 1, 0]))
-    (error,), (found,) = measure_errors(FIELD, GRID, [wrong], SIDE)
-    np.testing.assert_allclose(found[counts & columns], 0.3 / 3**0.5, atol=1e-5)
-    np.testing.assert_allclose(found[counts & ~columns], 0, atol=1e-5)
-    np.testing.assert_array_equal(np.isnan(found), ~counts)
+    (error,) = measure_errors(FIELD, GRID, [wrong], SIDE)
     assert 0 < counts.sum() < counts.size
     assert error == pytest.approx(0.3 / 3**0.5 * (counts & columns).sum() ** 0.5 / counts.sum() ** 0.5, abs=1e-5)
     hidden = replace(wrong, weight=(~columns * np.ones((SIDE, 1))).astype(np.float32))
-    (error,), (found,) = measure_errors(FIELD, GRID, [hidden], SIDE)
-    assert error == pytest.approx(0, abs=1e-5) and np.isnan(found[:, columns]).all()
+    assert measure_errors(FIELD, GRID, [hidden], SIDE) == pytest.approx([0], abs=1e-5)
 
 
 def test_another_exposure_counts_unless_it_is_corrected_and_a_view_of_nothing_modelled_has_no_rmse(views):
     gain, offset = np.float32([0.8, 0.9, 0.7]), np.float32([0.1, 0.05, 0.0])
     other = [replace(view, image=gain * view.image + offset) for view in views]
-    assert (measure_errors(FIELD, GRID, other, SIDE)[0] > 0.02).all()
-    np.testing.assert_allclose(measure_errors(FIELD, GRID, other, SIDE, corrected=True)[0], 0, atol=1e-5)
+    assert (measure_errors(FIELD, GRID, other, SIDE) > 0.02).all()
+    np.testing.assert_allclose(measure_errors(FIELD, GRID, other, SIDE, corrected=True), 0, atol=1e-5)
     aside = replace(views[0], camera=cameras.pinhole([90, 90, 4], [90, 90.1, 0], SIDE, SIDE, 40.0))
-    error, maps = measure_errors(FIELD, GRID, [aside, views[1]], SIDE)
-    assert np.isnan(error[0]) and np.isnan(maps[0]).all() and np.isfinite(error[1])
+    assert np.isnan(measure_errors(FIELD, GRID, [aside, views[1]], SIDE)).tolist() == [True, False]
 
 
 def test_the_field_is_drawn_as_large_as_it_was_fitted(views):
@@ -59,5 +54,5 @@ def test_the_field_is_drawn_as_large_as_it_was_fitted(views):
     fine = ground.field(large)
     photo = np.clip(render(fine, views[0].camera.resized(4 * SIDE, 4 * SIDE)).colour, 0, 1).astype(np.float32)
     view = replace(views[0], image=image_files.shrink_image(photo, SIDE, SIDE))
-    assert measure_errors(fine, large, [view], 4 * SIDE)[0][0] == pytest.approx(0, abs=1e-6)
-    assert measure_errors(fine, large, [view], SIDE)[0][0] > 1e-3
+    assert measure_errors(fine, large, [view], 4 * SIDE)[0] == pytest.approx(0, abs=1e-6)
+    assert measure_errors(fine, large, [view], SIDE)[0] > 1e-3
