@@ -6,8 +6,7 @@ from fixtures.seams import cost
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dav_gswt.tiles import energy, layout, semantics
-from dav_gswt.tiles.layout import NE, NW, SE, SW, E, Layout, N, S, W
+from dav_gswt.tiles import energy, semantics
 from dav_gswt_study import expansion
 from dav_gswt_study.expansion import Patches
 
@@ -55,19 +54,3 @@ def test_of_two_patches_it_is_as_cheap_as_the_best_of_all_labellings():
         best = min(best, cost(terms, labels, patches.rows, patches.columns))
     found = expansion.expand_labels(start, patches, terms)
     assert found.energies[-1] == pytest.approx(best, abs=31 * HALF) and found.broken == 0
-
-
-def test_every_cell_may_show_some_patch_but_for_the_rim_and_only_where_it_reaches():
-    plan = Layout(exemplar=40, levels=1, side=10, strip=2, corner=3)
-    reach = expansion.allowed_cells(plan)
-    n, k = plan.side, plan.block
-    inner = np.zeros((n, n), bool)
-    inner[k : n - k, k : n - k] = True
-    np.testing.assert_array_equal(reach[layout.CENTRE], inner)
-    assert not reach[:, ~inner].any()
-    y, x = np.nonzero(reach[W])
-    assert set(x) == {1} and set(y) == set(range(2, 8))  # a strip is 2 wide; the rim is 1
-    np.testing.assert_array_equal(np.argwhere(reach[SW]), [[1, 1], [1, 2], [2, 1], [2, 2]])  # a corner is 3
-    turned = {S: reach[W].T, E: reach[W][:, ::-1], N: reach[W].T[::-1]}
-    turned |= {NE: reach[SW][::-1, ::-1], SE: reach[SW][:, ::-1], NW: reach[SW][::-1]}
-    assert all((reach[label] == expected).all() for label, expected in turned.items())

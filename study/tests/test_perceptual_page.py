@@ -134,28 +134,3 @@ def test_pictures_go_after_their_time_and_may_be_answered_then(person, tmp_path)
         reached(page, 2)
         (one,) = page.evaluate("session.answers")
     assert one["gone"] and one["ms"] >= 1000 * BRIEF - 20 and one["choice"] == "left"
-
-
-def test_keys_between_pairs_and_keys_held_down_answer_nothing(person):
-    with person() as page:
-        begin(page)
-        page.keyboard.press("ArrowLeft")  # nothing is shown yet
-        shown(page)
-        for _ in range(6):
-            page.keyboard.down("ArrowRight")
-        reached(page, 2)
-        shown(page)
-        page.keyboard.down("ArrowRight")
-        assert page.evaluate("session.answers.length") == 1
-
-
-def test_who_stops_leaves_nothing_and_the_next_is_another_participant_with_a_list_that_is_drawn(person):
-    with person(query="?list=9999") as page:  # there is no such list
-        people, lists = set(), set()
-        for _ in range(6):
-            begin(page)
-            people.add(page.evaluate("session.participant"))
-            lists.add(page.evaluate("session.list"))
-            page.click("#stop")
-            assert page.evaluate("localStorage.length") == 0
-        assert len(people) == 6 and len(lists) > 1 and lists <= set(range(16))

@@ -1,19 +1,7 @@
 import numpy as np
 import pytest
-from scipy import stats
 
 from dav_gswt_study import statistics
-
-
-def test_an_interval_holds_the_truth_as_often_as_it_says():
-    """Scenes and seeds both vary; over 100 studies the 90 % interval misses about 10, a little more for few scenes."""
-    inside = 0
-    for study in range(100):
-        rng = np.random.default_rng(study)
-        scenes = {str(i): 0.3 + rng.normal(0, 0.2) + rng.normal(0, 0.2, 4) for i in range(10)}
-        found = statistics.bootstrap_paired(scenes, seed=study, level=0.9, replicates=150)
-        inside += found[1] <= 0.3 <= found[2]
-    assert 80 <= inside <= 96
 
 
 def test_scenes_count_alike_whatever_their_seeds_and_the_same_seed_says_the_same():
@@ -32,14 +20,6 @@ def test_crops_of_one_cluster_count_as_one():
     sums = [statistics.sum_by_cluster((f"{k}", [float(k)]) for k in range(4) for _ in range(n)) for n in (1, 20)]
     first, second = (statistics.percentile_interval(statistics.bootstrap_clusters(each)[0][:, 0]) for each in sums)
     assert first == pytest.approx(second)
-
-
-def test_one_scene_is_the_usual_paired_test():
-    values = np.array([-1.0, 0.5, 2.0, 2.5])
-    found, usual = statistics.compute_paired_test({"a": values}), stats.ttest_1samp(values, 0.0)
-    assert (found.df, found.units) == (3, 4)
-    assert found.t == pytest.approx(float(usual.statistic)) and found.p == pytest.approx(float(usual.pvalue))
-    assert found.d == pytest.approx(np.mean(values) / np.std(values, ddof=1))
 
 
 def test_scenes_far_apart_do_not_count_as_spread_of_seeds():

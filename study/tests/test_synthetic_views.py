@@ -23,15 +23,6 @@ def test_a_cap_is_photographed_and_tested_evenly_from_above_its_lowest_elevation
     assert list(tests) == ["high", "oblique"] and elevations(tests["oblique"]) == pytest.approx(8 * [45])
 
 
-def test_walkers_are_a_group_of_their_own_around_the_exemplar():
-    groups = synthetic_views.place_test_views(ENTRY, "ring", 0, 6)
-    assert list(groups) == ["hemisphere", "walker"]
-    own = groups["walker"]
-    assert [c.centre[2] for c in own] == pytest.approx([0.8, 1.6, 3.2, 0.8, 1.6, 3.2])
-    around = np.degrees(np.unwrap([np.arctan2(c.centre[1], c.centre[0]) for c in own]))
-    assert np.diff(around) == pytest.approx(5 * [60.0])
-
-
 @pytest.mark.parametrize("n, circle", [(100, 36), (72, 36), (71, 26), (50, 18), (3, 1)])
 def test_a_paper_rig_has_36_in_100_views_on_a_circle_and_the_others_uniform_above_the_lowest(n, circle):
     places = synthetic_views.list_paper_places(n, 45.0, 30.0, 7.0)
@@ -41,12 +32,3 @@ def test_a_paper_rig_has_36_in_100_views_on_a_circle_and_the_others_uniform_abov
     height = np.sin(np.radians([e for e, _, _ in places[circle:]]))
     # equal steps of height are equal areas of the sphere
     assert height == pytest.approx(1 - (np.arange(n - circle) + 0.5) / (n - circle) * 0.5)
-
-
-def test_a_walker_stands_away_from_the_target_and_looks_past_it_to_the_horizon():
-    camera = synthetic_views.stand_at_eye_level(1.6, 90.0, 4.0, (1.0, 2.0, 0.5), 160)
-    assert camera.centre == pytest.approx(np.array([1.0, 6.0, 2.1]))
-    horizon = camera.centre + np.array([[0.0, -1.0, 0.0]])
-    [pixel], _ = camera.project(horizon)
-    # 12 degrees above the middle: a focal length of 80 / tan 30 pixels times tan 12
-    assert pixel == pytest.approx([80, 80 - 80 * 3**0.5 * np.tan(np.radians(12))])

@@ -1,7 +1,6 @@
 import json
 from functools import partial
 
-import numpy as np
 import pytest
 
 from dav_gswt_study.comparison import curves, tables
@@ -100,15 +99,3 @@ def test_every_measure_is_compared_by_groups_of_scenes_and_better_is_above_zero(
     found = tables.compare_groups(table, "farthest", groups)
     psnr = {row["group"]: (row["mean"], row["units"]) for row in found if row["measure"] == "psnr"}
     assert psnr == {"mixed": (0.0, 1), "plants": (1.5, 2)}
-
-
-def curve(*values):
-    return np.array(values, float)
-
-
-def test_the_area_is_the_mean_height_of_the_curve():
-    assert tables.compute_nauc(curve(8, 12, 20), curve(20, 24, 33)) == pytest.approx((4 * 22 + 8 * 28.5) / 12)
-    assert tables.compute_nauc(curve(8, 16), curve(30, 30)) == 30
-    for photos, psnr in ((8,), (20,)), ((8, 8), (20, 21)), ((8, 9), (20, np.nan)):
-        with pytest.raises(ValueError, match="a curve"):
-            tables.compute_nauc(curve(*photos), curve(*psnr))

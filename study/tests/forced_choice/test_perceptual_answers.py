@@ -42,12 +42,6 @@ def test_who_stopped_early_or_failed_the_checks_is_left_out_and_counted(gather, 
     assert [each.name[-1] for each in found.participants] == ["0", "3"]
 
 
-def test_another_file_is_no_key(tmp_path):
-    (tmp_path / "key.json").write_text("[]")
-    with pytest.raises(InputError, match="not a key"):
-        answers.read_key(tmp_path / "key.json")
-
-
 def test_a_fifth_of_the_checks_may_be_wrong():
     key = kit.make_key(answer_files.drawn(crops=1, checks=5, scenes=("desert",)), seed=0)
     checks = [name for name, item in key["items"].items() if item["check"]]

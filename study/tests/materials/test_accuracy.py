@@ -46,14 +46,6 @@ def test_an_object_beside_its_place_is_wrong_and_one_at_the_border_does_not_coun
     assert (scores["objects"], scores["wrong"]) == (0, 0)
 
 
-def test_a_shifted_exemplar_is_compared_place_by_place():
-    half, none = np.ones((10, 10), int), np.zeros((10, 10), int)
-    half[:, 2:] = 0  # the exemplar begins at x = 1.0: two columns of sand, then meadow
-    middles = 1.0 + (np.arange(10) + 0.5) * 0.1
-    own = accuracy.FoundLabels(half, half, none, none.astype(bool), middles, middles)
-    assert accuracy.score_materials(truth(), own)["mean_iou"] == 1
-
-
 def test_the_label_map_of_a_materials_folder_is_read(tmp_path):
     none = np.zeros((2, 2), np.float32)
     layers = {"material": none, "kind": np.arange(4, dtype=np.float32).reshape(2, 2), "object": none}

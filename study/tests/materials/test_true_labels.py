@@ -46,12 +46,3 @@ def test_the_footprint_of_an_object_is_its_outline_from_above_cut_at_the_border(
     known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 8.0, (ball(2.0, 0.0, 0.5),))
     found = true_labels.draw_label_map(known, SQUARE, 200)
     assert (found.object == 1).sum() * 0.02**2 == pytest.approx(np.pi * 0.5**2 / 2, rel=0.12)
-
-
-def test_twigs_with_gaps_between_them_are_one_footprint():
-    twigs = np.array([[x, y, 0.1] for x in np.arange(-0.3, 0.31, 0.05) for y in np.arange(-0.3, 0.31, 0.05)])
-    far_leaf = [[0.8, 0.8, 0.1]]
-    covered = true_labels.rasterize_footprint(
-        np.vstack([twigs, far_leaf]).astype(np.float32), Square(-1.0, -1.0, 2.0), 200
-    )
-    assert covered.sum() * 0.01**2 == pytest.approx(0.6**2, rel=0.1)

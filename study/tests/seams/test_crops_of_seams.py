@@ -6,10 +6,9 @@ from fixtures import seams
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import metrics
-from dav_gswt.raster.interface import RIM
 from dav_gswt.terrain import heights, stills
 from dav_gswt_study.seams import crops, measure, places, rendering
-from dav_gswt_study.seams.rendering import MAX_SLOPE, Footprint, SpatialIndex
+from dav_gswt_study.seams.rendering import SpatialIndex
 
 HILLS = {"kind": "hills", "height": 1.0, "wavelength": 8.0}
 _, WALKER, TOP = crops.VIEWS
@@ -112,30 +111,3 @@ def test_crops_have_numbers_of_their_own_and_without_weights_no_seam_lpips(place
     assert [row["seam_lpips"] for row in found] == [None] * len(found)  # absent, never made up
     numbers = {name: {r["crop"] for r in found if r["place"] == name} for name in ("border", "cut", "ceiling", "floor")}
     assert numbers == {"border": {0, 1}, "cut": {2, 3}, "ceiling": {4, 5}, "floor": set(range(6))}
-
-
-def test_the_few_gaussians_of_the_exemplar_that_may_show_are_found_among_all(source, rng):
-    index = source.levels[0]
-    size = np.ptp(index.field.means[:, :2], axis=0).min()
-    for _ in range(4):
-        west, south = rng.uniform(-0.2, 1.0, 2) * size
-        box = np.array([[west, south], [west + 0.2 * size, south + 0.1 * size]])
-        seen = Footprint(box, rng.normal(0, 2, 2))
-        corner = np.array([*rng.uniform(-size, size, 2) * 0.1, 0.0])
-        found, wanted = index.query(seen, corner), index.field[_shows(seen, index.field, corner)]
-        np.testing.assert_array_equal(found.means, wanted.means)
-        np.testing.assert_array_equal(found.sh, wanted.sh)
-    assert len(wanted) < len(index.field)
-    assert len(SpatialIndex.from_field(index.field[:0]).query(seen, corner)) == 0
-
-
-def _shows(seen, field, corner):
-    """Each Gaussian asked for itself, as docs of `Footprint.occlusion_range` say it."""
-    shown = []
-    reaches = RIM * np.exp(field.log_scales.astype(float).max(1))
-    for place, reach in zip(field.means.astype(float), reaches, strict=True):
-        behind = [MAX_SLOPE * (place[2] + up) * seen.per_height for up in (-reach, reach)] + [np.zeros(2)]
-        low = place[:2] + corner[:2] - reach + np.min(behind, 0)
-        high = place[:2] + corner[:2] + reach + np.max(behind, 0)
-        shown.append(bool((high > seen.box[0]).all() and (low < seen.box[1]).all()))
-    return np.array(shown)

@@ -26,17 +26,6 @@ def test_what_is_laid_over_the_config_is_what_the_config_allows_or_says(root):
             assert extreme.error_pattern and running.has_failed_as_expected(extreme, said), extreme.name
 
 
-def test_a_run_ends_well_only_without_any_fault_and_fails_well_only_with_its_own_message():
-    assert running.has_finished(EXTREMES["tau-0"], WELL)
-    faults = dict(exit_code=1, traceback=True, not_finite=2, blank_stills=1, stills_psnr=20.0)
-    assert not any(running.has_finished(EXTREMES["tau-0"], WELL | {name: value}) for name, value in faults.items())
-    one = EXTREMES["one-gaussian"]
-    right = WELL | {"exit_code": 1, "message": "finished.ply: the field has 1 opaque Gaussians; a surface"}
-    assert running.has_failed_as_expected(one, right)
-    for fault in (dict(exit_code=0), dict(message="another"), dict(message=None), dict(traceback=True)):
-        assert not running.has_failed_as_expected(one, right | fault)
-
-
 def test_a_number_that_is_not_finite_is_found_in_a_table_in_a_field_and_in_a_bundle(tmp_path, monkeypatch):
     path = tmp_path / "a.csv"
     for word, finite in (("infinite", True), ("nan", False), ("-inf", False)):

@@ -8,7 +8,6 @@ from dav_gswt_study import sweeps
 from dav_gswt_study.claims import PAGE, TEMPLATE, Difference, describe_claims
 from dav_gswt_study.markdown import render_template
 from dav_gswt_study.tables import paper, spread
-from dav_gswt_study.terrain import tile_uncertainty
 
 ROW = dict.fromkeys(sweeps.list_columns(1)) | {"preset": "draft", "tiling": "semantic", "tau": "0.6"}
 TWO = [("desert", 0, 30.0), ("desert", 1, 32.0), ("dunes", 0, 20.0), ("dunes", 1, 21.0)]
@@ -43,13 +42,6 @@ def test_variants_are_compared_in_pairs_with_the_baseline_of_their_sweep_in_the_
     rows = [row for row in rows if (row["varied_0"], row["varied_1"]) != ("all", "2")]  # all are taken in one round
     random, everything = paper.tabulate_ablation({"budget": rows}, {"budget": "random"})
     assert (random["psnr"], everything["psnr"], everything["psnr_difference"]) == (22, 22, 0)
-
-
-def test_cells_of_the_terrain_are_as_uncertain_as_their_tiles():
-    tiles = [{"uncertainty": n / 16, "orders": [0, 1, 2] if n > 7 else [0, 2]} for n in range(16)]
-    manifest = {"tiles": tiles, "salt": 0, "directions": [0, 1, 2]}
-    shown, deep = tile_uncertainty.read_cells(manifest, -3, -2, (5, 6))
-    assert shown.shape == (5, 6) and (deep == (shown > 7 / 16)).all() and deep.any() and not deep.all()
 
 
 def test_every_value_is_printed_in_the_papers_table(root):

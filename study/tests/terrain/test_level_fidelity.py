@@ -27,14 +27,6 @@ def tile_set(fields):
     return TileSet(SIDE, SPACING, fields, labels, np.zeros((count, 9, 2), int), np.zeros(count), report_of())
 
 
-def test_the_torus_holds_every_tile_once_and_colours_meet():
-    torus = level_fidelity.arrange_torus(0)
-    assert sorted(torus[1:-1, 1:-1].ravel()) == list(range(16))
-    np.testing.assert_array_equal(torus[:, :-1] >> 1 & 1, torus[:, 1:] >> 3 & 1)  # E and W
-    np.testing.assert_array_equal(torus[:-1] >> 2 & 1, torus[1:] & 1)  # N and S
-    np.testing.assert_array_equal(level_fidelity.arrange_torus(2), torus + 32)
-
-
 def test_a_level_that_is_too_bright_is_wrong_by_that_much():
     rows = level_fidelity.measure_levels(tile_set([[plain(CELLS, 0.5)] * 16, [plain(CELLS // 2, 0.6)] * 16]), 1.0, 0.1)
     for row in rows[:16]:
@@ -54,16 +46,6 @@ def test_errors_are_those_of_the_tile_and_of_what_is_near_its_cut():
     errors = level_fidelity.measure_errors(tile_set([fine, coarse]), 1, 200.0)
     worst = min((t for t in errors if errors[t]["db"] is not None), key=lambda t: errors[t]["db"])
     assert worst[0] == 5 and errors[5, "oblique"]["cut_db"] < errors[5, "oblique"]["db"] - 1
-
-
-def test_autocorrelation_is_that_of_the_slow_sum():
-    picture = np.random.default_rng(0).random((6, 5, 3))
-    found = lattice.autocorrelate(picture)
-    f = picture - picture.mean((0, 1))
-    for dy, dx in ((0, 0), (1, 2), (3, 0)):
-        slow = (f[: 6 - dy, : 5 - dx] * f[dy:, dx:]).sum(-1).mean() / (f**2).sum(-1).mean()
-        assert found[6 + dy, 5 + dx] == pytest.approx(slow) == pytest.approx(found[6 - dy, 5 - dx])
-    assert not lattice.autocorrelate(np.full((4, 4, 3), 0.5)).any()
 
 
 PIXELS, TILES = 32, 12

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.geometry import camera_layouts
 from dav_gswt.prior.interface import Condition
 from dav_gswt_study.prior.training import example_files, examples
 
@@ -43,15 +42,6 @@ def test_a_seed_makes_the_same_examples_of_what_a_prior_takes_and_the_fit_resemb
     apart = np.abs(made.condition.colour - made.rgba[..., :3])[both]
     assert both.mean() > 0.2
     assert 0.001 < apart.mean() < 0.15  # neither the truth itself nor another place
-
-
-def test_a_camera_inside_a_thing_is_known_and_a_turned_one_stays_where_it_is():
-    field, camera = examples.make_world(0).field, camera_layouts.orbit(90, 0, 7.0, (0, 0, 0), 8, 8, 55.0)
-    assert examples.is_clear(field, camera)
-    assert not examples.is_clear(field, camera_layouts.orbit(90, 0, 0.1, field.means[0], 8, 8, 55.0))
-    turned = examples.aim_camera(camera, np.array([1.0, 2.0, 0.0]))
-    np.testing.assert_allclose(turned.centre, camera.centre, atol=1e-9)
-    np.testing.assert_allclose(turned.project(np.array([[1.0, 2.0, 0.0]]))[0], [[4, 4]], atol=1e-9)
 
 
 def test_stored_examples_come_back_to_the_bytes_precision(stored, tmp_path, made):

@@ -42,10 +42,3 @@ def test_a_wall_casts_a_shadow_as_long_as_it_is_high_and_its_foot_sees_less_sky(
     seen = worlds.sky_visibility(flat_with_a_wall(), np.array([[0.85, 0, 0], [-3.0, 0, 0], [1.0, 0, 1.0]]))
     assert seen[0] < 0.7
     np.testing.assert_allclose(seen[1:], 1, atol=1e-3)
-
-
-def test_a_lit_level_surface_reflects_sun_and_sky():
-    one = np.array([[-3.0, 0, 0]])
-    surface = worlds.Surface(one, np.array([[0, 0, 1.0]]), np.full((1, 3), 0.4), np.ones(1))
-    found = worlds.reflect(sun_at(30), flat_with_a_wall(), surface, np.zeros(3))
-    np.testing.assert_allclose(found, 0.4 * (0.5 + 0.5), rtol=1e-3)  # sin 30 of the sun, all of the sky
