@@ -91,6 +91,7 @@ def _describe_views(rows: Reader) -> dict:
     psnr = {variant: float(row["psnr"]) for variant, row in budget.items()}
     hundred = {r["policy"]: -float(r["gap"]) for r in rows("hundred_benchmark") if r["scene"] == "desert_100"}
     return {
+        "version": ", ".join(sorted({row["version"] for row in rows("view_curves") + rows("hundred_curves")})),
         "chosen": {variant: _compare(compared[variant], "psnr") for variant in ("w2", "grad-lpips", "single")},
         "photos": int(float(budget["w2-lpips"]["photos"])),
         "all_photos": int(float(budget["all"]["photos"])),

@@ -6,6 +6,7 @@ from pathlib import Path
 import jinja2
 import pandas as pd
 
+import dav_gswt
 from dav_gswt.files import atomic_file
 
 
@@ -21,7 +22,7 @@ def render_template(template: Path | str, values: dict) -> str:
     environment = jinja2.Environment(
         undefined=jinja2.StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
     )
-    environment.globals["table"] = format_table
+    environment.globals["version"] = dav_gswt.__version__  # for tables that do not say it
     return environment.from_string(Path(template).read_text(encoding="utf-8")).render(values)
 
 

@@ -26,7 +26,8 @@ def describe_seams(summary: list[dict], ablation: list[dict], own: dict[str, str
     own: the tiling of each scene.
     """
     baseline = next((row["baseline"] for row in ablation), "")
-    return {"baseline": baseline, "scenes": _format_scenes(summary, own), "variants": _format_variants(ablation)}
+    tables = {"scenes": _format_scenes(summary, own), "variants": _format_variants(ablation)}
+    return {"baseline": baseline, "version": summary[0]["version"]} | tables
 
 
 def _format_scenes(summary: list[dict], own: dict[str, str]) -> str:
