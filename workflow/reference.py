@@ -20,14 +20,25 @@ each `config/scenes/<name>.yaml` is one scene. Lay single keys over them on the 
 without a default may be left out."""
 POLICIES_HEAD = """# Policies
 
-The config's `policy` chooses the next views. The default, `auto`, uses `farthest` if a scene
-chooses from given photos (`agent: replay`), else `coverage-error` ([why](../active-views.md)).
-`make reference` writes this page; [Architecture](../architecture.md#a-policy) shows how to add a
-policy.
+A policy chooses the poses from which the next k photos are taken. The config's `policy` names the
+policy and its `k` the number. The default policy, `auto`, stands for `farthest` if a scene chooses
+from given photos (`agent: replay`), and for `coverage-error` if new photos are taken
+([why](../active-views.md)).
 
-Every policy knows the poses of the candidates and of the photos so far. The column `reads` lists
-what else it reads. `prior`, `p_drop` and `lam` matter only to policies that read a prior; settings
-after "not" have no effect. k is the config's `k`.
+The column "reads" lists what a policy uses:
+
+- `poses`: the camera poses of the candidates and of the photos so far. Every policy uses them.
+- `field`: the Gaussians that were fitted to the photos so far
+- `photos`: the photos so far
+- `prior`: samples of a [diffusion prior](../prior.md), a network that paints guesses of what a
+  candidate would show. Only these policies use the config's `prior`, `p_drop` and `lam`, except the
+  keys after "not".
+
+A cell is a square of the ground, which is 28 cells long. W2 is the 2-Wasserstein distance between
+samples. [Terms](../prior.md#terms) defines `w2_sq`, `lpips` and `gradient`. In a sum, each term is
+divided by its scale, a number that the first round fixes.
+
+[Architecture](../architecture.md#a-policy) shows how to add a policy.
 """
 
 

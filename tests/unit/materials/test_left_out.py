@@ -94,6 +94,18 @@ def test_pipes_are_left_out_whole(factor):
     assert not np.any([source[lying].any() for source in plan.sources])
 
 
+@pytest.mark.parametrize("share", [0.5, 0.7])
+def test_patches_of_flowers_all_over_the_ground_are_ground_and_a_shed_among_them_is_not(share):
+    maps, noise = made.maps(mixed=False, shrubs=False), np.random.default_rng(0).normal(0, 1, (M, M))
+    patches = gaussian_filter(noise, 6)
+    flowers = (patches > np.quantile(patches, 1 - share)) & ~ROOF
+    surface = maps.height + (9 * flowers + 40 * ROOF) * made.SPACING
+    colour = np.where(ROOF[..., None], [0.5, 0.2, 0.15], maps.colour)
+    plan = build.plan_ground(replace(maps, colour=colour, surface=surface, cover=0.5 * (flowers | ROOF)), True)
+    assert plan.sources[0][flowers].mean() > 0.9 and not plan.sources[0][ROOF].any()
+    assert [each.reason for each in plan.left_out] == [left_out.STANDS]
+
+
 def test_people_may_name_what_stands(tmp_path):
     from dav_gswt.images import image_files
 

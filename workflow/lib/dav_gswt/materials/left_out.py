@@ -1,8 +1,8 @@
 """What is no ground and no object: what stands or is sunk, and things that are cut off or were seen from above only.
 
 What stands is told by the heights alone, as buildings are in laser scans: it is what openings of rising widths cut off
-(Zhang et al. 2003), if it is taller than a share of its width. A heap of loose ground
-has no steep sides, and is ground.
+(Zhang et al. 2003), if it is taller than a share of its width. A heap of loose ground has no steep sides, and is
+ground; so is what rises all over the ground, as patches of flowers do.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,6 +29,7 @@ ROUNDED = 0.35  # cells: such a deviation has every straight row of cells
 TALL = 0.2  # height over width, from which something stands or is sunk; of what is wider than LARGEST: over that
 STEEP, WALL = 1.0, 0.5  # a slope that loose ground does not keep, and share of a thing's rim that rises by more
 LEAST_RISE = 4.0  # cells: lower things are too near to the errors of a draft
+COMMON, RARE = 0.55, 3.5  # quantile of the heights of all ground, which cover has; and height over it of what stands
 SPECK = 1 / 44  # of the side: width of the median of the heights, which a draft has with specks
 HIDDEN = 0.1  # of the ground around a cell, from which something stands there, not only in a noisy height
 WIDEST, WIDER = 0.7, 1.5  # of the side: width of the widest thing; ratio of the widths that are tried
@@ -77,7 +78,7 @@ def find_relief(maps: GroundMaps) -> list[tuple[str, Bool[Array, "m m"]]]:
 def find_steep_things(top: Float[Array, "m m"], low: Float[Array, "m m"]) -> list[Bool[Array, "m m"]]:
     """Cells of each thing longer than an object may be that rises from its surroundings with steep sides.
 
-    Things of rising widths are cut off by an opening.
+    Things of rising widths are cut off by an opening. What much of the ground rises by is the height of its cover.
     top, low: heights of what is seen from above and of the ground below it, as far as that is known; in cells.
     """
     m, found = len(top), np.zeros(top.shape, bool)
@@ -86,7 +87,8 @@ def find_steep_things(top: Float[Array, "m m"], low: Float[Array, "m m"]) -> lis
     while width < WIDEST * m:
         side = 2 * round(width / 2) + 1
         hat = top - grey_opening(low, (side, side))
-        pieces, number = label(find_wide_parts(hat > max(LEAST_RISE, TALL * min(width, LARGEST * m)), least))
+        rise = max(LEAST_RISE, TALL * min(width, LARGEST * m), RARE * np.quantile(hat, COMMON))
+        pieces, number = label(find_wide_parts(hat > rise, least))
         for k in range(1, number + 1):
             own = pieces == k
             rim = own & binary_dilation(~own, iterations=RING)

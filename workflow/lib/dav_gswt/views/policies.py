@@ -80,13 +80,15 @@ def policy(name: str, chooses: str, needs: tuple[str, ...] = (), fixed_zero: tup
     return register
 
 
-@policy("random", "k drawn at random")
+@policy("random", "k candidates drawn at random")
 def random(scores: Scores, inputs: SelectionInput) -> list[int]:
     """k candidates drawn without replacement."""
     return [int(i) for i in inputs.rng.permutation(len(scores))[: inputs.k]]
 
 
-@policy("farthest", "greedily, the one farthest from all photos so far: farthest point sampling")
+@policy(
+    "farthest", "one by one, the candidate that is farthest from the nearest photo so far (farthest point sampling)"
+)
 def farthest(scores: Scores, inputs: SelectionInput) -> list[int]:
     """Farthest point sampling: the candidate farthest from all views so far; ties by index."""
     return select_farthest_poses(scores.poses, inputs.k, inputs.captured)
@@ -94,19 +96,19 @@ def farthest(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 @policy(
     "coverage-w2",
-    "as `coverage`, each cell weighted by W2 between the prior's samples",
+    "like `coverage`, but a cell counts more if the prior's samples differ more there (in W2)",
     needs=("prior", "field"),
     fixed_zero=("lam",),
 )
 @policy(
     "coverage-error",
-    "as `coverage`, each cell weighted by the error of the field in the photos so far",
+    "like `coverage`, but a cell counts more if renders of the field differ more from the photos there",
     needs=("field", "photos"),
 )
 @policy(
     "coverage",
-    "greedily, the largest gain in directional coverage: every cell of the ground is to be seen large, and from many "
-    "sides",
+    "one by one, the candidate with the largest gain in directional coverage. It is high if photos show every cell of "
+    "the ground large and from many sides",
     needs=("field",),
 )
 def cover(scores: Scores, inputs: SelectionInput) -> list[int]:
@@ -130,7 +132,7 @@ def everything(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 @policy(
     "grad-lpips",
-    "the largest image gradient of the prior's mean sample plus `lam` LPIPS, each over its frozen scale (ablation)",
+    "the k candidates with the largest `gradient` + `lam` · `lpips` (an ablation)",
     needs=("prior",),
 )
 def grad_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
@@ -139,14 +141,16 @@ def grad_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 
 @policy(
-    "w2-lpips", "the largest u = W2² + `lam` LPIPS, each over its frozen scale: the paper's top k", needs=("prior",)
+    "w2-lpips",
+    "the k candidates with the largest uncertainty u = `w2_sq` + `lam` · `lpips`, as in the paper",
+    needs=("prior",),
 )
 def w2_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
     """The k candidates of greatest u = W2² + lam LPIPS, each over its frozen scale: the paper's Algorithm 1."""
     return top(uncertainty(scores, inputs.lam), inputs.k)
 
 
-@policy("w2", "the largest squared W2 of the prior's samples, in latents", needs=("prior",), fixed_zero=("lam",))
+@policy("w2", "the k candidates with the largest `w2_sq`", needs=("prior",), fixed_zero=("lam",))
 def w2(scores: Scores, inputs: SelectionInput) -> list[int]:
     """The k candidates whose samples disagree most in latents."""
     return top(scores.term("w2_sq"), inputs.k)
@@ -154,7 +158,7 @@ def w2(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 @policy(
     "single",
-    "the largest LPIPS between one sample without dropout and the render (ablation)",
+    "the k candidates with the largest `single`: LPIPS between one sample without dropout and the render (an ablation)",
     needs=("prior",),
     fixed_zero=("p_drop", "lam"),
 )
