@@ -15,8 +15,7 @@ from scipy.ndimage import gaussian_filter
 
 from dav_gswt.photos.synthetic import mitsuba_scene  # sets mitsuba's variant
 from dav_gswt.terrain.heights import HeightField, HeightMap, Hills, surface_from_config
-from dav_gswt.terrain.light import Light, place_light
-from dav_gswt.terrain.sun import LUMINANCE, Sun, level_light, measure_light
+from dav_gswt.terrain.light import LUMINANCE, Light, Sun, level_light, measure_light, place_light
 
 SIDE, WIDE = 64, 4  # tile sides of the picture, and points of the mesh (pixels) a tile side
 ALBEDO, SAMPLES = 0.3, 64

@@ -17,8 +17,7 @@ from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground, read_ground
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.pose_maps import PoseMaps
-from dav_gswt.views.scores import Scores
+from dav_gswt.views.scores import PoseMaps, Scores
 from dav_gswt.views.scoring import PHOTO_WIDTH, ground_mask, scoring_camera
 from dav_gswt.views.uncertainty import combine_terms
 from dav_gswt_study.calibration import agreement

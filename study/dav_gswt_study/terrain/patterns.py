@@ -24,7 +24,7 @@ from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
 from dav_gswt.images import image_files
-from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import Levels
 from dav_gswt.reconstruction import top_view
 from dav_gswt.terrain import stills, visibility
 from dav_gswt.terrain.endless import EndlessTerrain

@@ -5,7 +5,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter
 
-from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import Levels
 from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
 

@@ -10,7 +10,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.prior import conditions
-from dav_gswt.views import coverage, pose_maps, scores, scoring
+from dav_gswt.views import coverage, scores, scoring
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import FrozenScales
 from dav_gswt.views.scoring import backproject_maps
@@ -143,11 +143,11 @@ def test_a_prior_is_not_shown_what_no_photo_shows():
 
 def test_maps_are_read_as_written(tmp_path):
     found = scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2))
-    pose_maps.write_pose_maps(tmp_path / "maps.npz", found.maps, found.gaussians)
-    back, gaussians = pose_maps.read_pose_maps(tmp_path / "maps.npz")
+    scores.write_pose_maps(tmp_path / "maps.npz", found.maps, found.gaussians)
+    back, gaussians = scores.read_pose_maps(tmp_path / "maps.npz")
     (tmp_path / "broken.npz").write_bytes(b"PK nothing of the kind")
     with pytest.raises(InputError, match="broken.npz: not readable as maps"):
-        pose_maps.read_pose_maps(tmp_path / "broken.npz")
+        scores.read_pose_maps(tmp_path / "broken.npz")
     assert back.names == ["p0", "p1", "p2"] and np.array_equal(gaussians, found.gaussians)
     assert np.array_equal(back.w2_sq, found.maps.w2_sq)
     np.testing.assert_allclose(back.opacity, found.maps.opacity, atol=1e-3)

@@ -17,7 +17,7 @@ from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.field import GaussianField, read_field, write_field
 from dav_gswt.geometry.cameras import Camera, pinhole
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import Levels
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.coarse import Reconstruction
 from dav_gswt.terrain.endless import EndlessTerrain

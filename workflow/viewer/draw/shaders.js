@@ -11,7 +11,7 @@ import { OBJECTS, OVERLAYS } from "./overlays.js";
 import { WIND } from "./wind.js";
 
 const AIR = 0.12; // height at which the sky of a planet is 1/e as bright, in radii
-/** Distance that leaves 1/e of the far ground's colour, over the distance of the last tiles; see terrain/far_ground.py. */
+/** Distance that leaves 1/e of the far ground's colour, over the distance of the last tiles; see terrain/backdrop.py. */
 export const FAR_HAZE = 2.5;
 const FAR_SPACING = 0.0525; // of its points, over their distance
 const UNCERTAINTY = OVERLAYS.indexOf("uncertainty");

@@ -90,5 +90,5 @@ export function createFraying({ cells }, side, salt) {
   };
 }
 
-/** The columns of all faces beside each other, as dav_gswt/terrain/sphere.py. @param {{ cells: number }} sphere @param {number} face @param {number} i */
+/** The columns of all faces beside each other, as dav_gswt/terrain/planet.py. @param {{ cells: number }} sphere @param {number} face @param {number} i */
 export const columnOf = ({ cells }, face, i) => face * (cells + 2) + i + 1;

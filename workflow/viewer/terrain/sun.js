@@ -1,6 +1,6 @@
 // The sun and the clear sky: their light in three bands, and the sun's path over a day. Angles are in degrees: elevation
 // above the horizon, azimuth clockwise from the terrain's +y; `north` is the azimuth of +y, clockwise from true north.
-// The same numbers as dav_gswt/terrain/sun.py; tests/golden/light.json holds both to it.
+// The same numbers as dav_gswt/terrain/light.py; tests/golden/light.json holds both to it.
 
 const RAYLEIGH = [0.0496, 0.0987, 0.2267]; // optical depths of air at 0.65, 0.55 and 0.45 micrometres
 const AEROSOL = [0.0805, 0.1, 0.1298]; // of clear, dry haze

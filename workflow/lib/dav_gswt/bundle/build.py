@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dav_gswt.bundle import direction_search, level_distances, manifest, parts, recipes
+from dav_gswt.bundle import level_distances, manifest, orders, parts, recipes
 from dav_gswt.bundle.blocks import Block, pack_block
 from dav_gswt.bundle.content import BundleContent, compute_ground_colour
 from dav_gswt.bundle.encoding import Encoding
@@ -79,7 +79,7 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
     uncertainties = [u for same in content.tiles for u in np.clip(same.uncertainty, 0, 1).tolist()]
     # the materials in turn: of what errors are measured on each has its share
     in_turn = [each for same in zip(*(own.fields[0] for own in content.tiles), strict=True) for each in same]
-    rings = direction_search.search_directions(in_turn, content.side)
+    rings = orders.search_directions(in_turn, content.side)
     table = level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band)
     objects = list(zip(*(content.object_fields(level) for level in range(content.levels)), strict=True))
     encoding, composition = _fit_grid(content, [field for fields in (*tiles, *objects) for field in fields])

@@ -1,20 +1,22 @@
-"""The files of photos: what their EXIF says (focal length, position, time), and names for the pictures made of them."""
+"""The files of photos: what EXIF says (focal length, place, time, sun), and names of the pictures made of them."""
 
 import logging
 import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from pathlib import Path, PurePosixPath
+from typing import get_args
 
 import exifread
 import numpy as np
 from exifread.utils import Ratio
 
-from dav_gswt.geometry.sun import Clock
+from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.geometry.sun import LOWEST, CapturedSun, Clock, locate_sun
 from dav_gswt.images import image_files
 from dav_gswt.images.camera_formats import read_heif_exif
 from dav_gswt.images.file_kinds import HEIF_SUFFIXES, RAW_SUFFIXES, SUFFIXES, detect_kind
@@ -29,6 +31,7 @@ YEARS = range(1990, 2101)  # in which photos are taken: cameras whose clock was 
 UNSAFE = re.compile(
     r"[\s#{}<>]+"
 )  # COLMAP's lists end a name at a blank and skip lines with #; Snakemake has {} and <>
+_log = logging.getLogger(__name__)
 
 
 def read_focal_length(path: Path | str) -> float | None:
@@ -189,3 +192,28 @@ def name_pictures(names: Sequence[str]) -> list[str]:
         used.add(free)
         out.append(f"{free}.png")
     return out
+
+
+def find_sun(paths: Iterable[Path], place: Georeference) -> CapturedSun | None:
+    """Find the sun at the median time of the photos. If it is not known, return None and log the reason.
+
+    If the photos know their times in different ways (`Clock`), only the most frequent way is used, and among equally
+    frequent ones the most reliable.
+    """
+    times = [time for path in paths if (time := read_utc_time(path, place.longitude))]
+    if not times:
+        _log.info("light: no photo says when it was taken: the sun is not known")
+        return None
+    counts = Counter(time.clock for time in times)
+    clock: Clock = max(get_args(Clock), key=lambda each: counts[each])
+    times = sorted((time for time in times if time.clock == clock), key=lambda time: time.utc)
+    middle = times[len(times) // 2]
+    hours = (times[-1].utc - times[0].utc).total_seconds() / 3600
+    elevation, azimuth = locate_sun(middle.utc, place.latitude, place.longitude)
+    stamp = f"{middle.utc:%Y-%m-%dT%H:%M:%SZ}"
+    if elevation < LOWEST:
+        _log.warning("light: at %s the sun stood %.0f degrees high: it is not known where it stood", stamp, elevation)
+        return None
+    sun = CapturedSun(round(elevation, 2), round(azimuth, 2) % 360, stamp, clock, middle.zone, round(hours, 2))
+    _log.info("light: %s", sun.describe())
+    return sun

@@ -18,13 +18,13 @@ from dav_gswt.geometry.scene_frame import LeftOutPhoto, SceneFrame, write_scene_
 from dav_gswt.images import image_files
 from dav_gswt.images.file_kinds import detect_kind
 from dav_gswt.logs import progress
-from dav_gswt.photos.captured_sun import find_sun
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model, splat
 from dav_gswt.photos.importers.splat_files import read_splat
 from dav_gswt.photos.lenses import Lens, pinhole_parameters, write_lenses
 from dav_gswt.photos.masks import PhotoMasks, find_borders, read_picture
+from dav_gswt.photos.photo_files import find_sun
 from dav_gswt.photos.photo_listing import Source, list_photos
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos
 from dav_gswt.threads import map_ahead

@@ -18,8 +18,7 @@ from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import Sphere
 from dav_gswt.terrain.light import Light, light_of, place_light
 from dav_gswt.terrain.placement import group_by_cell, place_cell
-from dav_gswt.terrain.planet import place_on_sphere, visible_on_sphere
-from dav_gswt.terrain.sphere import frame_at, walk_from
+from dav_gswt.terrain.planet import frame_at, place_on_sphere, visible_on_sphere, walk_from
 from dav_gswt.threads import default_threads
 
 MAX_GAUSSIANS = 10_000_000  # in one picture

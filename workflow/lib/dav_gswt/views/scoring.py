@@ -20,9 +20,8 @@ from dav_gswt.reconstruction.top_view import render_top_view
 from dav_gswt.views import prior_sampling
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.coverage import GroundCells
-from dav_gswt.views.pose_maps import PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
-from dav_gswt.views.scores import FrozenScales, Scores
+from dav_gswt.views.scores import FrozenScales, PoseMaps, Scores
 from dav_gswt.views.terms import Renders, compute_terms
 from dav_gswt.views.uncertainty import Quantiles, Scales, normalise, require_finite
 
