@@ -18,8 +18,7 @@ from dav_gswt.bundle.land_cover import WaveEntry
 from dav_gswt.lod.store import material_folder, write_levels
 from dav_gswt.terrain import endless
 from dav_gswt.terrain.fit_cover import gather_content
-from dav_gswt.terrain.fit_variation import fit_variation
-from dav_gswt.terrain.variation import Variation
+from dav_gswt.terrain.variation import Variation, fit_variation
 from dav_gswt.tiles import build
 from dav_gswt.tiles import store as tile_store
 from dav_gswt.tiles.semantics import SemanticSource

@@ -12,9 +12,9 @@ from record import read_installed_lpips, report_figures
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import lpips
-from dav_gswt.prior import conditions
-from dav_gswt.views import prior_sampling, uncertainty
-from dav_gswt.views.prior_sampling import PriorConfig
+from dav_gswt.prior import interface
+from dav_gswt.views import scoring, uncertainty
+from dav_gswt.views.scoring import PriorConfig
 
 REPEATS = 7
 TOP = 20  # poses whose order matters: as many as a round may take
@@ -71,8 +71,8 @@ def pools() -> dict[str, float]:
     photos = examples.take_photos(made, rng)
     field = examples.fit_field(made, photos, rng)
     given = read_installed_lpips()
-    model = prior_sampling.load_prior({"model": "terrain"})
-    known = conditions.prepare_photos(photos, made.frame, model.size)
+    model = scoring.load_prior({"model": "terrain"})
+    known = interface.prepare_photos(photos, made.frame, model.size)
 
     def scored(count: int, samples: int = 5, steps: int = 8, seed: int = 0):
         places = camera_layouts.hemisphere(count, 30.0, FLYING_HEIGHT)
@@ -81,10 +81,10 @@ def pools() -> dict[str, float]:
         ]
         pool = [(pose_of_camera(f"pose_{i:04d}", c, made.frame), c) for i, c in enumerate(cameras)]
         start = time.perf_counter()
-        told = conditions.build_condition(field, pool, known, FLYING_HEIGHT, model.size)
+        told = interface.build_condition(field, pool, known, FLYING_HEIGHT, model.size)
         ask = PriorConfig(model, samples, steps, 0.15, seed, given)
         everywhere = np.ones((count, model.size, model.size), np.float32)
-        terms = prior_sampling.sample_terms(ask, told, [pose.name for pose, _ in pool], everywhere)
+        terms = scoring.sample_terms(ask, told, [pose.name for pose, _ in pool], everywhere)
         scales = uncertainty.Scales.from_terms({name: terms[name] for name in ("w2_sq", "lpips")})
         return time.perf_counter() - start, uncertainty.combine_terms(terms["w2_sq"], terms["lpips"], 0.1, scales)
 

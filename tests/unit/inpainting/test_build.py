@@ -11,7 +11,7 @@ from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.inpainting import build
 from dav_gswt.reconstruction import discs
 from dav_gswt.views import scores
-from dav_gswt.views.prior_sampling import PriorConfig
+from dav_gswt.views.scoring import PriorConfig
 
 MIDDLE = [1.6, 1.6, 0.0]
 FIRST = 20  # column of the first unseen cell

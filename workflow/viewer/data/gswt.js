@@ -1,5 +1,5 @@
 // A gswt.zip: tiles as PLY files for the public GSWT renderer, converted to a bundle of plain records. It holds no
-// distances or surface; these are computed as dav_gswt/bundle/level_distances.py does.
+// distances or surface; these are computed as dav_gswt/bundle/manifest.py does.
 
 import { PageError, REMAKE_SET } from "./checks.js";
 import { MAX_LEVELS, RECORD, VERSION } from "./layout.js";

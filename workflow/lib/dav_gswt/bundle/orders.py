@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float, Float32, UInt32
 from numpy import ndarray as Array
 
-from dav_gswt.bundle import level_distances
+from dav_gswt.bundle import manifest
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
@@ -114,7 +114,7 @@ def measure_psnr(
     The views lie evenly around at an elevation in degrees below the horizon. halfway: half-way between two azimuths,
     where an order is worst; otherwise along an azimuth. Infinite: no difference.
     """
-    pixel = side / level_distances.FOCAL  # of the reference picture a tile's side away: nearer tiles are sorted exactly
+    pixel = side / manifest.FOCAL  # of the reference picture a tile's side away: nearer tiles are sorted exactly
     along, pairs = rings.directions(), []
     for k in range(VIEWS):
         azimuth = 360 / rings.azimuths * (round(rings.azimuths * k / VIEWS) + 0.5) % 360
@@ -187,7 +187,7 @@ def measure_orders(bundle: Bundle) -> dict[str, float | int | None]:
 def _measure_error(bundle: Bundle, fields: list) -> float | None:
     """PSNR of every tile, seen once at each elevation, in the order of the nearest of its directions."""
     tiles, side, pairs = bundle.manifest.tiles, bundle.manifest.tile_side, []
-    along, pixel = np.array(bundle.manifest.directions), side / level_distances.FOCAL
+    along, pixel = np.array(bundle.manifest.directions), side / manifest.FOCAL
     for number, down in enumerate(ELEVATIONS.values()):
         # azimuths in the golden angle: of all directions each tile meets others
         azimuths = (np.arange(len(tiles)) + number * len(tiles)) * np.pi * (3 - 5**0.5)

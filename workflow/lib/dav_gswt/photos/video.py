@@ -28,7 +28,7 @@ from dav_gswt.files import atomic_folder
 from dav_gswt.images import image_files
 from dav_gswt.images.srgb import Curve, convert_hdr
 from dav_gswt.logs import progress
-from dav_gswt.photos.sharpness import find_threshold
+from dav_gswt.photos.photo_files import find_threshold
 
 _log = logging.getLogger(__name__)
 
