@@ -35,7 +35,7 @@ def filter_attainable(
         return candidates
     if keep_reachable := REACHABLE.get(scene["agent"]):
         candidates = keep_reachable(scene, frame, candidates)
-    return candidates.filter_feasible(candidates, field, grid, frame.flying_height)
+    return pools.filter_feasible(candidates, field, grid, frame.flying_height)
 
 
 def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[Pose], folder: Path) -> None:

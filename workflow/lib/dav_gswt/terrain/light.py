@@ -5,7 +5,7 @@ another sun, is multiplied by the ratio of its own light to that light, in linea
 surface stays as it was photographed: ripples, and the shading of objects, which are lit like the ground below them.
 
 Elevations are in degrees above the horizon, azimuths in degrees clockwise from the terrain's +y. `north` is the azimuth
-of +y itself, clockwise from true north. The viewer's `terrain/light.js`, `terrain/sun.js` and its shader compute the
+of +y itself, clockwise from true north. The viewer's `terrain/light.js` and its shader compute the
 same; tests/golden/light.json holds all to it.
 """
 

@@ -220,7 +220,7 @@ def render_view(
     things = group_by_cell(terrain, cells, eye)
     backdrop = Backdrop.for_eye(terrain, eye, sky, ground_colour)
 
-    def project(k: int) -> Splats:
+    def project_cell(k: int) -> Splats:
         if sphere:
             field, slope = place_on_sphere(terrain, sphere, cells[k : k + 1], eye)
         else:
@@ -229,7 +229,7 @@ def render_view(
 
     far, close = [EMPTY], [EMPTY]
     with ThreadPoolExecutor(default_threads()) as pool:  # NumPy works beside itself; each cell is on its own
-        for k, part in enumerate(pool.map(project, range(len(cells)))):
+        for k, part in enumerate(pool.map(project_cell, range(len(cells)))):
             (close if exact or cells.close[k] else far).append(part)
     last = Splats.concatenate(close)
     seen = blend(Splats.concatenate([*far, last[depth_order(last)]]), here)

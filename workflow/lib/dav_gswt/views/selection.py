@@ -18,7 +18,7 @@ from dav_gswt.reconstruction import ground
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.coverage import ERROR_WIDTH, DirectionalCoverage, GroundCells, measure_cell_errors
 from dav_gswt.views.policies import NEEDS_FIELD, NEEDS_PHOTOS, POLICIES, PRIOR_POLICIES, SelectionInput
-from dav_gswt.views.scores import Scores, read_pose_maps
+from dav_gswt.views.scores import Scores, apply_uncertainty, read_pose_maps
 from dav_gswt.views.scoring import scoring_camera
 
 _log = logging.getLogger(__name__)
@@ -80,7 +80,7 @@ def _measure_importance(
         return measure_cell_errors(cells, views, corrected)
     if policy in PRIOR_POLICIES:
         gaussians = read_pose_maps(files["maps"])[1]
-        return cells.average(scores.apply_uncertainty(cells.field, gaussians).uncertainty)
+        return cells.average(apply_uncertainty(cells.field, gaussians).uncertainty)
     return None
 
 
