@@ -6,6 +6,9 @@
 //
 // In a set that does not fit into the chunk cache, a second factor limits the chunks that a view needs to a part of the
 // cache. Both factors then depend on the camera alone, not on what is at hand: at rest each chunk is composed once.
+//
+// And placement of objects: which are drawn with which cell, at which levels and in which order, as in
+// dav_gswt/terrain/placement.py.
 
 import { RING } from "./caches.js";
 import { REACH } from "./cells.js";
@@ -15,6 +18,7 @@ import { findReach } from "./sphere_cells.js";
 
 /**
  * @typedef {import("./frustum.js").Cell} Cell
+ * @typedef {import("./scatter.js").Thing} Thing
  * @typedef {import("./camera.js").Camera} Camera
  * @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables
  *
@@ -252,11 +256,6 @@ function nearestCells(cells, budget, reach) {
   const chosen = new Set(nearestFirst.slice(0, kept));
   return { cells: cells.filter((cell) => chosen.has(cell)), count, reach: nearestFirst[kept]?.nearest ?? reach };
 }
-
-/**
- * @typedef {import("./scatter.js").Thing} Thing
- * @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables
- */
 
 /**
  * The objects in view of cells, by the index of the cell that each is drawn with, by falling distance; null: none.

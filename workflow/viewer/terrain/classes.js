@@ -109,11 +109,9 @@ function mostLead(lattice, materials, square, m, o) {
  *
  * @typedef {import("./heights.js").HeightField} HeightField
  *
- * @typedef {Lattice} Lattice
  * @typedef {ReturnType<typeof createClasses>} Classes
  */
 
-export { LATTICE };
 export const MAX_MATERIALS = 8;
 const NOISE = 16; // axis of the hash: octave k of material m uses NOISE + MAX_OCTAVES m + k
 const TURN = [0.8, 0.6]; // cosine and sine by which each octave is turned against the last

@@ -6,7 +6,6 @@
 // The same numbers as dav_gswt/terrain/light.py; tests/golden/light.json holds both to it.
 
 /**
- * @typedef {Sun} Sun
  * @typedef {import("./heights.js").HeightField} HeightField
  *
  * margins: tangent of the sun's elevation minus the tangent of the horizon's, rows from the south; first: world

@@ -1,5 +1,5 @@
 // Tiles on the faces of a sphere, and the frayed edges where two faces meet turned.
-// The same as dav_gswt/terrain/sphere_edges.py, which explains it; tests/golden/sphere.json holds both to it.
+// The same as dav_gswt/terrain/planet.py, which explains it; tests/golden/sphere.json holds both to it.
 
 import { tileAt } from "./choice.js";
 import { createNoise, SHIFT } from "./heights.js";
