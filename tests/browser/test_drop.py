@@ -25,7 +25,7 @@ READ = """async text => {
   // what the page says against a zip: null if all of it is read
   const { openSource, readParts } = await import("./data/bundle.js");
   const { PageError } = await import("./data/checks.js");
-  const { createComposer } = await import("./data/compose.js"), { run } = await import("./terrain/steps.js");
+  const { createComposer } = await import("./data/compose.js"), { run } = await import("./terrain/draw_order.js");
   const { readTerrain } = await import("./scene/open_terrain.js");
   const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
   try {
@@ -331,7 +331,7 @@ def test_the_page_rounds_a_set_as_the_library_does(modules):
     lists = [[bytes_of(f), *(v.ravel().tolist() for v in (f.means, f.log_scales, f.quats))] for f in fields]
     told, found = modules.evaluate(
         """async sets => {
-          const { fitEncoding, writeRecords } = await import("./data/quantize.js");
+          const { fitEncoding, writeRecords } = await import("./data/gswt.js");
           const made = sets.map(([paint, ...rest]) => {
             const [centres, logScales, turns] = rest.map(list => new Float32Array(list));
             return { count: paint.length / 4, paint: new Uint8Array(paint), centres, logScales, turns };

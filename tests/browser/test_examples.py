@@ -19,7 +19,7 @@ from PIL import Image
 
 from dav_gswt.bundle import store
 from dav_gswt.bundle.manifest import Manifest, Sky
-from dav_gswt.config.exports import Export
+from dav_gswt.config.settings import Export
 from dav_gswt.export import ground_files, terrain_files
 from dav_gswt.export.axes import Y_DOWN, turn_field
 from dav_gswt.field import read_field

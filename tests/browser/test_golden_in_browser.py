@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from fixtures.shader_functions import OPEN_SHADER
 
-from dav_gswt.terrain import sphere
+from dav_gswt.terrain import planet
 
 FOLDER = Path(__file__).parents[1] / "golden"
 
@@ -280,7 +280,7 @@ def test_a_walk_over_a_planet_is_that_of_the_library(modules):
         walks,
     )
     for (place, east, north), there in zip(walks, found, strict=True):
-        frame = sphere.walk_from(sphere.frame_at(place["x"], place["y"]), np.array([east, north]), 1.5)
+        frame = planet.walk_from(planet.frame_at(place["x"], place["y"]), np.array([east, north]), 1.5)
         np.testing.assert_allclose(there["frame"][2], frame[2], atol=1e-12)
         looks = [
             np.cos(np.radians(yaw)) * axes[0] + np.sin(np.radians(yaw)) * axes[1]

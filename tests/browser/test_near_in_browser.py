@@ -5,7 +5,7 @@ import pytest
 
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry import cameras
-from dav_gswt.terrain import splats
+from dav_gswt.terrain import stills
 from dav_gswt.terrain.heights import displace_means, surface_from_config
 
 SIDE, COUNT, NEAR = 4.0, 1000, 0.05
@@ -76,7 +76,7 @@ def test_whatever_may_show_is_sorted(modules, field, rng, entry):
     shown = kept = 0
     for (eye, camera), found in zip(views, sorted_, strict=True):
         placed, slope = displace_means(field, surface, np.zeros(3), eye)
-        _, which = splats.project(placed, slope, camera, NEAR)
+        _, which = stills.project(placed, slope, camera, NEAR)
         assert set(which.tolist()) <= set(found)
         depth = placed.means @ camera.rotation[2]
         assert (np.diff(depth[found]) <= 1e-4).all(), "back to front"

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dav_gswt.bundle import blocks
-from dav_gswt.bundle.blocks import PLANES, Block, pack_block, unpack_block
+from dav_gswt.bundle import parts
+from dav_gswt.bundle.parts import PLANES, Block, pack_block, unpack_block
 
 ENDS = {np.uint8: (0, 255), np.uint16: (0, 1, 32767, 32768, 65534, 65535), np.int16: (-32768, -1, 0, 1, 32767)}
 
@@ -68,13 +68,13 @@ def test_a_part_of_a_splat_is_no_block(size):
 
 def test_zigzag_counts_small_numbers_of_both_signs_first():
     signed = np.array([0, -1, 1, -2, 2, 32767, -32768], np.int16).view(np.uint16)
-    assert blocks.zigzag(signed).tolist() == [0, 1, 2, 3, 4, 65534, 65535]
+    assert parts.zigzag(signed).tolist() == [0, 1, 2, 3, 4, 65534, 65535]
     every = np.arange(65536).astype(np.uint16)
-    np.testing.assert_array_equal(blocks.unzigzag(blocks.zigzag(every)), every)
-    assert len(np.unique(blocks.zigzag(every))) == 65536
+    np.testing.assert_array_equal(parts.unzigzag(parts.zigzag(every)), every)
+    assert len(np.unique(parts.zigzag(every))) == 65536
 
 
 def test_differences_run_over_the_end_of_the_range():
     values = np.array([65535, 0, 65535, 32768], np.uint16)
-    assert blocks.pack_differences(values).tolist() == [1, 2, 1, 65533]
-    np.testing.assert_array_equal(blocks.unpack_differences(blocks.pack_differences(values)), values)
+    assert parts.pack_differences(values).tolist() == [1, 2, 1, 65533]
+    np.testing.assert_array_equal(parts.unpack_differences(parts.pack_differences(values)), values)

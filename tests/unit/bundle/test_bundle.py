@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from fixtures.tile_sets import report_of
 
-from dav_gswt.bundle import build, level_distances, manifest, store
-from dav_gswt.bundle.blocks import unpack_block
+from dav_gswt.bundle import build, manifest, store
 from dav_gswt.bundle.content import BundleContent
-from dav_gswt.bundle.parts import read_part
+from dav_gswt.bundle.parts import read_part, unpack_block
 from dav_gswt.bundle.recipes import coarsen_rotation
 from dav_gswt.errors import InputError
 from dav_gswt.export import gswt
@@ -56,25 +55,25 @@ def bundle(tiles, tmp_path_factory):
 
 def test_a_level_ends_where_the_next_one_has_its_size_in_pixels():
     # f = 960 / tan 30 degrees = 1662.77 px: 0.3 units cover 2 px at 249.4 units
-    table = level_distances.compute_levels([0.1, 0.3], pixels=2.0, band=0.1)
+    table = manifest.compute_levels([0.1, 0.3], pixels=2.0, band=0.1)
     assert table[0].distance == pytest.approx(249.415, abs=1e-3)
     assert table[0].band == pytest.approx(24.9415, abs=1e-4)
     assert table[1].distance is None
     # a scene in other units is the same scene
-    assert level_distances.compute_levels([1.0, 3.0], 2.0, 0.1)[0].distance == pytest.approx(10 * table[0].distance)
+    assert manifest.compute_levels([1.0, 3.0], 2.0, 0.1)[0].distance == pytest.approx(10 * table[0].distance)
     with pytest.raises(InputError, match="level 1"):
-        level_distances.compute_levels([0.1, 0.1], 1.0, 0.1)
+        manifest.compute_levels([0.1, 0.1], 1.0, 0.1)
 
 
 def test_eye_floor_shows_the_nearest_disc_at_the_size_asked_for():
-    height = level_distances.compute_eye_floor(spacing=0.01, pixels=8.0)
+    height = manifest.compute_eye_floor(spacing=0.01, pixels=8.0)
     v = np.arctan(9 / 16 * np.tan(np.radians(30)))  # half of the picture's height
     ray = height / np.sin(np.radians(30) + v)  # to the ground at the picture's lower edge
     assert 0.01 * 1662.768775 / (ray * np.cos(v)) == pytest.approx(8.0)
     assert (
-        level_distances.compute_eye_floor(0.02, 8.0)
+        manifest.compute_eye_floor(0.02, 8.0)
         == pytest.approx(2 * height)
-        == pytest.approx(level_distances.compute_eye_floor(0.01, 4.0))
+        == pytest.approx(manifest.compute_eye_floor(0.01, 4.0))
     )
 
 

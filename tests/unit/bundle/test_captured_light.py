@@ -10,7 +10,7 @@ from fixtures.frames import scene_frame
 from fixtures.land_covers import cover_content
 
 from dav_gswt.bundle import build
-from dav_gswt.bundle.captured_light import find_light
+from dav_gswt.bundle.content import find_light
 from dav_gswt.bundle.land_cover import LightEntry
 from dav_gswt.bundle.manifest import Manifest, read_manifest
 from dav_gswt.errors import InputError

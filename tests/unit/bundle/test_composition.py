@@ -11,8 +11,7 @@ import pytest
 from fixtures.compositions import CELL, EXEMPLARS, LEVELS, SIDE, Composed
 
 from dav_gswt.bundle import manifest, store
-from dav_gswt.bundle.blocks import unpack_block
-from dav_gswt.bundle.parts import read_part
+from dav_gswt.bundle.parts import read_part, unpack_block
 from dav_gswt.bundle.recipes import coarsen_correction, coarsen_rotation
 from dav_gswt.errors import InputError
 from dav_gswt.tiles.compose import coarsen_labels

@@ -5,8 +5,7 @@ import pytest
 from fixtures.land_covers import TILES, cover_content
 
 from dav_gswt.bundle import build, manifest, store
-from dav_gswt.bundle.blocks import unpack_block
-from dav_gswt.bundle.parts import read_part
+from dav_gswt.bundle.parts import read_part, unpack_block
 from dav_gswt.errors import InputError
 
 

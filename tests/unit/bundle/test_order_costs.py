@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 from fixtures import bundles
 
-from dav_gswt.bundle import order_costs, store
+from dav_gswt.bundle import orders as costs
+from dav_gswt.bundle import store
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +22,7 @@ def with_orders(bundle, orders):
 
 
 def test_orders_are_counted_and_more_of_them_lose_less(bundle):
-    few, many = (order_costs.measure_orders(with_orders(bundle, orders)) for orders in ([8], list(range(9))))
+    few, many = (costs.measure_orders(with_orders(bundle, orders)) for orders in ([8], list(range(9))))
     assert (few["orders"], many["orders"]) == (16 * 2, 9 * 16 * 2)
     # 64 and 16 discs, 20 things at both levels, 4 bytes each
     assert few["order_mb"] == pytest.approx(4 * 16 * (64 + 16 + 40) / 1e6)

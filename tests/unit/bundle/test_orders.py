@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dav_gswt.bundle import direction_search, orders
+from dav_gswt.bundle import orders
 from dav_gswt.bundle.orders import DirectionRings
 from dav_gswt.field import GaussianField, rgb_to_sh
 
@@ -59,18 +59,18 @@ def test_orders_are_permutations_by_falling_depth(seed, count, size):
 
 
 def test_one_colour_needs_the_fewest_directions():
-    rings = direction_search.search_directions([ground(0, colours=0.0)], SIDE, 40.0)
-    assert rings == DirectionRings((20.0,), 2 * direction_search.MIN_AZIMUTHS)
+    rings = orders.search_directions([ground(0, colours=0.0)], SIDE, 40.0)
+    assert rings == DirectionRings((20.0,), 2 * orders.MIN_AZIMUTHS)
 
 
 def test_directions_are_added_until_the_error_is_small_or_the_room_is_full(monkeypatch):
-    monkeypatch.setattr(direction_search, "VIEWS", 2)
+    monkeypatch.setattr(orders, "VIEWS", 2)
     fields = [ground(seed, stones=150) for seed in range(2)]
-    few, many = (direction_search.search_directions(fields, SIDE, wanted) for wanted in (15.0, 60.0))
+    few, many = (orders.search_directions(fields, SIDE, wanted) for wanted in (15.0, 60.0))
     first, last = (len(rings.select_directions(0.0, 1.0)) for rings in (few, many))
-    assert first < last <= direction_search.MAX_ORDERS
+    assert first < last <= orders.MAX_ORDERS
     good, bad = (
-        min(direction_search.measure_psnr(fields, SIDE, kept, down) for down in direction_search.ELEVATIONS.values())
+        min(orders.measure_psnr(fields, SIDE, kept, down) for down in orders.ELEVATIONS.values())
         for kept in (DirectionRings(rings.elevations, rings.azimuths // 2) for rings in (few, many))
     )
     assert good >= 15.0

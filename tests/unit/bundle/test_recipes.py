@@ -8,9 +8,8 @@ import pytest
 from fixtures import tile_sets
 
 from dav_gswt.bundle import build, store
-from dav_gswt.bundle.blocks import Block
 from dav_gswt.bundle.content import BundleContent
-from dav_gswt.bundle.parts import LEVEL, RECIPES, read_part
+from dav_gswt.bundle.parts import LEVEL, RECIPES, Block, read_part
 from dav_gswt.bundle.recipes import GROUND, UNDERLAY, Layer, TileRecipe, compose_records, unpack_level, unpack_recipes
 from dav_gswt.field import concatenate_fields
 from dav_gswt.reconstruction import discs

@@ -8,7 +8,7 @@ from fixtures.land_covers import cover_content, write_cover_bundle
 
 from dav_gswt.bundle import store
 from dav_gswt.cli import main
-from dav_gswt.config.exports import Export
+from dav_gswt.config.settings import Export
 from dav_gswt.export import terrain_files
 from dav_gswt.terrain import endless
 from dav_gswt.terrain.heights import Hills, make_sphere

@@ -12,7 +12,7 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial import ConvexHull
 
 from dav_gswt.errors import InputError
-from dav_gswt.export import ground_files, ground_surface
+from dav_gswt.export import ground_files
 from dav_gswt.export.axes import Y_UP
 from dav_gswt.export.height_mesh import simplify_heights
 from dav_gswt.export.terrain_files import find_origin
@@ -40,7 +40,7 @@ def sets():
 
 @pytest.fixture(scope="module")
 def surface(cover_terrain, sets):
-    return ground_surface.collect_surface(cover_terrain, ground_surface.measure_tiles(sets), AREA)
+    return ground_files.collect_surface(cover_terrain, ground_files.measure_tiles(sets), AREA)
 
 
 @pytest.fixture(scope="module")
@@ -86,26 +86,26 @@ def test_heights_are_those_that_a_camera_above_sees(cover_terrain, surface):
 
 
 def test_the_ground_layer_alone_is_taken_and_blades_where_there_is_none(sets):
-    ground = ground_surface.measure_tiles(sets).heights
+    ground = ground_files.measure_tiles(sets).heights
     assert np.abs(ground).max() < 1e-3 and ground.shape == (32, 17, 17)
     plain = [replace(sets[1], fields=[[replace(f, ground=np.zeros(len(f), bool)) for f in sets[1].fields[0]]])]
-    assert ground_surface.measure_tiles(plain).heights.max() > 0.05
+    assert ground_files.measure_tiles(plain).heights.max() > 0.05
 
 
 def test_at_a_border_the_neighbour_is_seen_too(sets):
     """A ridge along the western border of every tile is there at the eastern one, which its neighbour's covers."""
     ridge = [_lift(field, 0.3 * (field.means[:, 0] < 0.3)) for field in sets[0].fields[0]]
-    heights = ground_surface.measure_tiles([replace(sets[0], fields=[ridge])]).heights
+    heights = ground_files.measure_tiles([replace(sets[0], fields=[ridge])]).heights
     assert heights[:, :, 0].min() > 0.1 and heights[:, :, 8].max() < 0.01
     np.testing.assert_allclose(heights[:, 1:-1, -1], heights[:, 1:-1, 0], atol=0.02)
 
 
 def test_of_several_materials_the_one_that_lies_there_is_taken(cover_terrain, sets):
     raised = [sets[0], replace(sets[1], fields=[[_lift(f, 0.5) for f in level] for level in sets[1].fields])]
-    tiles = ground_surface.measure_tiles(raised)
+    tiles = ground_files.measure_tiles(raised)
     flat = replace(cover_terrain, heights=endless.FlatSurface())
     area = Area(-4, -4, 8, 8)
-    heights = ground_surface.collect_surface(flat, tiles, area).heights
+    heights = ground_files.collect_surface(flat, tiles, area).heights
     low, high = (heights < 0.05).mean(), (heights > 0.45).mean()
     assert low > 0.1 and high > 0.1 and low + high > 0.6  # a blur of one cell lies between
 
@@ -170,7 +170,7 @@ def test_every_object_has_a_closed_hull_that_holds_what_is_drawn(exported, facts
 
 def test_a_hull_reaches_one_deviation_of_what_is_solid():
     ball = gaussians([[1.0, 2, 3], [9, 9, 9]], LEAF, [0.3, 0.2, 0.1])
-    points = ground_surface.find_outermost(replace(ball, opacity_logits=np.float32([4, -4])))
+    points = ground_files.find_outermost(replace(ball, opacity_logits=np.float32([4, -4])))
     np.testing.assert_allclose(np.linalg.norm((points - [1, 2, 3]) / [0.3, 0.2, 0.1], axis=1), 1, rtol=1e-5)
     np.testing.assert_allclose(np.ptp(points, axis=0), [0.6, 0.4, 0.2], atol=0.015)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.images.hdr import convert_hdr
+from dav_gswt.images.srgb import convert_hdr
 
 
 @pytest.mark.parametrize(("curve", "signal"), [("hlg", 0.75), ("pq", 0.58)])

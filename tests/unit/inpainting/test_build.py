@@ -10,8 +10,8 @@ from fixtures import ground as patch
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.inpainting import build
 from dav_gswt.reconstruction import discs
-from dav_gswt.views import pose_maps
-from dav_gswt.views.prior_sampling import PriorConfig
+from dav_gswt.views import scores
+from dav_gswt.views.scoring import PriorConfig
 
 MIDDLE = [1.6, 1.6, 0.0]
 FIRST = 20  # column of the first unseen cell
@@ -181,5 +181,5 @@ def test_no_camera_is_inside_an_object_or_under_the_ground():
 def test_the_maps_of_a_prior_leave_inpainted_gaussians_at_uncertainty_1():
     field = replace(patch.field()[:5], imagined=np.array([False, True, False, False, True]))
     field = replace(field, uncertainty=np.float32([0.1, 1, 0.1, 0.1, 1]))
-    told = pose_maps.apply_uncertainty(field, np.float32([0.3, 0.3, 0.4, 0.5]))
+    told = scores.apply_uncertainty(field, np.float32([0.3, 0.3, 0.4, 0.5]))
     assert told.uncertainty.tolist() == np.float32([0.3, 1, 0.4, 0.5, 1]).tolist()

@@ -9,7 +9,7 @@ from dav_gswt import field as field_module
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.lod import build, merge, store
-from dav_gswt.lod.levels import AUTO, Levels
+from dav_gswt.lod.store import AUTO, Levels
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.discs import find_underlay
 from dav_gswt.reconstruction.objects import make_blobs

@@ -7,7 +7,7 @@ from fixtures import mixed_ground as made
 from dav_gswt.errors import InputError
 from dav_gswt.field import concatenate_fields
 from dav_gswt.materials import build, extraction, store
-from dav_gswt.materials.filling import CellSources
+from dav_gswt.materials.extraction import CellSources
 from dav_gswt.materials.objects import Footprint
 from dav_gswt.reconstruction import discs, top_view
 from dav_gswt.reconstruction.objects import make_blobs

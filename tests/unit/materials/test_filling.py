@@ -1,6 +1,6 @@
 import numpy as np
 
-from dav_gswt.materials.filling import fill_cells, find_places
+from dav_gswt.materials.extraction import fill_cells, find_places
 from dav_gswt.tiles import energy
 
 

@@ -5,7 +5,7 @@ import OpenImageIO as oiio
 import pytest
 
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.photos.captured_sun import find_sun
+from dav_gswt.photos.photo_files import find_sun
 
 GOLDEN = Georeference(39.742476, -105.1786, 1830.0, 0.0, metres_per_unit=1.0)  # of test_sun, at 19:30:30 UTC
 SUN = pytest.approx((39.87, 194.34), abs=0.02)

@@ -8,9 +8,8 @@ from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos.masks import MARGIN, PhotoMasks, find_borders, read_picture
 from dav_gswt.photos.photo_listing import list_photos
-from dav_gswt.photos.photo_set import prepare_photos, write_photo_folder
+from dav_gswt.photos.photo_set import MARGIN, PhotoMasks, find_borders, prepare_photos, read_picture, write_photo_folder
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions
 from dav_gswt.photos.training_views import read_training_view
 

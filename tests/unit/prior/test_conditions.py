@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.geometry.cameras import pinhole
-from dav_gswt.prior.conditions import crop_camera, crop_image
+from dav_gswt.prior.interface import crop_camera, crop_image
 
 
 @pytest.mark.parametrize("width, height", [(16, 10), (10, 17), (12, 12)])

@@ -5,7 +5,7 @@ import pytest
 from fixtures.terrains import SKY, walking
 
 from dav_gswt.terrain import stills
-from dav_gswt.terrain.far_ground import HAZE, SPACING, FarColours, FarGround
+from dav_gswt.terrain.backdrop import HAZE, SPACING, FarColours, FarGround
 from dav_gswt.terrain.heights import HeightMap, Hills
 
 GROUND, HORIZON = np.float32([0.2, 0.5, 0.3]), np.float32([0.9, 0.8, 0.7])

@@ -14,8 +14,19 @@ from dav_gswt.bundle.manifest import Sky
 from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.finite import Area, list_cells, place_block
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills, Sphere
-from dav_gswt.terrain.light import CELL, SIZE, Light, apply_light, light_of, place_light, relight
-from dav_gswt.terrain.sun import Sun, find_hour, measure_light, sun_at
+from dav_gswt.terrain.light import (
+    CELL,
+    SIZE,
+    Light,
+    Sun,
+    apply_light,
+    find_hour,
+    light_of,
+    measure_light,
+    place_light,
+    relight,
+    sun_at,
+)
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "light.json").read_text())
 NOON = Sun(60.0, 180.0)

@@ -10,7 +10,7 @@ from dav_gswt.bundle import build as bundles
 from dav_gswt.bundle.store import read_bundle
 from dav_gswt.errors import InputError
 from dav_gswt.lod import store as levels
-from dav_gswt.lod.levels import AUTO, Levels
+from dav_gswt.lod.store import AUTO, Levels
 from dav_gswt.materials import build as materials
 from dav_gswt.materials import store as material_store
 from dav_gswt.terrain import fit_cover

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 from dav_gswt.cli import judgement
 from dav_gswt.field import concatenate_fields
 from dav_gswt.lod import store as level_store
-from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import Levels
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import discs

@@ -16,7 +16,7 @@ from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.objects import make_blobs
-from dav_gswt.views import candidates, feasibility
+from dav_gswt.views import candidates
 
 FRAME = scene_frame(kind="photos", flying_height=5.0, exemplar=(10.0, 20.0, 4.0))
 MIDDLE = np.array([12.0, 22.0, 0.0])
@@ -114,7 +114,7 @@ BLOCK = make_blobs(np.array([[-0.5, 0.0, 1.5]]), np.full((1, 3), 0.5), np.full(1
 def verdicts(**move):
     pool = [candidate(name, eye, **move) for name, eye in PLACES.items()]
     block = BLOCK[:0] if move else BLOCK  # single precision knows no places far out
-    return feasibility.find_infeasible(pool, block, ground(**move), 0.15 * move.get("scale", 1.0))
+    return candidates.find_infeasible(pool, block, ground(**move), 0.15 * move.get("scale", 1.0))
 
 
 @pytest.fixture(scope="module")
@@ -140,9 +140,9 @@ def test_what_is_in_sight_over_the_ridge_by_hand(height, columns):
     that is x <= (2.6 - RIDGE z) / (1 - z). The lattice's columns stand at (2 i - 8) / 9."""
     last = (2.6 - RIDGE * height) / (1 - height)
     assert np.sum((2 * np.arange(9) - 8) / 9 <= last) == columns
-    site = feasibility._build_mesh(ground())
+    site = candidates._build_mesh(ground())
     camera = candidate("", (2.6, 0, height))[1]
-    shown, seen = feasibility._count_visible(site, [camera], camera.centre[None])
+    shown, seen = candidates._count_visible(site, [camera], camera.centre[None])
     assert (shown[0], seen[0]) == (81, 9 * columns)
 
 
@@ -154,15 +154,15 @@ def test_the_world_may_lie_anywhere_and_have_any_unit(usual, move):
 def test_pictures_that_miss_the_exemplar_or_all_ground_are_rejected():
     away, half = (-2, 0, 1), (0, 0, 2)
     pool = [candidate("away", away, (-3, 0, 0), fov=40.0), candidate("half", half, (0, 3, 1.5), fov=140.0)]
-    found = feasibility.find_infeasible(pool, BLOCK, ground(), 0.1)
+    found = candidates.find_infeasible(pool, BLOCK, ground(), 0.1)
     assert found == {"away": "off the exemplar", "half": "past the ground"}
 
 
 def test_what_is_kept_and_how_many_are_not_is_said(caplog):
     with caplog.at_level("INFO"):
-        left = feasibility.filter_feasible([candidate(*place) for place in PLACES.items()], BLOCK, ground(), 3.0)
+        left = candidates.filter_feasible([candidate(*place) for place in PLACES.items()], BLOCK, ground(), 3.0)
     assert [pose.name for pose, _ in left] == ["above", "aside", "over the ridge"]
     assert "7 of 10 candidate poses are left out: 2 hidden, 2 buried, 2 too near the ground, 1 inside an" in caplog.text
-    assert feasibility.filter_feasible([], BLOCK, ground(), 3.0) == []
+    assert candidates.filter_feasible([], BLOCK, ground(), 3.0) == []
     with pytest.raises(InputError, match=r"any of the 1 candidate poses \(1 buried\)"):
-        feasibility.filter_feasible([candidate("low", (0, 0, -1))], BLOCK, ground(), 3.0)
+        candidates.filter_feasible([candidate("low", (0, 0, -1))], BLOCK, ground(), 3.0)

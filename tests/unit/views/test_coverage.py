@@ -18,8 +18,7 @@ from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import coverage, selection
-from dav_gswt.views.pose_maps import PoseMaps, write_pose_maps
-from dav_gswt.views.scores import Scores
+from dav_gswt.views.scores import PoseMaps, Scores, write_pose_maps
 from dav_gswt.views.scoring import scoring_camera
 from dav_gswt.views.uncertainty import Scales
 

@@ -9,8 +9,8 @@ from fixtures import lpips_arrays
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import SIZE, Network
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.views import prior_sampling, terms
-from dav_gswt.views.prior_sampling import BATCH, PriorConfig
+from dav_gswt.views import scoring, terms
+from dav_gswt.views.scoring import BATCH, PriorConfig
 
 N = 8
 NAMES = [f"p{i}" for i in range(N)]
@@ -36,7 +36,7 @@ def condition(n):
 
 
 def sampled(config, n=N, masks=ALL):
-    return prior_sampling.sample_terms(config, condition(n), NAMES[:n], masks[:n])
+    return scoring.sample_terms(config, condition(n), NAMES[:n], masks[:n])
 
 
 def test_what_does_not_look_at_the_ground_does_not_count():
@@ -64,7 +64,7 @@ def test_terms_do_not_depend_on_the_number_of_threads_which_pytorch_keeps(monkey
     for threads in ("1", "2"):
         monkeypatch.setenv("DAV_GSWT_THREADS", threads)
         masks = np.ones((count, SIZE, SIZE), np.float32)
-        found.append(prior_sampling.sample_terms(config, seen, NAMES[:count], masks))
+        found.append(scoring.sample_terms(config, seen, NAMES[:count], masks))
         assert torch.get_num_threads() == before
     for name in ("w2_sq", "lpips", "gradient", "maps"):
         np.testing.assert_array_equal(*(each[name] for each in found), err_msg=name)

@@ -9,11 +9,10 @@ from fixtures import ground as patch
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose, pose_of_camera
-from dav_gswt.prior import conditions
-from dav_gswt.views import coverage, pose_maps, scores, scoring
-from dav_gswt.views.prior_sampling import PriorConfig
+from dav_gswt.prior import interface
+from dav_gswt.views import coverage, scores, scoring
 from dav_gswt.views.scores import FrozenScales
-from dav_gswt.views.scoring import backproject_maps
+from dav_gswt.views.scoring import PriorConfig, backproject_maps
 from dav_gswt.views.terms import TERMS
 from dav_gswt.views.uncertainty import Quantiles, Scales
 
@@ -105,22 +104,22 @@ def test_without_a_prior_only_geometric_terms_are_computed_of_which_coverage_is_
 
 def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
     wide = pool([1.6, 1.6, 5.0], width=60)[0][1]
-    cut = conditions.crop_camera(wide)
+    cut = interface.crop_camera(wide)
     assert (cut.width, cut.height) == (40, 40) and cut.cx == wide.cx - 10
     np.testing.assert_allclose(cut.rays()[1], wide.rays()[1][:, 10:50])
     picture = np.random.default_rng(0).random((40, 60, 3), np.float32)
-    assert np.array_equal(conditions.crop_image(picture), picture[:, 10:50])
+    assert np.array_equal(interface.crop_image(picture), picture[:, 10:50])
     photos = patch.photos()
-    large = conditions.prepare_photos(photos, patch.FRAME, 64).photos
+    large = interface.prepare_photos(photos, patch.FRAME, 64).photos
     assert large.shape == (3, 64, 64, 3)  # smaller photos are enlarged
-    known = conditions.prepare_photos(photos, patch.FRAME, 24)
+    known = interface.prepare_photos(photos, patch.FRAME, 24)
     near = photos[1].camera.centre + [0, 0, 0.1]
-    condition = conditions.build_condition(patch.field(), pool(near), known, 6.0, 24)
+    condition = interface.build_condition(patch.field(), pool(near), known, 6.0, 24)
     assert np.array_equal(condition.photo[0], known.photos[1])
     assert condition.relative[0] == pytest.approx([0, 0, 1, 0], abs=0.05) and condition.colour.shape == (1, 24, 24, 3)
-    turned = conditions.relative_pose(Pose("", 10.0, 20.0, 3.0), Pose("", 40.0, 110.0, 6.0), 6.0)
+    turned = interface.relative_pose(Pose("", 10.0, 20.0, 3.0), Pose("", 40.0, 110.0, 6.0), 6.0)
     assert turned == pytest.approx([np.pi / 6, 1, 0, 0.5], abs=1e-6)
-    up = conditions.render_view(patch.field(), pool([1.6, 1.61, 3.0])[0][1], 6.0)
+    up = interface.render_view(patch.field(), pool([1.6, 1.61, 3.0])[0][1], 6.0)
     assert up.inverse_depth[20, 20] == pytest.approx(6 / 3, rel=0.02) and up.alpha[20, 20] > 0.95
 
 
@@ -143,11 +142,11 @@ def test_a_prior_is_not_shown_what_no_photo_shows():
 
 def test_maps_are_read_as_written(tmp_path):
     found = scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2))
-    pose_maps.write_pose_maps(tmp_path / "maps.npz", found.maps, found.gaussians)
-    back, gaussians = pose_maps.read_pose_maps(tmp_path / "maps.npz")
+    scores.write_pose_maps(tmp_path / "maps.npz", found.maps, found.gaussians)
+    back, gaussians = scores.read_pose_maps(tmp_path / "maps.npz")
     (tmp_path / "broken.npz").write_bytes(b"PK nothing of the kind")
     with pytest.raises(InputError, match="broken.npz: not readable as maps"):
-        pose_maps.read_pose_maps(tmp_path / "broken.npz")
+        scores.read_pose_maps(tmp_path / "broken.npz")
     assert back.names == ["p0", "p1", "p2"] and np.array_equal(gaussians, found.gaussians)
     assert np.array_equal(back.w2_sq, found.maps.w2_sq)
     np.testing.assert_allclose(back.opacity, found.maps.opacity, atol=1e-3)
