@@ -19,30 +19,6 @@ def large(page_of):
         yield address
 
 
-REST = """async () => {
-  // how often each chunk is composed while ever finer pictures of one place are made, and the picture after that
-  const { createFrameBuilder } = await import("./worker/frame_builder.js");
-  const { createHeights } = await import("./terrain/heights.js");
-  const { cameraAt } = await import("./terrain/camera.js");
-  const { readManifest, readParts } = await import("./data/bundle.js");
-  const { webSource } = await import("./data/source.js");
-  const source = webSource(new URL("./", location.href)), manifest = await readManifest(source);
-  const counts = {}, heights = createHeights(manifest.heights);
-  const onChunk = ({ tile, level }) => { counts[`${tile} ${level}`] = (counts[`${tile} ${level}`] ?? 0) + 1; };
-  const builder = createFrameBuilder(manifest, heights, { onChunk });
-  await readParts(manifest, source, { take: (index, buffer) => builder.supply.addPart(index, buffer) });
-  const camera = cameraAt({ x: 1, y: 1, eye: 1.7, yaw: 60, pitch: -12 }, 640, 400, heights);
-  let frame;
-  for (const budget of [1e4, 2e4, 4e4, 1e9, 1e9, 1e4]) {
-    for (const patient of budget < 2e4 ? [false, false] : [true]) {
-      frame = builder.build(camera, budget, patient);
-      while (builder.workAhead(1000));
-    }
-  }
-  return { most: Math.max(...Object.values(counts)), many: Object.keys(counts).length, missing: frame.missing.size };
-}"""
-
-
 def set_cache(tab, cache: float) -> None:
     """Give the viewer's modules in a tab a cache of another size."""
     text = (VIEWER / "data/layout.js").read_text()
@@ -78,14 +54,6 @@ def test_at_rest_nothing_is_composed_twice_and_the_nearest_ground_is_fine(visit,
     assert seen.page.evaluate("davgswt.grab().then(([width]) => width)") == 320
 
 
-def test_while_pictures_of_a_place_become_finer_nothing_is_composed_twice(blank, large):
-    tab = blank(large)
-    set_cache(tab, CACHE)
-    found = tab.evaluate(REST)
-    assert found["most"] == 1 and found["missing"] == 0
-    assert 16 < found["many"] < 48
-
-
 @pytest.mark.slow
 def test_on_a_walk_nothing_is_read_twice_and_the_cache_is_never_exceeded(visit, large):
     seen = visit(160, 100)
@@ -99,16 +67,6 @@ def test_on_a_walk_nothing_is_read_twice_and_the_cache_is_never_exceeded(visit, 
     assert max(asked.values()) == 1
     assert {cell["level"] for cell in seen.state["drawn"]} >= {1, 2}
     assert seen.state["work"]["composed"] > CACHE / 33, "some were composed again"
-
-
-@pytest.mark.slow
-def test_a_still_waits_for_the_tiles_of_its_view(visit, large):
-    seen = visit(320, 200)
-    asked = watch(seen)
-    seen.open(f"{large}?still")
-    seen.at(x=1.0, y=1.0, eye=1.7, yaw=0.0, pitch=-20.0)
-    assert seen.state["drawn"][-1]["level"] == 0
-    assert max(asked.values()) == 1
 
 
 @pytest.mark.slow

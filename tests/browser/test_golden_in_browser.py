@@ -124,20 +124,6 @@ def test_cells_and_orders_stand_as_they_do_in_the_library(modules):
     assert orders == [entry["position"] for entry in values["orders"]]
 
 
-def test_sorting_is_exact_and_stable(modules):
-    depths = np.random.default_rng(3).normal(size=5000).astype(np.float32)
-    depths[::7] = depths[3]
-    depths[5], depths[6] = 0.0, 1e30
-    found = modules.evaluate(
-        """async depths => {
-          const { createDepthSorter } = await import("./terrain/draw_order.js");
-          return [...createDepthSorter()(new Float32Array(depths), depths.length)];
-        }""",
-        depths.tolist(),
-    )
-    assert found == np.argsort(-depths, kind="stable").tolist()
-
-
 def test_classes_have_the_scores_and_keep_the_gaussians_shared_with_the_library(modules):
     terrains = golden("classes")["terrains"]
     computed = modules.evaluate(

@@ -65,34 +65,6 @@ HURRY = """async () => {
   performance.now = real;
   return { frames: frames.map(describe), patient: describe(last) };
 }"""
-COUNT = """async () => {
-  const { createTerrainTables } = await import("./worker/terrain_tables.js");
-  const { createBorders } = await import("./worker/sorted_batches.js");
-  const terrain = createTerrainTables(manifest, heights), borders = createBorders(terrain, builder.store);
-  return [[1e9, -12], [1e9, -40], [40000, -12]].map(([budget, pitch]) => {
-    const frame = builder.build(cameraAt({ ...place, pitch }, 640, 400, heights), budget, true);
-    let stay = 0;
-    for (const { tiles, things, border, lo, hi } of frame.cells) {
-      for (let level = lo; level <= hi; level++) {
-        for (const t of tiles) stay += border ? borders.keep(border, t, level).length : terrain.tiles[t].counts[level];
-        for (const { tile } of things) stay += terrain.tiles[tile].counts[level];
-      }
-    }
-    return { budget, stay, count: frame.count };
-  });
-}"""
-FORGET = """async () => {
-  const { createBorders } = await import("./worker/sorted_batches.js");
-  const centres = new Float32Array(300), store = { get: () => ({ centres, count: 100 }) };
-  const keeper = { keep: () => new Uint32Array(50) };
-  const borders = createBorders({ keeper, each: 16 }, store, 1000); // bytes: room for five lists
-  const cells = Array.from({ length: 8 }, (_, i) => ({ i, j: 0, serial: i, kept: new Map(), last: null, batch: null }));
-  const held = () => cells.map(({ kept }) => kept.size);
-  for (const cell of cells) borders.keep(cell, 0, 0);
-  const after = held(), { bytes } = borders;
-  borders.keep(cells[7], 0, 0);
-  return { after, bytes, tested: borders.tested };
-}"""
 
 
 @pytest.fixture(scope="module")
@@ -130,16 +102,3 @@ def test_a_hurried_frame_leaves_no_cell_out_and_is_soon_what_a_patient_one_is(pa
     assert all(frame["cells"] == patient["cells"] and frame["near"] == patient["near"] for frame in frames)
     assert min(frame["drawn"] for frame in frames) > 0.5 * patient["drawn"]
     assert frames[-1] == patient
-
-
-def test_the_budget_counts_what_stays(page):
-    whole, oblique, bounded = run(page, COUNT)
-    for found in (whole, oblique, bounded):
-        assert found["count"] == pytest.approx(found["stay"], rel=0.05)
-    assert 0.5 * bounded["budget"] < bounded["count"] <= bounded["budget"] < whole["count"]
-
-
-def test_cells_that_were_asked_for_long_ago_are_forgotten(page):
-    found = page.evaluate(FORGET)
-    assert found["after"] == [0, 0, 0, 1, 1, 1, 1, 1] and found["bytes"] == 1000
-    assert found["tested"] == 800, "what is known is not tested again"

@@ -121,20 +121,3 @@ def test_a_machine_in_between_comes_to_rest_below_what_it_can_do_on_its_display(
     settled = pace(modules, 900, a_splat, 0.0, refresh)[0][600:]
     assert min(settled) > 300_000 and max(settled) < 1.21 * min(settled)
     assert 1.0 * refresh < a_splat * settled[-1] <= 1.44 * refresh
-
-
-def test_where_pixels_are_slow_the_resolution_is_lower_and_the_budget_stays(modules):
-    budgets, scales = pace(modules, 600, 0.0, 100.0)
-    # 24 ms allow 0.49 of the resolution along each side, 19 ms 0.44
-    assert min(scales[200:]) > 0.4 and max(scales[200:]) < 0.5 and len(set(scales[200:])) < 4
-    assert set(budgets[200:]) == {100_000}
-
-
-@pytest.mark.parametrize("took, scale", [(5, 1), (21, 0.5), (84, 0.3), (10, 0.7246)])
-def test_the_first_picture_says_which_resolution_to_begin_with(modules, took, scale):
-    begin = """async took => {
-      const { createFramePacing } = await import("./draw/pacing.js"), pacing = createFramePacing();
-      pacing.begin(took);
-      return pacing.scale;
-    }"""
-    assert modules.evaluate(begin, took) == pytest.approx(scale, abs=1e-3)

@@ -146,36 +146,6 @@ def test_a_bad_file_is_refused(modules, manifest, change, message):
     assert message in run(modules, manifest, act)
 
 
-def test_only_cells_that_a_dab_touches_are_made_again(modules, manifest):
-    """Borders of other cells keep their identity, so their Gaussians are not tested again."""
-    found = modules.evaluate(
-        """async manifest => {
-          const { createTerrainTables } = await import("./worker/terrain_tables.js");
-          const { createHeights } = await import("./terrain/heights.js");
-          const { lookUpCell } = await import("./terrain/cells.js");
-          const { paintPoints } = await import("./worker/terrain_tables.js");
-          const terrain = createTerrainTables(manifest, createHeights());
-          const borders = () => {
-            const found = new Map();
-            for (let j = -20; j < 20; j++) for (let i = -20; i < 20; i++) {
-              found.set(`${i},${j}`, terrain.cache.border[lookUpCell(terrain, i, j)]);
-            }
-            return found;
-          };
-          const before = borders();
-          paintPoints(terrain, Int32Array.of(20, 36, 1));
-          const after = borders();
-          return {
-            borders: [...before.values()].filter(Boolean).length,
-            changed: [...before].filter(([key, one]) => one !== after.get(key)).map(([key]) => key),
-          };
-        }""",
-        manifest,
-    )
-    assert found["borders"] > 100
-    assert set(found["changed"]) <= {"2,4"}
-
-
 def test_a_dab_changes_the_picture_there_and_nowhere_else_and_undo_restores_it(seen):
     before = seen.at(**ABOVE)
     x, y, radius, material = 4.0, 7.0, 3.0, int(not is_grass(before[100, 100]))

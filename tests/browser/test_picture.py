@@ -150,17 +150,3 @@ def test_uncertain_tiles_are_warm_and_sure_ones_cool(still, uncertain):
         assert (red > blue + 30) == (tile >= 8) and (blue > red + 30) == (tile < 8)
         found.add(tile >= 8)
     assert found == {True, False}
-
-
-def test_frame_times_have_means_and_deviations_of_the_last_120(modules):
-    found = modules.evaluate(
-        """async () => {
-          const { createFrameStats } = await import("./draw/pacing.js"), stats = createFrameStats();
-          for (let k = 0; k < 200; k++) {
-            stats.addTime("sort", k < 80 ? 1000 : k % 2 ? 3 : 5);
-            stats.addFrame(k % 4 === 0);
-          }
-          return stats.summary();
-        }"""
-    )
-    assert found == {"share": 0.25, "sort": {"mean": 4, "sd": pytest.approx((120 / 119) ** 0.5), "n": 120}}

@@ -123,38 +123,6 @@ def test_a_ray_meets_the_ground_where_it_lies(other):
     assert other.evaluate("terrain.pick([3, 5, 30], [0, 0, 1])") is None
 
 
-def test_a_steep_place_elsewhere_hides_no_ground(other):
-    """A tower of 100 above a plain: the ray comes down 40 beside it, or does not within reach."""
-    found = other.evaluate(
-        """async () => {
-          const { createHeights } = await import("./terrain/heights.js");
-          const { hitGround } = await import("./terrain/camera.js");
-          const pixels = new Float32Array(64 * 64), entry = { kind: "image", rows: 64, columns: 64, width: 640 };
-          pixels[64 * 20 + 20] = 100;
-          const heights = createHeights(entry, pixels), long = Math.hypot(1, 0.05);
-          const cast = (east, up, farthest) => (
-            hitGround([0, 0, 2.5], [east / long, 0, up / long], heights, { lift: 0.5, farthest }));
-          return [cast(1, -0.05, 200), cast(1, -0.05, 39), cast(1, 0.05, 200), cast(0.05, 1, 200)];
-        }"""
-    )
-    assert found[0] == pytest.approx([40.0, 0.0], abs=40 * 1e-4)
-    assert found[1:] == [None, None, None]
-
-
-def test_a_ray_over_hills_ends_where_it_first_comes_down(other):
-    """Rays at a grazing angle, beside the first change of sign on a fine grid of distances."""
-    ways = [[np.cos(yaw), np.sin(yaw), -0.12] for yaw in np.radians(np.arange(0, 360, 30))]
-    hits = other.evaluate("ways => ways.map(way => terrain.pick([3, 5, 12], way))", ways)
-    for way, hit in zip(ways, hits, strict=True):
-        far = np.linspace(0, 48 * GROUND.side, 100_001)
-        x, y, z = (at + far * one for at, one in zip((3, 5, 12), way / np.linalg.norm(way), strict=True))
-        below = np.flatnonzero(z < HILLS.at(x, y)[0])
-        if len(below):
-            assert hit["distance"] == pytest.approx(far[below[0]], rel=1e-4)
-        else:
-            assert hit is None
-
-
 def test_an_object_counts_from_its_foot(blank, tmp_path):
     """Its ground is another height than 0: the chunk's z counts from the foot already."""
     write_cover_bundle(tmp_path / "bundle")

@@ -234,14 +234,6 @@ def test_orbiting_keeps_what_one_looks_at_and_zooming_nears_it(modules):
         assert distance_of(place) == pytest.approx((4.0, 2.0)[place is near], rel=1e-3)
 
 
-def test_orbiting_in_the_sky_turns_about_a_place_ahead(modules):
-    up, turned, _ = modules.evaluate(ORBIT, [OBLIQUE | {"pitch": 10}, [[180, 0]], 1])
-    # about a place four tile sides ahead: on its other side
-    far = 2 * 16 * math.cos(math.radians(10))
-    assert turned["x"] - up["x"] == pytest.approx(far * math.cos(math.radians(20)), abs=1e-6)
-    assert (turned["yaw"], turned["eye"]) == (pytest.approx(200), pytest.approx(2))
-
-
 @pytest.mark.slow
 def test_the_map_takes_one_elsewhere(visit, plain):
     seen = visit(640, 400).open(plain)

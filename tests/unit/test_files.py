@@ -30,13 +30,6 @@ def test_json_has_no_nan(tmp_path):
             files.read_json(tmp_path / "a.json")
 
 
-def test_the_name_of_a_file_is_no_path():
-    assert files.require_file_name("a b.png") == "a b.png"
-    for name in ("", "..", "a/b", "a\\b", "a\n", "x" * 256, None):
-        with pytest.raises(ValueError, match="is no name of a file"):
-            files.require_file_name(name)
-
-
 @pytest.mark.parametrize("write", [atomic_file, atomic_folder])
 def test_a_full_disk_is_told_with_the_name_of_what_was_written(tmp_path, write):
     """The system's calls on open files know no name."""

@@ -1,12 +1,10 @@
 """Blocks: bytes by hand, round trips of any values, zigzag."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dav_gswt.bundle import blocks
 from dav_gswt.bundle.blocks import PLANES, Block, pack_block, unpack_block
 
 ENDS = {np.uint8: (0, 255), np.uint16: (0, 1, 32767, 32768, 65534, 65535), np.int16: (-32768, -1, 0, 1, 32767)}
@@ -54,27 +52,3 @@ def test_records_have_clipped_colours_and_all_else_as_it_is(block):
     for name in ("position", "scale", "rotation", "opacity"):
         np.testing.assert_array_equal(getattr(back, name), getattr(block, name))
     assert unpack_block(pack_block(back)).to_records().tobytes() == rows.tobytes()
-
-
-def test_an_empty_block_has_no_bytes():
-    assert pack_block(unpack_block(b"")) == b"" and len(unpack_block(b"").to_records()) == 0
-
-
-@pytest.mark.parametrize("size", [1, PLANES - 1, PLANES + 1])
-def test_a_part_of_a_splat_is_no_block(size):
-    with pytest.raises(ValueError, match="cannot reshape"):
-        unpack_block(bytes(size))
-
-
-def test_zigzag_counts_small_numbers_of_both_signs_first():
-    signed = np.array([0, -1, 1, -2, 2, 32767, -32768], np.int16).view(np.uint16)
-    assert blocks.zigzag(signed).tolist() == [0, 1, 2, 3, 4, 65534, 65535]
-    every = np.arange(65536).astype(np.uint16)
-    np.testing.assert_array_equal(blocks.unzigzag(blocks.zigzag(every)), every)
-    assert len(np.unique(blocks.zigzag(every))) == 65536
-
-
-def test_differences_run_over_the_end_of_the_range():
-    values = np.array([65535, 0, 65535, 32768], np.uint16)
-    assert blocks.pack_differences(values).tolist() == [1, 2, 1, 65533]
-    np.testing.assert_array_equal(blocks.unpack_differences(blocks.pack_differences(values)), values)

@@ -18,7 +18,7 @@ from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.sun import CapturedSun
 from dav_gswt.materials.build import find_materials
 from dav_gswt.materials.shading import Sun
-from dav_gswt.materials.store import NAME, write_materials
+from dav_gswt.materials.store import write_materials
 
 FRAME = scene_frame()
 LOCATED = replace(
@@ -52,13 +52,6 @@ def test_relief_reveals_the_sun_in_the_world_and_otherwise_it_is_assumed_in_the_
     assert find_light(FRAME, materials / "none", {}) == ASSUMED
     assert find_light(FRAME, None, {}) == ASSUMED
     assert find_light(replace(LOCATED, sun=None), None, {}) == LightEntry(45.0, 285.0, "assumed", 300.0)
-
-
-def test_a_report_of_materials_without_the_key_tells_no_sun(materials, tmp_path):
-    values = json.loads((materials / "sun" / NAME).read_text())
-    del values["sun"]
-    (tmp_path / NAME).write_text(json.dumps(values))
-    assert find_light(FRAME, tmp_path, {}) == ASSUMED
 
 
 def test_a_manifest_holds_the_light_where_it_is_known_and_refuses_what_cannot_be(tmp_path):

@@ -123,11 +123,3 @@ def test_a_cell_of_a_composed_tile_is_a_whole_number_of_steps_of_which_a_tile_ha
     assert west == pytest.approx(round(west), abs=1e-9) and coding.origin[0] <= -0.7
     with pytest.raises(InputError, match="100 tile sides"):
         Encoding.fit([field_of([[1, 1, 0], [201, 1, 0]], np.full((2, 3), 0.1))], SIDE, PIXEL, cells)
-
-
-def test_a_side_s_both_ends_are_places_of_the_grid_and_a_splat_miles_from_its_tile_is_refused():
-    field = field_of([[0, 0, 0], [SIDE, SIDE, 0], [-0.3, 1, 0]], np.full((3, 3), 0.1))
-    coding = Encoding.fit([field], SIDE, PIXEL)
-    np.testing.assert_allclose(coding.decode(coding.encode(field)).means[:2], field.means[:2], atol=1e-7)
-    with pytest.raises(InputError, match="5000 tile sides"):
-        Encoding.fit([field_of([[1, 1, 0], [1e4, 1, 0]], np.full((2, 3), 0.1))], SIDE, PIXEL)

@@ -58,11 +58,6 @@ def test_orders_are_permutations_by_falling_depth(seed, count, size):
             assert (found == np.arange(count)).all()
 
 
-def test_one_colour_needs_the_fewest_directions():
-    rings = direction_search.search_directions([ground(0, colours=0.0)], SIDE, 40.0)
-    assert rings == DirectionRings((20.0,), 2 * direction_search.MIN_AZIMUTHS)
-
-
 def test_directions_are_added_until_the_error_is_small_or_the_room_is_full(monkeypatch):
     monkeypatch.setattr(direction_search, "VIEWS", 2)
     fields = [ground(seed, stones=150) for seed in range(2)]

@@ -12,12 +12,12 @@ from fixtures.photo_store import read_records
 
 from dav_gswt.capture import capturing, drop_folder
 from dav_gswt.capture.agents import AGENTS
-from dav_gswt.capture.store import PhotoStore, Site, pose_key
+from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
-from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
+from dav_gswt.photos.capture_record import read_capture_record, write_capture_record
 from dav_gswt.photos.view_split import ViewSplit
 
 WHEN = "2026-05-04T10:00:00"
@@ -174,22 +174,3 @@ def test_a_photo_stored_for_a_pose_no_longer_asked_for_is_placed_again(site, mon
     assert len(drop_folder.import_dropped_photos(used, requested(0.2), "plan")) == 1  # an earlier round has it
     assert drop_folder.import_dropped_photos(site, requested(0.2), "plan") == []
     assert len(read_records(site.store)) == 2
-
-
-def test_an_agent_knows_the_poses_of_this_round_and_the_earlier_ones(site, tmp_path, monkeypatch):
-    (before,) = requested(3.0)
-    (tmp_path / "before").mkdir()
-    record = CapturedPhoto("a.png", before[0], before[1], at(3.1), 0.0)
-    write_capture_record(tmp_path / "before", "handheld", [record])
-    now, seen = requested(0.0, 1.0), []
-    monkeypatch.setattr(capturing.pools, "list_remaining", lambda *_: now)
-
-    def listen(site, _):
-        seen.extend(site.requested)
-        raise InputError("photos are missing")
-
-    monkeypatch.setitem(AGENTS, "handheld", replace(AGENTS["handheld"], take=listen))
-    chosen = [pose for pose, _ in now]
-    with pytest.raises(InputError, match="photos are missing"):
-        capturing.capture_views(site, ViewSplit((), (), ()), [tmp_path / "before"], chosen, tmp_path / "capture")
-    assert [pose_key(camera) for camera in seen] == [pose_key(at(x)) for x in (3.0, 0.0, 1.0)]

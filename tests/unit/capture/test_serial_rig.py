@@ -213,13 +213,6 @@ def test_what_was_in_the_inbox_before_is_not_taken_for_a_photo(shoot, tmp_path):
     assert "old.png" not in {record["source"] for record in read_records(store)}
 
 
-def test_a_photo_written_over_another_is_new(tmp_path):
-    image_files.write_png(tmp_path / "capt.png", np.zeros((48, 64, 3)))
-    before = serial_rig.list_photos(tmp_path)
-    image_files.write_png(tmp_path / "capt.png", np.random.default_rng(0).random((48, 64, 3)))
-    assert serial_rig.wait_for_photo(tmp_path, before) == tmp_path / "capt.png"
-
-
 @pytest.mark.parametrize("place", [PLACES[1], (90.0, 200.0, 2.0), (12.0, 359.9999, 1.0)])
 def test_axes_and_cameras_are_each_others_inverse(place):
     camera = posed(0, place)[1]
@@ -244,10 +237,6 @@ def test_what_is_missing_is_said_and_only_poses_where_the_rig_may_stand_are_cand
     assert [pose.name for pose, _ in serial_rig.filter_reachable({"rig": rig}, FRAME, pool)] == ["pose_0000"]
     with pytest.raises(InputError, match="none of the candidate poses"):
         serial_rig.filter_reachable({"rig": rig | {"limits": RIG["limits"] | {"radius": [1, 2]}}}, FRAME, pool)
-
-
-def test_the_checksum_is_that_of_the_standard():
-    assert serial_protocol.frame_line("123456789") == b"123456789*29B1\n"
 
 
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=1, max_size=100), st.data())

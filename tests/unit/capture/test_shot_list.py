@@ -9,7 +9,7 @@ from dav_gswt.capture import drop_folder, handheld
 from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
-from dav_gswt.geometry import camera_layouts, cameras
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import image_files
@@ -108,19 +108,6 @@ def test_words_say_where_to_stand_and_where_to_look():
         "Stand 3.1 m south of the middle, camera 2.6 m above the ground; face the middle, which is to the north; "
         "look down 40 degrees."
     )
-
-
-def test_words_for_cameras_that_do_not_look_at_the_middle():
-    by = handheld.Ruler(FRAME)
-    aside = cameras.pinhole([0.5, 3.0, 1.5], [3.0, 5.5, 1.5], 48, 64, 60.0)
-    assert "face the upper right of the map; look level." in handheld.describe_pose(aside, by)
-    down = camera_layouts.orbit(90, 270, 1.8, MIDDLE, 64, 48, 60.0)
-    assert handheld.describe_pose(down, by) == (
-        "Stand in the middle, camera 1.8 m above the ground; turn the top of the picture to the top of the map; "
-        "look straight down."
-    )
-    assert handheld.describe_walk(aside, down, by) == "go 1.8 m towards the lower right of the map"
-    assert handheld.describe_walk(down, down, by) == "stay where you are"
 
 
 def test_the_map_shows_the_exemplar_and_every_pose(site, requested):

@@ -3,7 +3,6 @@
 import argparse
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 import yaml
@@ -206,12 +205,3 @@ def test_the_judgement_says_from_how_high_the_ground_looks_sharp():
     (said,) = judgement.describe_sharpness(splat, None, manifest)
     assert said == "The ground looks sharp from 13 units of the splat above it."
     assert not judgement.describe_sharpness(frame, windows, None)
-
-
-def test_help_says_where_the_pages_lie_that_messages_name(capsys):
-    with pytest.raises(SystemExit):
-        main.main(["--help"])
-    said = capsys.readouterr().out.strip()
-    assert "dav-gswt make PHOTOS" in said
-    place = said.rpartition(" lie in ")[2].removesuffix(".")
-    assert (Path(place) / "docs/reference/config.md").is_file() and (Path(place) / "docs/photos.md").is_file()

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from dav_gswt.config.base import LARGEST_SIDE
 from dav_gswt.config.load import add_scene_files, check_config, parse_command_line, read_config
 from dav_gswt.errors import InputError
 
@@ -43,11 +42,6 @@ def test_the_configs_that_come_with_the_project_are_valid(root, name):
     checked = check_config(read(root, *FILES[name]))
     assert checked["scene"] in checked["scenes"]
     assert check_config(checked) == checked
-
-
-def test_native_photos_are_those_of_any_size(config):
-    checked = check_config(changed(config, ["scenes", "copr_dunes", "size"], "native"))
-    assert checked["scenes"]["copr_dunes"]["size"] == LARGEST_SIDE
 
 
 def test_a_folder_alone_is_a_scene(config):

@@ -2,18 +2,15 @@
 
 import pickle
 
-import numpy as np
 import pytest
 
 from dav_gswt.capture import serial_rig
 from dav_gswt.config.base import EntryKeys, select_keys
 from dav_gswt.config.load import check_model
-from dav_gswt.config.scenes import SCENES, PhotoScene, SyntheticScene
+from dav_gswt.config.scenes import PhotoScene
 from dav_gswt.config.settings import Preset
-from dav_gswt.geometry.cameras import Camera
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.reconstruction.fitting.plan import FitSettings
-from dav_gswt.views import candidates
 
 RIG = {"port": "p", "inbox": "in", "millimetres": 250.0, "limits": dict.fromkeys(("pan", "tilt", "radius"), (0, 1000))}
 SYNTHETIC = {"kind": "synthetic", "family": "desert", "seed": 0, "photo_count": 5, "test": 2, "size": 128}
@@ -24,11 +21,6 @@ PHOTOS = {"kind": "photos", "folder": "x", "size": 512, "start": 8, "preset": "d
 def photo_scene(agent: str) -> dict:
     given = PHOTOS | {"agent": agent} | ({"rig": RIG} if agent == "serial" else {})
     return check_model(PhotoScene, given).model_dump(mode="json", exclude_none=True)
-
-
-@pytest.fixture
-def synthetic_scene() -> dict:
-    return check_model(SyntheticScene, SYNTHETIC).model_dump(mode="json", exclude_none=True)
 
 
 @pytest.mark.parametrize("read", [lambda keys: keys["b"], lambda keys: keys.get("b", 0), lambda keys: "b" in keys])
@@ -59,19 +51,3 @@ def test_scores_are_given_all_keys_of_a_rig_s_reach():
     given = select_keys(PhotoScene, "score_coarse", photo_scene("serial"))["rig"]
     assert not {"millimetres", "limits"} & given.withheld and "port" in given.withheld
     assert serial_rig.filter_reachable({"rig": given}, synthetic.Scene("desert", 0).frame, []) == []
-
-
-def test_what_renders_photos_reads_only_its_keys(synthetic_scene):
-    given = select_keys(SyntheticScene, "render_photos", synthetic_scene)
-    assert synthetic.scene_from_config(given) == synthetic.scene_from_config(synthetic_scene)
-    assert len(synthetic.start_views(given)) == 5
-    assert len(synthetic.test_views(given)) == len(synthetic.test_views(synthetic_scene)) == 2
-
-
-def test_what_lists_candidates_reads_only_its_keys(synthetic_scene):
-    frame = synthetic.Scene("desert", 0).frame
-    given = select_keys(SCENES["synthetic"], "select_poses", synthetic_scene)
-    camera = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, 64.0, 64.0, 128, 128)
-    assert len(candidates.list_poses(given, frame, camera)) == 250
-    given = select_keys(PhotoScene, "score_round", photo_scene("plan"))
-    assert given["agent"] == "plan" and len(candidates.list_poses(given, frame, camera)) == 250

@@ -6,7 +6,7 @@ from fixtures.random_field import random_field
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.export import spool
-from dav_gswt.export.axes import Y_DOWN, Y_UP, turn_field, turn_points
+from dav_gswt.export.axes import turn_field
 from dav_gswt.export.spool import Spool
 from dav_gswt.raster.interface import RIM
 
@@ -22,11 +22,6 @@ def known():
 def covariances(field):
     turn = Rotation.from_quat(field.quats[:, [1, 2, 3, 0]]).as_matrix()
     return np.einsum("nij,nj,nkj->nik", turn, np.exp(2.0 * field.log_scales), turn)
-
-
-def test_up_becomes_minus_y_or_y_and_north_z_or_minus_z():
-    point = np.float32([[1, 2, 3]])
-    assert turn_points(point, Y_DOWN).tolist() == [[1, -3, 2]] and turn_points(point, Y_UP).tolist() == [[1, 3, -2]]
 
 
 def test_covariances_turn_with_the_frame_and_back_gives_the_field_again(known):

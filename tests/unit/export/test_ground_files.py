@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures.finite_cells import collect_cells
-from fixtures.land_covers import LEAF, cover_content, gaussians
+from fixtures.land_covers import cover_content
 from fixtures.splat_files import read_glb
 from scipy.ndimage import map_coordinates
 from scipy.spatial import ConvexHull
@@ -17,14 +17,12 @@ from dav_gswt.export.axes import Y_UP
 from dav_gswt.export.height_mesh import simplify_heights
 from dav_gswt.export.terrain_files import find_origin
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.images import image_files
 from dav_gswt.raster import render
 from dav_gswt.terrain import endless, finite
 from dav_gswt.terrain.finite import Area
 from dav_gswt.terrain.heights import make_sphere
 
-PLACE = Georeference(47.1, 11.3, 600.0, 20.0, metres_per_unit=1.0)
 AREA = Area(0, -1, 6, 5)
 
 
@@ -166,13 +164,6 @@ def test_every_object_has_a_closed_hull_that_holds_what_is_drawn(exported, facts
         hull = ConvexHull(vertices)
         outside = hull.equations[:, :3] @ (centres + corner).T + hull.equations[:, 3:]
         assert outside.max() < 0.05 and hull.volume < 1
-
-
-def test_a_hull_reaches_one_deviation_of_what_is_solid():
-    ball = gaussians([[1.0, 2, 3], [9, 9, 9]], LEAF, [0.3, 0.2, 0.1])
-    points = ground_surface.find_outermost(replace(ball, opacity_logits=np.float32([4, -4])))
-    np.testing.assert_allclose(np.linalg.norm((points - [1, 2, 3]) / [0.3, 0.2, 0.1], axis=1), 1, rtol=1e-5)
-    np.testing.assert_allclose(np.ptp(points, axis=0), [0.6, 0.4, 0.2], atol=0.015)
 
 
 def test_mujoco_loads_the_model_and_its_rays_meet_the_heights(exported, facts, surface):

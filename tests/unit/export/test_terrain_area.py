@@ -8,7 +8,6 @@ import pytest
 from dav_gswt.errors import InputError
 from dav_gswt.export import terrain_files
 from dav_gswt.export.formats import FORMATS
-from dav_gswt.terrain import finite
 from dav_gswt.terrain.finite import Area
 
 
@@ -41,13 +40,3 @@ def test_too_much_is_refused_with_how_much_smaller_it_must_be(cover_terrain, mon
         check(count)
         with pytest.raises(InputError, match=f"{count} Gaussians, a file holds"):
             check(count - 1)
-
-
-def test_a_set_of_all_levels_is_counted_by_the_finest(cover_terrain, monkeypatch):
-    area, both = Area(-1, -1, 3, 2), {name: FORMATS[name] for name in ("ply", "3dtiles")}
-    count = int(finite.count_cells(cover_terrain, finite.list_cells(cover_terrain, area), 0).sum())
-    monkeypatch.setattr(terrain_files, "MAX_BYTES", count * both["3dtiles"].bytes)
-    terrain_files.check_size(cover_terrain, area, 1, both)
-    monkeypatch.setattr(terrain_files, "MAX_BYTES", count * both["3dtiles"].bytes - 1)
-    with pytest.raises(InputError, match=f"export: 3dtiles: 3 x 2 cells have up to {count} Gaussians"):
-        terrain_files.check_size(cover_terrain, area, 1, both)

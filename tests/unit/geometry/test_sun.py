@@ -4,7 +4,7 @@ from datetime import UTC, datetime, timedelta, timezone
 
 import pytest
 
-from dav_gswt.geometry.sun import locate_sun, name_direction
+from dav_gswt.geometry.sun import locate_sun
 
 WITHIN = 0.01  # degrees, that the formula claims, which leaves out 0.002 of parallax
 
@@ -21,9 +21,3 @@ def test_at_noon_the_sun_is_highest_and_stands_towards_the_equator(latitude, ele
     found = locate_sun(datetime(1992, 10, 13, tzinfo=UTC), latitude, 180 - 3.427351)
     assert found[0] == pytest.approx(elevation, abs=WITHIN)
     assert (found[1] - azimuth + 180) % 360 - 180 == pytest.approx(0, abs=WITHIN)
-
-
-def test_directions_have_names():
-    assert [name_direction(azimuth) for azimuth in (0.0, 44.0, 225.0, 337.4, 359.0)] == [
-        "north", "north-east", "south-west", "north-west", "north",
-    ]  # fmt: skip

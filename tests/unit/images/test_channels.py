@@ -24,15 +24,6 @@ def test_sums_with_a_colour_or_another_image_are_those_of_broadcasting(image, al
     assert channels.sum_products(image, other) == pytest.approx((before.astype(float) * other).sum(-1), abs=1e-6)
 
 
-def test_channels_are_scaled_and_filled_each_by_its_own_value(image):
-    gain, offset = np.float32([0.5, 1.5, 2.5]), np.float32([0.1, -0.2, 0.3])
-    assert np.array_equal(channels.scale_channels(image[::2, ::3], gain), image[::2, ::3] * gain)
-    assert np.array_equal(channels.scale_channels(image, gain, offset), image * gain + offset)
-    image[1, 2], image[3, 4, 1] = np.nan, np.nan
-    assert np.array_equal(channels.fill_unknown(image, gain), np.where(np.isnan(image), gain, image))
-    assert np.isnan(image[1, 2]).all()
-
-
 ONE = np.ones((16, 16), np.float32)
 
 

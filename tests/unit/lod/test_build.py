@@ -13,7 +13,6 @@ from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.discs import find_underlay
 from dav_gswt.reconstruction.objects import make_blobs
-from dav_gswt.reconstruction.observation import mask_to_ground
 
 
 @pytest.fixture(scope="module")
@@ -43,18 +42,6 @@ def test_discs_keep_the_mean_heights_of_what_they_cover():
     np.testing.assert_allclose(level.means[: four.size, 2].reshape(four.shape), four, atol=1e-6)
 
 
-def test_low_ground_has_no_dark_rim_in_what_coarser_levels_are_fitted_to():
-    """Below z = 0, rays that meet that plane inside the grid pass beside the field."""
-    field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
-    low = np.float32(0.06 * grid.cells * grid.spacing)
-    sunk = replace(field, means=field.means - np.float32([0, 0, low])), replace(grid, heights=grid.heights - low)
-    views = mask_to_ground(build.render_neighbour_views(*sunk), sunk[1])
-    counted = np.concatenate([view.image[view.weight > 0] for view in views])
-    # a splat's rim of opacity .9 is divided by it, so nothing that counts is darker than the ground itself
-    assert counted.mean(1).min() > 0.7 * field.base_colours.mean(1).min()
-    assert len(counted) > 0.5 * sum((view.weight >= 0).sum() for view in views) / len(views)
-
-
 def test_a_level_is_as_uncertain_as_what_it_was_merged_from():
     """So are the objects, of which the fit drops one, and the underlay."""
     field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
@@ -71,14 +58,6 @@ def test_a_level_is_as_uncertain_as_what_it_was_merged_from():
     np.testing.assert_allclose(level.uncertainty[under], level.means[under, 0] / 3.2, atol=0.07)  # a coarse cell's
 
 
-def test_coarser_levels_are_fitted_to_the_colours_that_are_shipped():
-    field, grid = made.field(), made.grid()
-    directed = np.random.default_rng(2).normal(0, 0.3, (len(field), 3, 3)).astype(np.float32)
-    glossy = replace(field, sh=np.concatenate([field.sh, directed], 1))
-    for one, two in zip(*(build.render_neighbour_views(f, grid) for f in (field, glossy)), strict=True):
-        np.testing.assert_array_equal(one.image, two.image)
-
-
 def test_levels_are_fitted_while_the_exemplar_has_room():
     field, grid = made.field(), made.grid()
     made_levels = build.build_levels(field, grid, AUTO, 3, seed=0)
@@ -89,14 +68,6 @@ def test_levels_are_fitted_while_the_exemplar_has_room():
     assert scales == sorted(scales) and "tiles make it" in made_levels.stopped
     two = build.build_levels(field, grid, 2, 3, seed=0)
     assert len(two.fields) == 2 and two.wanted == 2
-
-
-def test_a_level_that_saves_nothing_is_not_made(monkeypatch):
-    field, grid = made.field(), made.grid()
-    monkeypatch.setattr(build, "MAX_SHARE", 0.1)  # a quarter is left
-    alone = build.build_levels(field, grid, AUTO, 1, seed=0)
-    assert len(alone.fields) == 1 and alone.wanted == 1 and "saves too little" in alone.stopped
-    assert len(build.build_levels(field, grid, 2, 1, seed=0).fields) == 2  # but where it is asked for
 
 
 def test_levels_that_were_written_read_back(levels, tmp_path):

@@ -33,14 +33,6 @@ def things(n, seed=0):
     )
 
 
-def test_a_crop_keeps_discs_and_grid_in_step_and_the_exemplar_in_place(scene):
-    field, grid = scene
-    small, cut = merge.crop_to_blocks(field, grid, 8)
-    assert cut.first_row % 8 == cut.first_column % 8 == 0
-    assert cut.exemplar == pytest.approx(grid.exemplar)
-    np.testing.assert_allclose(small.means[: cut.heights.size, :2], cut.centres[:, :2], atol=1e-5)
-
-
 def test_four_discs_become_one_of_their_mean(scene):
     field, grid = merge.crop_to_blocks(*scene, 8)
     half, coarse = merge.halve_resolution(field, grid)
@@ -52,15 +44,6 @@ def test_four_discs_become_one_of_their_mean(scene):
     np.testing.assert_allclose(half.base_colours[:n, 0], half.means[:n, 0] / 10, atol=1e-5)
     np.testing.assert_allclose(half.means[:n, 2], 0.1 * half.means[:n, 0], atol=1e-5)
     assert np.exp(half.log_scales).mean() > np.exp(field.log_scales).mean()
-
-
-def test_merging_one_gaussian_gives_it_back():
-    one = things(1)
-    back = merge.merge_by_voxel(one, voxel=0.5)
-    np.testing.assert_allclose(back.means, one.means, atol=1e-6)
-    np.testing.assert_allclose(merge.compute_covariances(back), merge.compute_covariances(one), rtol=1e-4, atol=1e-7)
-    np.testing.assert_allclose(back.opacity_logits, one.opacity_logits, atol=1e-4)
-    np.testing.assert_allclose(back.sh, one.sh, atol=1e-5)
 
 
 def test_merged_moments_are_those_of_the_mixture():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.materials.borders import FINEST, WIDTHS, measure_share, measure_strays
+from dav_gswt.materials.borders import WIDTHS, measure_share, measure_strays
 
 CELLS, TILE = 240, 120.0
 EVERY = np.ones((CELLS, CELLS), bool)
@@ -29,18 +29,6 @@ def test_a_wave_strays_at_each_width_by_what_that_and_the_next_filter_leave_of_i
     expected = 2 / np.pi * height * np.diff(left)[:3]  # the narrowest width is not resolved
     # a line at no angle to the grid is shorter than pi / 4 of its crossings say
     assert np.array(strays_of(wave(height, length))) * np.pi / 4 == pytest.approx(expected, rel=0.25, abs=0.25)
-
-
-def test_widths_that_cells_do_not_resolve_have_no_value():
-    for tile in (30.0, 60.0, 120.0, 240.0):
-        assert len(strays_of(wave(3.0, 40.0), tile=tile)) == sum(width * tile >= FINEST for width in WIDTHS)
-
-
-def test_a_narrow_gap_hides_no_stray_but_a_wide_one_does():
-    gap = np.abs(AWAY) > 6
-    assert strays_of(wave(6.0, 80.0), gap) == strays_of(wave(6.0, 80.0))
-    assert strays_of(wave(6.0, 80.0), np.abs(AWAY) > 60) is None
-    assert strays_of(EVERY) is None
 
 
 def test_colours_show_the_fray_that_smooth_labels_hide_but_no_texture():

@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures import mixed_ground as made
-from scipy.ndimage import gaussian_filter
 
 from dav_gswt.materials import classes
 from dav_gswt.materials.maps import NO_CLASS, GroundMaps, GroundMasks
@@ -26,13 +25,6 @@ def test_materials_are_those_of_the_ground_and_every_shrub_is_an_object_on_sand(
     assert not (found.source(0) & true).any()
     assert found.shares.sum() == pytest.approx(1)
     assert found.shares[0] == pytest.approx(np.mean(made.true_materials() == 0), abs=0.04)
-
-
-def test_materials_that_one_start_of_many_tells_apart_are_apart(monkeypatch):
-    one, apart = np.zeros(made.true_materials().shape, int), made.true_materials()
-    for order in ([one, apart], [apart, one]):
-        monkeypatch.setattr(classes.segmentation, "list_segmentations", lambda _, order=order: [(c, []) for c in order])
-        assert classes.classify_ground(made.maps()).number == 2
 
 
 def test_shade_of_a_material_is_no_material():
@@ -113,13 +105,6 @@ def test_things_are_objects_at_any_resolution_and_keep_no_ground_around_them(gro
     assert (found.excluded | found.occupied).mean() < 2 * covered
 
 
-def test_wide_rows_are_texture_or_materials_but_not_left_out():
-    maps, _ = things_on((0.35, 0.27, 0.2), made.GRASS, number=0)
-    colour = maps.colour.copy()
-    colour[:, np.arange(128) % 44 < 22] = made.GRASS
-    assert classes.classify_ground(replace(maps, colour=colour)).excluded.mean() < 0.2
-
-
 def test_named_materials_are_taken_as_they_are_and_ground_without_a_name_or_a_photo_is_excluded():
     maps = made.maps(mixed=False, shrubs=False)
     left, top, known = (np.zeros(maps.known.shape, bool) for _ in range(3))
@@ -133,15 +118,3 @@ def test_named_materials_are_taken_as_they_are_and_ground_without_a_name_or_a_ph
     assert found.excluded[:, 40:].all() and not found.excluded[20:, :40].any()
     found = classes.classify_ground(made.maps(shrubs=False), GroundMasks({}, top))  # materials are found beside it
     assert found.excluded[100:].all() and found.number == 2
-
-
-def test_a_thing_in_dense_growth_stays_in_it():
-    """One material of grass that rises by cells: a tuft more is no landmark."""
-    maps, rng = made.maps(mixed=False, shrubs=False), np.random.default_rng(0)
-    blades = gaussian_filter(rng.normal(size=maps.known.shape), 1.5)
-    colour, surface = maps.colour.copy(), 8 * made.SPACING * blades
-    colour[60:68, 60:68] -= 0.3
-    for rough in (True, False):
-        up = surface if rough else 0 * surface
-        found = classes.classify_ground(replace(maps, colour=colour, surface=up))
-        assert (found.footprints == [] and not found.excluded.any()) == rough

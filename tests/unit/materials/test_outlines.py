@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.ndimage import label
 
 from dav_gswt.materials import outlines
 from dav_gswt.materials.maps import GroundMaps
@@ -62,24 +61,3 @@ def test_footprints_never_overlap_and_keep_their_order(maps):
 @pytest.mark.parametrize("other", [disc(50, 50, 6), disc(20, 22, 18), disc(20, 22, 3)])
 def test_an_outline_that_disagrees_is_not_accepted(maps, other):
     assert outlines.accept_outline(disc(20, 22, 7), other, maps.known) is None
-
-
-def test_an_outline_is_one_piece_without_holes_on_known_ground_off_the_border(maps):
-    (found,) = outlines.refine_footprints(maps, [Footprint(disc(20, 22, 7), 0)])
-    assert label(found.cells)[1] == 1
-    known = maps.known.copy()
-    known[:, :17] = False
-    found = outlines.accept_outline(disc(20, 22, 7) & known, (SHRUB & ~disc(20, 22, 2)) | disc(50, 50, 4), known)
-    assert (found == SHRUB & known).all()
-    rolled = replace(
-        maps, colour=np.roll(maps.colour, -15, 0), surface=np.roll(maps.surface, -15, 0)
-    )  # the shrub reaches the border
-    (found,) = outlines.refine_footprints(rolled, [Footprint(disc(6, 22, 5), 0)])
-    assert not found.cells[: outlines.BORDER].any() and found.cells[outlines.BORDER].any()
-
-
-def test_a_few_cells_are_not_cut(maps):
-    before = disc(20, 22, 1.5)
-    assert outlines.refine_footprints(maps, []) == []
-    (found,) = outlines.refine_footprints(maps, [Footprint(before, 0)])
-    assert (found.cells == before).all()

@@ -56,18 +56,6 @@ def test_even_light_tells_no_sun():
         assert shading.fit_sun(heaps(albedo, lit=False)) is None
 
 
-def test_a_weak_sun_is_told_but_not_taken_out(monkeypatch):
-    """Half of the ground's light varies by what no relief explains."""
-    maps = heaps(SAND)
-    patches = 1 + 0.25 * np.sign(gaussian_filter(np.random.default_rng(5).normal(size=(M, M, 1)), (3, 3, 0)))
-    maps = replace(maps, colour=encode_srgb(decode_srgb(maps.colour) * patches))
-    found = shading.fit_sun(maps)
-    assert found is not None and found.explained < shading.LEAST_EXPLAINED
-    assert found.azimuth == pytest.approx(90, abs=10)
-    monkeypatch.setattr(shading, "even_light", lambda *given: pytest.fail("it is taken out"))
-    assert classes.classify_ground(maps).sun.azimuth == found.azimuth
-
-
 def test_classes_are_those_of_the_ground_and_not_of_its_light():
     assert classes.classify_ground(heaps(SAND)).number == 1
     found = classes.classify_ground(heaps(halves()))

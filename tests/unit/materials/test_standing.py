@@ -59,10 +59,3 @@ def test_one_stone_among_many_is_none():
     rng = np.random.default_rng(1)
     field = [(r + rng.uniform(-2, 2), c + rng.uniform(-2, 2), 6, 5) for r in range(8, M, 13) for c in range(8, M, 13)]
     assert find(scene(field)) == []
-
-
-def test_roughness_is_that_of_usual_blobs():
-    everything, field = np.ones((M, M), bool), [(r, c, 5, 5) for r in range(4, M, 9) for c in range(4, M, 9)]
-    smooth, rough = (standing.measure_roughness(standing.measure_rise(scene(each)), everything) for each in ([], field))
-    assert smooth < 0.5 < rough
-    assert standing.measure_roughness(np.zeros((M, M)), ~everything) == 0.0

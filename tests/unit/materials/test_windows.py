@@ -120,15 +120,6 @@ def maps_of_truth(cells):
     return made.true_materials()[np.ix_(at, at)] == 1
 
 
-def test_windows_that_overlap_are_one_and_far_things_have_their_own():
-    box = windows._Box
-    joined, tiled = windows._join_boxes(
-        [box(0, 0, 40), box(4, 4, 40)], [box(10, 10, 5), box(80, 80, 6), box(84, 84, 6)]
-    )
-    assert tiled == 1 and [each.side for each in joined] == [44, 6, 6]
-    assert [each.side for each in windows._merge_boxes([box(80, 80, 6), box(81, 82, 6)])] == [8]
-
-
 def test_windows_take_the_uncertainty_of_the_draft_that_a_prior_scored(plan):
     """Half of the ground is uncertain by the prior; the windows' own is zero."""
     field, grid = made.field(shrubs=False), made.grid()

@@ -10,7 +10,6 @@ from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import (
     colour_points,
-    group_images,
     read_colmap_model,
     triangulate_model,
     write_colmap_model,
@@ -53,36 +52,12 @@ def test_wrong_matches_are_left_out(flown):
     assert len(triangulate_model(replace(flown, pixels=pixels), flown.names).points) == len(good.points) - 1
 
 
-def test_rays_that_are_nearly_parallel_are_left_out():
-    near = [synth.camera((x, 0, 1), (0, 0, 0)) for x in (0.0, 0.02)]  # 1.1 degrees apart seen from the point
-    wide = [synth.camera((x, 0, 1), (0, 0, 0)) for x in (0.0, 0.03)]  # 1.7 degrees
-    for cameras, count in ((near, 0), (wide, 1)):
-        pair = synth.model(cameras, np.zeros((1, 3)))
-        assert len(triangulate_model(pair, pair.names).points) == count
-
-
 def test_colours_come_from_the_named_images_alone(flown, tmp_path):
     for i, name in enumerate(flown.names):
         image_files.write_png(tmp_path / name, np.full((synth.HEIGHT, synth.WIDTH, 3), 0.2 if i < 3 else 1.0))
     part = triangulate_model(flown, flown.names[:3])
     colours = colour_points(part, [tmp_path / name for name in part.names])
     assert colours == pytest.approx(np.full(colours.shape, 0.2), abs=1e-6)
-
-
-def test_images_are_grouped_by_the_points_that_three_of_them_see(flown):
-    """Images 0 to 2 and 3 to 5; four points tie the groups, forty others are seen by one image of each."""
-    seen = [(range(3), 20), (range(3, 6), 20), ((0, 1, 3), 3), ((2, 4, 5), 1), ((2, 3), 40)]
-    rows = [(images, i) for images, count in seen for i in range(count)]
-    image_of = np.array([i for images, _ in rows for i in images])
-    point_of = np.repeat(np.arange(len(rows)), [len(images) for images, _ in rows])
-    n, m = len(rows), len(image_of)
-    points = {"points": np.zeros((n, 3)), "colours": np.zeros((n, 3), np.float32), "pixels": np.zeros((m, 2))}
-    images = {"names": flown.names[:6], "cameras": flown.cameras[:6]}
-    model = replace(flown, **images, **points, point_of=point_of, image_of=image_of)
-    group, ties = group_images(model, 5)
-    assert group.tolist() == [0, 0, 0, 1, 1, 1] and ties[0, 1] == 4
-    assert group_images(model, 4)[0].tolist() == [0] * 6  # no two images of the groups share four
-    assert group_images(model, 50)[0].tolist() == [*range(6)]
 
 
 def test_a_model_comes_back_from_disk_as_it_was(flown, tmp_path):

@@ -11,7 +11,6 @@ from dav_gswt.errors import InputError
 from dav_gswt.photos import view_split
 from dav_gswt.photos.view_split import (
     find_aim_point,
-    measure_picture_share,
     measure_visible_share,
     split_views,
 )
@@ -69,17 +68,6 @@ def test_test_views_look_at_the_inner_exemplar_and_stay_apart(flown):
     assert apart.min() > 0.25  # more than the step between neighbours in a flight line
 
 
-def test_start_views_are_connected_by_points(flown):
-    """Whatever the seed, each start view shares enough points with one chosen before it, and none is close to it."""
-    sees = [set(flown.point_of[flown.image_of == i]) for i in range(30)]
-    for seed in range(5):
-        start = [flown.names.index(name) for name in split(flown, seed).start]
-        for k in range(1, len(start)):
-            assert max(len(sees[start[k]] & sees[j]) for j in start[:k]) >= view_split.LINK
-        at = np.array([flown.cameras[i].centre for i in start])
-        assert np.linalg.norm(at[:, None] - at, axis=2)[~np.eye(len(at), dtype=bool)].min() > 0.3  # of steps of 0.25
-
-
 def test_photos_of_other_ground_take_no_part_and_are_counted(flown, caplog):
     """An exemplar in one corner: photos of the opposite corner do not see it."""
     frame = scene_frame(exemplar=(-0.9, -0.9, 0.6))
@@ -91,16 +79,6 @@ def test_photos_of_other_ground_take_no_part_and_are_counted(flown, caplog):
     ]
     ground = (-0.9, -0.9, -0.3, -0.3)
     assert all(measure_visible_share(flown.camera(n), ground) >= view_split.MIN_VISIBLE_SHARE for n in named)
-
-
-def test_sight_is_the_share_of_the_square_by_hand():
-    # From height 1 the picture covers 320 / 300 by 240 / 300 of ground, centred under the camera.
-    camera = synth.camera((0, 0, 1))
-    assert measure_visible_share(camera, (-0.3, -0.3, 0.3, 0.3)) == 1
-    assert measure_visible_share(camera, (0.0, -0.4, 0.8, 0.4)) == pytest.approx(160 / 300 / 0.8, abs=1 / 16)
-    assert measure_visible_share(camera, (5.0, 5.0, 6.0, 6.0)) == 0
-    assert measure_picture_share(camera, (0.0, -9.0, 9.0, 9.0)) == 0.5  # its eastern half
-    assert measure_picture_share(camera, (-9.0, 60 / 300, 9.0, 9.0)) == 0.25  # the quarter in the north
 
 
 def test_the_test_views_that_ground_json_names_are_taken_or_refused(flown):

@@ -4,9 +4,7 @@ import os
 import subprocess
 import sys
 
-import numpy as np
 import pytest
-from fixtures.raster_scenes import CAMERAS, gaussians, relative
 
 from dav_gswt import raster
 from dav_gswt.errors import InputError
@@ -86,17 +84,3 @@ def test_a_backend_makes_openmp_wait_passively(name):
 
 
 # --- PyTorch's backend
-
-
-def test_how_torch_groups_its_squares_does_not_matter(monkeypatch):
-    torch = backends.load_backend("torch")
-    pictures, gradients = [], []
-    for together in (1, 1 << 14, 1 << 26):
-        monkeypatch.setattr(torch, "BATCH", together)
-        drawing = torch.Rasterizer()
-        seen = drawing.forward(**gaussians(120), camera=CAMERAS["pinhole"])
-        pictures.append(seen.colour)
-        gradients.append(drawing.backward(seen.colour).means)
-    for one in (1, 2):
-        np.testing.assert_allclose(pictures[one], pictures[0], atol=1e-6)  # sums of matrix products, in other orders
-        assert relative(gradients[one], gradients[0]) < 1e-5

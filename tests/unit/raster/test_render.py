@@ -4,7 +4,6 @@ import numpy as np
 from fixtures.raster_scenes import CAMERAS, gaussians
 
 from dav_gswt.field import GaussianField, rgb_to_sh
-from dav_gswt.geometry import cameras
 from dav_gswt.raster import harmonics, render
 
 
@@ -49,11 +48,3 @@ def test_harmonics_have_the_signs_that_3dgs_gives_them():
     # looking along +x, +y, +z: degree 1 is (-y, z, -x) sqrt(3 / 4 pi)
     c = np.sqrt(3 / (4 * np.pi))
     np.testing.assert_allclose(harmonics.basis(np.eye(3), 1)[:, 1:], [[0, 0, -c], [-c, 0, 0], [0, c, 0]], atol=1e-15)
-
-
-def test_degree_zero_looks_the_same_from_everywhere_and_colour_is_never_negative():
-    sh, camera = np.array([[[-5.0, 0, 1]]], np.float32), cameras.pinhole((0, 0, 4), (0, 0, 0), 8, 8, 60.0)
-    found = harmonics.seen_colours(sh, np.array([[0.0, 0, 1]]), camera)
-    np.testing.assert_allclose(found, [[0, 0.5, 0.5 + 0.28209479]], rtol=1e-6)
-    padded = np.concatenate([sh, np.zeros((1, 15, 3), np.float32)], 1)
-    np.testing.assert_allclose(harmonics.seen_colours(padded, np.array([[0.6, 0, 0.8]]), camera), found, rtol=1e-6)

@@ -31,14 +31,6 @@ def test_the_core_and_numpy_agree_the_number_of_threads_changes_no_bit_and_other
     np.testing.assert_allclose(found.squares[~differ], wanted.squares[~differ], atol=1e-5)
 
 
-def test_deviations_are_those_of_the_colours():
-    rng = np.random.default_rng(1)
-    colours = rng.uniform(0, 1, (5, 1, 7, 3)).astype(np.float32)
-    sums = photo_colours.ColourSums(colours.sum(0), (colours**2).sum((0, 3)), np.full((1, 7), 5, np.float32))
-    wanted = np.sqrt(colours.astype(float).var(0, ddof=1).sum(-1))
-    np.testing.assert_allclose(sums.deviations(), wanted, atol=1e-4)
-
-
 def test_a_line_that_one_photo_shows_does_not_count_and_nothing_else_is_lost():
     grid = made.grid(0.04)
     photos = made.photos(5, size=64)

@@ -56,20 +56,6 @@ def test_pixels_that_do_not_count_change_nothing_and_exposure_is_forgiven_where_
     assert evaluate([replace(view, weight=np.zeros_like(weight))])["psnr"] is None
 
 
-def test_lpips_counts_by_the_area_that_counts():
-    """The same wrong half, seen alone or beside a right half: as far off where it counts."""
-    (view,) = patch.photos(1, size=96)
-    wrong = view.image.copy()
-    wrong[:, :48] = 1 - wrong[:, :48]
-    half = np.zeros_like(view.weight)
-    half[:, :48] = 1
-    alone, beside = (
-        evaluate([replace(view, image=wrong, weight=weight)], weights=lpips_arrays.random())["lpips"]
-        for weight in (half, view.weight)
-    )
-    assert alone == pytest.approx(2 * beside, rel=1e-3)
-
-
 def test_without_weights_lpips_is_null_which_is_said_and_so_is_all_without_test_views(caplog):
     with caplog.at_level(logging.INFO):
         found = evaluate(off([0.02]))

@@ -9,7 +9,6 @@ from fixtures.frames import scene_frame
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.scene_frame import Extent
 from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import coarse, discs, ground, photo_colours
@@ -35,19 +34,6 @@ def test_the_exemplar_is_whole_cells_inside_the_well_seen_square_and_the_margin_
     rows, columns = grid.shape
     assert grid.west >= -2 - 1e-9 and grid.west + columns * grid.spacing <= 10 + 1e-9
     assert grid.south >= -1 - 1e-9 and grid.south + rows * grid.spacing <= 9 + 1e-9
-
-
-def test_judged_is_the_exemplar_unless_far_more_is_modelled():
-    usual = place(margin=ground.MARGIN)
-    west, south, side = usual.exemplar
-    assert usual.judged == pytest.approx((west, south, west + side, south + side))
-    wide = replace(FRAME, extent=Extent(-20.0, 0.0, 10.0, 9.0))
-    whole = place(wide, margin=ground.WHOLE)
-    west, south, side = whole.exemplar
-    rows, columns = whole.shape
-    assert whole.judged[0] == pytest.approx(whole.west + ground.MARGIN * side)
-    assert whole.judged[1] == pytest.approx(south) and whole.judged[3] >= south + side
-    assert whole.judged[2] <= whole.west + columns * whole.spacing
 
 
 def test_the_cap_widens_the_spacing_and_an_exemplar_too_small_for_the_levels_is_refused():
@@ -144,18 +130,3 @@ def test_where_no_ground_is_seen_there_is_no_value():
     found += [one([place], photo((0, 0.01, 4))) for place in ((1.5, 0, 2), (0, 0, 5))]
     found += [one([(0.5, 0, 2)], photo((0, 0.01, 4), weight=0.0))]
     np.testing.assert_array_equal(found, np.full((4, 1), np.nan))
-
-
-def test_most_photos_decide_and_few_have_no_say():
-    grid = around()
-    values = np.where(eastings(grid) > 0.5, np.float32(1), np.float32(0.2))
-    values[eastings(grid) < -0.5] = np.nan
-    west, middle, east = photo((-2, 0.01, 3)), photo((0, 0.01, 3)), photo((2, 0.01, 3))  # they see 1, .2 and nothing
-    place = [[0.0, 0.0, 1.5]]
-
-    def tell(*photos, least=1):
-        return float(one(place, *photos, values=values, least=least)[0])
-
-    assert tell(west) == 1 and tell(middle) == pytest.approx(0.2) and np.isnan(tell(east))
-    assert tell(west, middle) == pytest.approx(0.6) and tell(west, middle, middle, east) == pytest.approx(0.2)
-    assert tell(west, middle, east, least=2) == pytest.approx(0.6) and np.isnan(tell(west, middle, east, least=3))

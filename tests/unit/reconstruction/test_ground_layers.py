@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 from fixtures import ground as made
-from scipy.spatial.transform import Rotation
 
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry import cameras
@@ -15,13 +14,6 @@ from dav_gswt.reconstruction.coarse import estimate_uncertainty
 from dav_gswt.reconstruction.fitting import state
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 from dav_gswt.reconstruction.objects import make_blobs
-
-
-def test_a_discs_thin_axis_is_the_surfaces_normal():
-    east, north = np.array([0.0, 0.5, -0.3]), np.array([0.0, 0.0, 0.7])
-    turned = Rotation.from_quat(discs.slopes_to_quaternions(east, north), scalar_first=True).apply([0, 0, 1])
-    normal = np.stack([-east, -north, np.ones(3)], 1)
-    np.testing.assert_allclose(turned, normal / np.linalg.norm(normal, axis=1)[:, None], atol=1e-6)
 
 
 def test_discs_lie_on_the_surface_unseen_ones_are_uncertain_and_unknown_ones_take_their_neighbours_colours():
@@ -37,17 +29,6 @@ def test_discs_lie_on_the_surface_unseen_ones_are_uncertain_and_unknown_ones_tak
     colours = np.full((24, 3), np.nan, np.float32)
     colours[known.ravel()] = 0.25
     np.testing.assert_allclose(discs.fill_unknown(colours, known), 0.25, atol=1e-6)
-
-
-def test_a_field_has_its_underlay_after_its_discs_and_no_thing_is_lost_with_it():
-    grid, field = made.grid(), made.field()
-    n = grid.heights.size
-    assert discs.find_underlay(field, grid) == slice(n, n + discs.count_underlay(grid))
-    alone = discs.remove_underlay(field, grid)
-    assert alone.ground.all() and len(alone) == grid.heights.size
-    assert discs.find_underlay(alone, grid).stop == grid.heights.size
-    few = replace(field, ground=np.zeros(len(field), bool))[: grid.heights.size // 2]
-    assert discs.remove_underlay(few, grid) is few
 
 
 def test_no_sky_shines_through_the_ground_between_shrunken_discs():

@@ -76,16 +76,6 @@ def test_sand_that_looks_like_sand_is_no_tower_over_what_no_two_photos_show_alik
     assert found.above.max() < 0.25  # of 1.2 that are tried
 
 
-def test_nothing_is_a_column():
-    above = np.zeros((20, 20))
-    above[2:10, 2:10] = 0.2  # a bush, 8 cells of .1 wide, ...
-    above[5, 5] = above[5, 6] = 1.5  # ... and over it what is not even .2 wide
-    above[12:18, 12:18] = 1.5  # a tree
-    found = plane_sweep.reject_columns(above > 0, above, 0.1)
-    assert found[12:18, 12:18].all() and found[2:10, 2:10].sum() == 62 and found.sum() == 98
-    assert not plane_sweep.reject_columns(np.zeros((4, 4), bool), np.zeros((4, 4)), 0.1).any()
-
-
 def test_on_ground_that_fewer_than_two_photos_see_nothing_stands(photos):
     alone = plane_sweep.sweep_heights(made.grid(0.1), photos[:1], flying_height=4.0, pixel=0.08)
     assert not alone.stands.any() and not alone.above.any()
@@ -101,22 +91,6 @@ def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
     ceiling = objects.compute_ceiling(grid, found, shell)
     assert ceiling[inner(grid, 0.3, 0.7)].max() < 0.3 * TALL  # free space over bare ground
     assert ceiling[inner(grid, 1.4, 1.8)].min() > TALL
-
-
-def test_costs_add_up_over_paths_from_four_sides_by_a_plain_loop():
-    costs = np.random.default_rng(0).uniform(0, 1, (4, 3, 5)).astype(np.float32)
-    one, more, total = 0.1, 0.25, np.zeros((4, 3, 5))
-    for down, across in ((0, 1), (0, -1), (1, 0), (-1, 0)):
-        path = costs.astype(float)
-        for r in range(3)[:: down or 1]:
-            for c in range(5)[:: across or 1]:
-                if 0 <= r - down < 3 and 0 <= c - across < 5:
-                    last = path[:, r - down, c - across]
-                    steps = np.abs(np.subtract.outer(np.arange(4), np.arange(4)))
-                    best = (last + np.where(steps == 0, 0, np.where(steps == 1, one, more))).min(1)
-                    path[:, r, c] += best - last.min()
-        total += path
-    np.testing.assert_allclose(plane_sweep.aggregate_costs(costs, one, more), total, rtol=1e-5)
 
 
 def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_nothing():

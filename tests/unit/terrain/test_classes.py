@@ -23,11 +23,6 @@ def classes_of(terrain) -> Classes:
     return Classes(entry, terrain["materials"], terrain["side"], heights)
 
 
-@pytest.fixture
-def sand_and_grass():
-    return Classes(two_classes(), 2, SIDE)
-
-
 def discs_at(places, z=0.0):
     means = np.concatenate([places * SIDE, np.full((len(places), 1), z)], 1)
     return gaussians(means, [0.5] * 3, 0.1).means

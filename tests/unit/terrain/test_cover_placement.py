@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 from fixtures.land_covers import GRASS, SAND, SIDE, cover_content
 from fixtures.terrains import HILLS, SKY, walking
-from scipy.spatial.transform import Rotation
 
 from dav_gswt.bundle.build import BundleOptions, write_bundle
-from dav_gswt.lod.merge import compute_covariances
-from dav_gswt.materials.model import turn_and_scale, turn_rows
 from dav_gswt.terrain import endless, placement, stills, visibility
 
 MAGENTA = [1.0, 0.0, 1.0]
@@ -54,17 +51,6 @@ def test_a_picture_shows_both_materials_without_a_gap_and_the_objects(cover, bar
     assert full[changed].mean(0) == pytest.approx([0.2, 0.35, 0.15], abs=0.1)
 
 
-def test_an_object_is_turned_and_scaled_about_its_foot(cover):
-    source = cover.objects[0][0]
-    n, foot = len(source), np.array([3.0, 4.0, 0.5])
-    way = turn_rows(np.full(n, 0.3))
-    made = turn_and_scale(source, way, np.full(n, 1.1), np.tile(foot, (n, 1)))
-    turn = Rotation.from_euler("z", 0.3).as_matrix()
-    assert made.means == pytest.approx(1.1 * source.means @ turn.T + foot, abs=1e-5)
-    expected = 1.1**2 * turn @ compute_covariances(source) @ turn.T
-    assert compute_covariances(made) == pytest.approx(expected, rel=1e-4, abs=1e-9)
-
-
 def test_an_object_is_drawn_with_the_last_of_the_cells_that_it_touches(cover, seen):
     eye, cells, things = seen
     moved = 0
@@ -78,19 +64,6 @@ def test_an_object_is_drawn_with_the_last_of_the_cells_that_it_touches(cover, se
             assert steps[k] == steps[last]
             moved += (cells.i[k], cells.j[k]) != (some.i[n], some.j[n])
     assert moved > 0
-
-
-def test_objects_come_after_the_tiles_of_their_cell_the_farthest_first(cover, seen):
-    eye, cells, things = seen
-    k, some = next((k, some) for k, some in things.items() if len(some) > 1)
-    alone, _ = placement.place_cell(cover, cells[k : k + 1], eye)
-    field, slope = placement.place_cell(cover, cells[k : k + 1], eye, some)
-    np.testing.assert_array_equal(field.means[: len(alone)], alone.means)
-    assert len(slope) == len(field) > len(alone)
-    feet = np.stack([(some.i + some.u) * SIDE, (some.j + some.v) * SIDE], 1) - eye[:2]
-    first = field.means[len(alone), :2]
-    farthest = feet[np.argmax(np.linalg.norm(feet, axis=1))]
-    assert np.linalg.norm(first - farthest) < 1.0
 
 
 def test_an_object_stands_on_the_surface(cover, seen):

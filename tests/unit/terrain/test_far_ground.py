@@ -47,15 +47,6 @@ def test_rays_meet_the_hills_that_they_march_into():
     assert np.quantile(np.abs(seen[hit] - expected), 0.9) < 0.0135
 
 
-def test_hills_keep_the_detail_that_points_can_show():
-    x, y = np.random.default_rng(0).uniform(-1e3, 1e3, (2, 50))
-    height, slope = HILLS.at(x, y)
-    first, _ = Hills(6.0 / 1.56, 60.0, 1, 2).at(x, y)
-    for spacing, expected in ((0.0, height), (15.0, first), (22.5, first / 2), (30.0, 0 * first)):
-        np.testing.assert_allclose(HILLS.smooth_at(x, y, np.full(50, spacing))[0], expected, atol=1e-12)
-    assert (HILLS.smooth_at(x, y, np.full(50, 30.0))[1] == 0).all() and (slope != 0).any()
-
-
 @pytest.mark.parametrize("height", [1.0, 6.0, 30.0])
 def test_ground_has_the_colour_of_the_horizon_there(hilly, height):
     backdrop = stills.Backdrop.for_eye(hilly, walking(hilly, 0.0, height).centre, SKY, GROUND)

@@ -63,25 +63,6 @@ def test_borders_stray_as_photographed_ones_do_at_every_width(strays):
     assert np.log(found[:3] / strays) == pytest.approx(np.zeros(3), abs=0.35)
 
 
-def test_straight_borders_have_no_jitter_and_no_octaves_finer_than_their_patches():
-    entry = fits.fit_classes(content_of((0.6, 20.0), (0.4, 20.0), strays=[0.0, 0.0, 0.0]), 7)
-    assert entry.jitter.amplitude == 0 and all(len(each) == len(fits.WIDER) + 1 for each in entry.rule[0].gains)
-
-
-def test_below_the_widths_that_were_seen_strays_fall_as_they_did():
-    found = fits._find_strays(content_of((0.6, 20.0), (0.4, 20.0), strays=[0.04 * SIDE, 0.02 * SIDE]))
-    assert found == pytest.approx(0.04 * 0.5 ** np.arange(6))
-
-
-def test_patches_have_many_sizes():
-    """On lines, stretches vary more than those of noise of one octave, whose deviation is about .8 of their mean."""
-    entry = fits.fit_classes(content_of((0.6, 12.0), (0.4, 12.0)), 7)
-    i, j = np.meshgrid(np.arange(20_000), np.arange(0, 16_000, 1000))
-    best = Classes(entry, 2, SIDE).lattice_scores(i.ravel(), j.ravel()).argmax(1).reshape(i.shape)
-    stretches = np.concatenate([np.diff(np.flatnonzero(np.diff(row))) for row in best])
-    assert stretches.std() / stretches.mean() > 0.85
-
-
 def test_the_relief_of_the_ground_itself_does_not_count_as_height():
     content = content_of((0.5, 10.0), (0.5, 10.0))
     rng = np.random.default_rng(1)
@@ -107,11 +88,3 @@ def test_every_object_has_its_density_in_another_window():
     counts = np.bincount(scatter.instances_in(i, j).number) / (40 * 40 * SIDE**2 * np.array([0.4, 0.6]))
     # the window has about 1000 and 900 things, and a share of ground of its own
     assert counts == pytest.approx([0.1, 0.06], rel=0.15)
-
-
-def test_strays_follow_the_side_of_the_tiles():
-    strays = [0.4, 0.2, 0.1]  # at 0.1, 0.05 and 0.025 of a tile's side
-    for ratio in (0.5, 1.0, 1.1):
-        assert fits.resample_strays(strays, ratio) == pytest.approx([ratio * stray for stray in strays])
-    assert fits.resample_strays([0.0, 0.0], 2.0) == [0.0, 0.0]
-    assert fits.resample_strays([0.4], 0.5) == pytest.approx([0.4 * fits.FALL])

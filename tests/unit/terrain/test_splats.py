@@ -92,13 +92,6 @@ def test_a_given_order_is_kept_however_wrong_it_is():
     np.testing.assert_allclose(ray.colour[20, 32], expected, atol=1e-5)
 
 
-def test_what_is_behind_or_too_near_or_out_of_sight_is_left_out():
-    field = made(4)
-    means = np.array([[-5, 0, 0], [0.5, 0, 0], [6, 90, 0], [6, 1, -1]], np.float32)
-    seen, _ = splats.project(replace(field, means=means), level(field), CAMERA, 1.0)
-    assert seen.depths == pytest.approx([(CAMERA.rotation @ means[3])[2]])
-
-
 def test_discs_underfoot_fade_instead_of_rising_over_the_horizon():
     """A disc one deviation below the eye is drawn by no plane through its centre; one far off keeps its bits."""
     two = replace(made(2), means=np.array([[1, 0, -0.5], [8, 0, -2]], np.float32))

@@ -118,14 +118,6 @@ def test_nothing_is_added_where_it_is_turned_off_or_tiles_are_known_by_their_gau
     assert tile is plain.tiles[0, int(cells.tile[0])]
 
 
-def test_power_of_an_octave_is_the_variance_of_its_waves():
-    y, x = np.mgrid[:96, :96]
-    for period, octave in ((32, 1), (15, 2)):  # windows of 48 cells; octaves 24 to 48 and 12 to 24
-        power = fit_variation.measure_octaves(np.sin(2 * np.pi * x / period), 96, 24)
-        # a plane is subtracted without the window's weights, so that parts do not add up exactly
-        assert power[octave] == pytest.approx(0.5, rel=0.3) and power.argmax() == octave and len(power) == 3
-
-
 @pytest.mark.parametrize("waves", [[], [WaveEntry(0.63, [[0.1] * 3])]])
 def test_manifests_whose_waves_do_not_fit_are_refused(tmp_path, waves):
     content = replace(cover_content(), variation=WAVES)

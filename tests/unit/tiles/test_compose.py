@@ -51,21 +51,6 @@ def test_mean_heights_of_the_finest_tiles_are_equal(tiles):
     assert np.ptp(heights) < 1e-6
 
 
-def test_levelling_vanishes_at_the_border_in_value_and_slope():
-    side, step = 3.0, 1e-5
-    edge = np.array([[0, 1.0], [side, 1.0], [1.0, 0], [1.0, side]])
-    inward = edge + step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
-    np.testing.assert_allclose(compose.bump(edge, side), 0, atol=1e-15)
-    # quadratic: (pi step / side)^2
-    assert compose.bump(inward, side).max() / step < 2 * step * (np.pi / side) ** 2
-    assert compose.bump(np.array([[1.5, 1.5]]), side) == pytest.approx(1)
-
-
-def test_a_coarse_cell_takes_the_label_of_most_of_its_cells():
-    labels = np.array([[1, 1, 0, 2], [1, 3, 2, 0]], np.uint8)
-    np.testing.assert_array_equal(compose.coarsen_labels(np.concatenate([labels, labels]), 2), [[1, 0], [1, 0]])
-
-
 def test_things_follow_the_cell_under_their_centre(sample_ground):
     level = compose.bin_gaussians(sample_ground.levels[0], sample_ground.exemplar, 1)
     n, shift = 8, np.zeros((9, 2), int)
@@ -183,20 +168,6 @@ def test_four_discs_become_one_of_their_means(tile):
             np.testing.assert_allclose(values(flat)[disc], values(fine)[under].mean(0), atol=1e-5)
         sizes = fine.log_scales[under, :2].mean()
         np.testing.assert_allclose(flat.log_scales[disc, :2], sizes + np.log(2), atol=1e-5)
-
-
-def test_the_underlay_is_renewed_and_nothing_else_is_taken_for_it(tile):
-    assert compose.find_underlay(tile, SPACING).sum() == CELLS**2 // 4
-    half = compose.merge_cells(tile, CELLS, SPACING)
-    assert compose.find_underlay(half, 2 * SPACING).sum() == CELLS**2 // 16
-    bare = compose.merge_cells(tile[~compose.find_underlay(tile, SPACING)], CELLS, SPACING)
-    assert not compose.find_underlay(bare, 2 * SPACING).any() and bare.ground.sum() == half.ground.sum()
-
-
-def test_a_cell_without_a_disc_stays_empty(tile):
-    inside = (tile.means[:, :2] < 2 * SPACING).all(1) & tile.ground
-    half = compose.merge_cells(tile[~inside], CELLS, SPACING)
-    assert half.ground.sum() == CELLS**2 // 4 - 1 and np.isfinite(half.means).all()
 
 
 def test_tiles_go_on_where_the_exemplar_ends(cut, tiles):

@@ -5,7 +5,7 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.tiles import layout
-from dav_gswt.tiles.layout import NE, NW, SE, SW, E, Layout, N, PatchPlaces, S, W
+from dav_gswt.tiles.layout import NE, NW, SE, SW, E, Layout, PatchPlaces, W
 
 PLAN = Layout(exemplar=40, levels=1, side=10, strip=2, corner=3)
 PLACES = PatchPlaces(
@@ -28,13 +28,6 @@ def test_a_tile_is_whole_in_the_cells_of_every_level(exemplar, levels, strip):
     assert plan.block < plan.strip < plan.corner < plan.side / 2
     # the first coarser level is composed of patches, too
     assert plan.composed_levels > 1 or plan.levels == 1 or plan.side < 2 * layout.MIN_BLOCKS
-
-
-def test_coarse_levels_do_not_make_tiles_large():
-    # 224 / 2 = 112 cells: three and a half of 32; the nearest whole number is four
-    assert layout.plan_layout(224, 6, 0.5, 0.125).side == 128
-    assert layout.plan_layout(224, 3, 0.5, 0.125).side == 112
-    assert layout.plan_layout(224, 6, 0.5, 0.125).block == layout.plan_layout(224, 3, 0.5, 0.125).block == 4
 
 
 def test_auto_makes_the_levels_that_are_ever_drawn():
@@ -64,17 +57,3 @@ def test_the_corner_patch_is_whole_where_four_tiles_meet():
     np.testing.assert_array_equal(shift[SE] + [n - 1, 0], middle + [-1, 0])
     np.testing.assert_array_equal(shift[NW] + [0, n - 1], middle + [0, -1])
     np.testing.assert_array_equal(shift[NE] + [n - 1, n - 1], middle - 1)
-
-
-def test_a_frame_holds_strips_at_its_sides_and_the_corner_patch_in_its_corners():
-    n, b = PLAN.side, PLAN.strip
-    mask = np.zeros((2, n, 2 * b), bool)
-    mask[:, :b] = mask[:, n - b :] = True
-    mask[1, b, b] = True  # colour 1: the corner patch reaches one cell further, right of the edge
-    labels = layout.frame_labels(PLAN, mask, mask.swapaxes(1, 2), 8)
-    assert (labels[:b, :b] == SW).all() and (labels[:b, n - b :] == SE).all()
-    assert (labels[n - b :, :b] == NW).all() and (labels[n - b :, n - b :] == NE).all()
-    assert (labels[:b, b : n - b] == S).all() and (labels[n - b :, b : n - b] == N).all()
-    assert labels[b, 0] == SW and labels[b, 1] == W and (labels[b + 1 : n - b, :b] == W).all()
-    assert (labels[b : n - b, n - b :] == E).all()
-    assert (labels[b : n - b, b : n - b] == layout.CENTRE).all()

@@ -31,51 +31,6 @@ def test_charges_sum_to_the_power_of_what_comes_back_but_for_the_patches_own():
     assert total == pytest.approx(power(np.sum(tiles, 0)) - sum(own(tile) for tile in tiles))
 
 
-def test_only_what_shows_counts():
-    shown = patches.start_overlay(exemplar(), 16, (16, 12), (4, 3))
-    x, y = place = np.array([8, 4])
-    tile = np.zeros((16, 16, 3))  # what does not show adds nothing to a row's mean
-    tile[:6, :8] = shown.ground[y + 3 : y + 9, x + 4 : x + 12]
-    assert shown.compute_costs(shown.crop_all(place[None]))[0] == pytest.approx(
-        (power(tile) - own(tile)) * 16 * 16 / (6 * 8)
-    )
-
-
-def test_pairs_are_charged_what_both_bring_back_but_for_their_own():
-    empty = patches.start_overlay(exemplar(), 16, (16, 16))
-    places = np.array([[0, 0], [8, 4], [20, 24]])
-    charges = empty.compute_pair_costs(places)
-    for i, j in np.ndindex(charges.shape):
-        tiles = [empty.crop(places[k]) for k in (i, j)]
-        assert charges[i, j] == pytest.approx(power(sum(tiles)) - sum(own(tile) for tile in tiles))
-
-
-def test_what_lies_over_a_patch_shows_in_its_place():
-    over = np.zeros((16, 8), bool)
-    over[:3] = over[-2:] = True
-    rows, columns = (v + k for v, k in zip(np.mgrid[:16, :8], (20, 30), strict=True))
-    shown = patches.start_overlay(exemplar(), 16, (8, 16), cover=(over, (rows, columns)))
-    crop = shown.crop(np.array([4, 6]))
-    np.testing.assert_array_equal(crop[over], shown.ground[20:36, 30:38][over])
-    np.testing.assert_array_equal(crop[~over], shown.ground[6:22, 4:12][~over])
-
-
-def test_two_strips_of_a_direction_never_show_nearly_the_same():
-    places = np.array([[0, 0], [2, 0], [8, 1], [9, 40]])
-    size = (12, 80)
-    pairs = patches.rank_pairs(places, np.array([0.0, 0, 1, 5]), np.zeros((4, 4)), size, [])
-    # nearer than a quarter of the shorter side is the same, however cheap; then costs decide, then ground shown twice
-    assert [pair.tolist() for pair in pairs[[0, 1, -1]]] == [places[k].tolist() for k in ([0, 2], [1, 2], [0, 1])]
-    alone = patches.rank_pairs(places[:1], np.zeros(1), np.zeros((1, 1)), size, [])
-    assert alone.tolist() == [[[0, 0], [0, 0]]]  # rather than none
-
-
-def test_ground_seen_beside_a_strip_is_dearer():
-    places = np.array([[0, 0], [20, 0], [40, 0]])
-    pairs = patches.rank_pairs(places, np.zeros(3), np.zeros((3, 3)), (10, 30), [(places[0], (10, 10))])
-    assert pairs[0].tolist() == [[20, 0], [40, 0]]
-
-
 def test_a_strip_is_no_better_for_being_barer_than_the_ground():
     rng = np.random.default_rng(2)
     colour = np.full((60, 60, 3), 0.5)
@@ -90,24 +45,6 @@ def test_a_strip_is_no_better_for_being_barer_than_the_ground():
     assert plain[bare].max() < np.median(plain)
     assert set(odd[bare]) == {odd.min()} == {np.median(plain)}
     assert odd[-1] > 2 * odd.min()  # a landmark is dear
-
-
-def test_the_mismatch_is_the_mean_of_the_least_differences_along_the_lines():
-    rng = np.random.default_rng(4)
-    guide = patches.GuidanceMaps(rng.random((20, 20, 2)), np.zeros((20, 20)), np.zeros((20, 20)))
-    zone, shown = rng.integers(0, 8, (2, 5, 3)), rng.integers(0, 20, (2, 5, 3))  # five lines of three cells
-    found = patches.compute_mismatch(guide, (zone[0], zone[1]), (shown[0], shown[1]), np.array([[3, 4], [0, 12]]))
-    for cost, (x, y) in zip(found, ((3, 4), (0, 12)), strict=True):
-        off = guide.features[zone[0] + y, zone[1] + x] - guide.features[shown[0], shown[1]]
-        assert cost == pytest.approx((off**2).sum(-1).min(1).mean())
-
-
-def test_ground_that_is_seen_beside_or_was_taken_comes_last():
-    places = np.array([[0, 0], [1, 0], [30, 0], [60, 0]])
-    costs, beside, taken = np.array([0, 0, 0.1, 0.2]), [(places[2], (10, 10))], places[:1]
-    ranked = patches.rank_places(places, costs, (10, 10), beside, taken)
-    assert ranked.tolist() == [[60, 0], [30, 0], [1, 0], [0, 0]]
-    assert patches.find_fitting(np.array([1.0, 1.7, 1.9, 9.0])).tolist() == [0, 1]
 
 
 def test_a_landmark_is_what_stands_out_of_its_surroundings_not_a_shade_or_grain():

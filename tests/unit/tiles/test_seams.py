@@ -50,16 +50,6 @@ def test_a_gradient_across_an_edge_makes_only_that_edge_cheaper():
     np.testing.assert_allclose(upper, 0.2 / energy.EPS, rtol=1e-12)
 
 
-def test_both_terms_are_weighed_above_and_below():
-    nothing, (a, b) = patches(np.zeros((2, 2, 1)), np.zeros((2, 2, 1)))
-    step = np.array([0.0, 0, 1, 1])[None, :, None]
-    one = ColourLayer(np.full((2, 4, 2), 0.5), LayerScales(2.0, 4.0), nothing.values + step)
-    other = ColourLayer(np.full((2, 4, 2), 1.0), LayerScales(3.0, 2.0), nothing.values + 3 * step)
-    # D = 2 / 2 and 6 / 3, G = 4 * 0.5 / 4 and 4 * 1 / 2
-    for cost in energy.compute_edge_costs([(0.25, one), (0.75, other)], a, b):
-        np.testing.assert_allclose(cost, (0.25 * 1 + 0.75 * 2) / (0.25 * 0.5 + 0.75 * 2 + energy.EPS), rtol=1e-12)
-
-
 @given(seed=st.integers(0, 2**32 - 1), share=SHARES, place=st.tuples(*[st.integers(0, 8)] * 4))
 @settings(max_examples=20)
 def test_weights_are_symmetric_finite_not_negative_and_0_for_the_same_patch(seed, share, place):
@@ -109,15 +99,6 @@ def test_cut_of_a_small_grid_is_as_cheap_as_the_best_of_all_partitions(seed):
     assert not found.labels[first].any() and found.labels[second].all()
 
 
-@pytest.mark.parametrize("forced", [0, 1])
-def test_where_only_one_patch_is_forced_all_is_that_patch_and_there_is_no_seam(forced):
-    sides = [np.zeros((3, 4), bool), np.zeros((3, 4), bool)]
-    sides[forced][0] = True
-    found = energy.find_cut(np.full((3, 3), 0.3), np.full((2, 4), 0.3), *sides)
-    assert found.energy == 0 and (found.labels == bool(forced)).all()
-    assert energy.find_cut(np.zeros((3, 3)), np.zeros((2, 4)), *sides).energy == 0  # free cells may show either
-
-
 def test_a_straight_seam_costs_what_it_crosses_and_no_less_than_the_cut():
     rng = np.random.default_rng(3)
     right, upper = rng.random((5, 5)), rng.random((4, 6))
@@ -155,12 +136,6 @@ def test_cover_is_the_opaque_area_over_a_cell():
     expected[0, 0] = 0.8 * 2 * np.pi * 0.05**2 / 0.25
     expected[1, 2] = 2 * 0.5 * 2 * np.pi * 0.1**2 / 0.25
     np.testing.assert_allclose(found, expected, rtol=1e-6)
-
-
-def test_what_lies_on_the_ground_or_under_it_hides_nothing():
-    field = a_field([-0.9, 2.1, 0.2, 1.0, 0.9], [-0.4, 2.1, -3.0, 1.0, 0.9])
-    assert not compose.compute_cover(field, EXEMPLAR, np.zeros((4, 4))).any()
-    assert compose.compute_cover(field, EXEMPLAR, np.full((4, 4), -4.0)).any()  # of a ground below them they stand
 
 
 def test_cover_is_at_most_one_and_nothing_stands_on_ground_that_is_not_known():

@@ -134,18 +134,6 @@ def test_poses_in_the_ground_near_it_and_behind_the_ridge_are_rejected_and_no_ot
     }
 
 
-@pytest.mark.parametrize("height, columns", [(1.5, 3), (1.7, 5), (2.0, 7)])
-def test_what_is_in_sight_over_the_ridge_by_hand(height, columns):
-    """From (2.6, 0, z) the ground at x shows where the line passes over the ridge: z (RIDGE - x) / (2.6 - x) >= 1,
-    that is x <= (2.6 - RIDGE z) / (1 - z). The lattice's columns stand at (2 i - 8) / 9."""
-    last = (2.6 - RIDGE * height) / (1 - height)
-    assert np.sum((2 * np.arange(9) - 8) / 9 <= last) == columns
-    site = feasibility._build_mesh(ground())
-    camera = candidate("", (2.6, 0, height))[1]
-    shown, seen = feasibility._count_visible(site, [camera], camera.centre[None])
-    assert (shown[0], seen[0]) == (81, 9 * columns)
-
-
 @pytest.mark.parametrize("move", [{"shift": (1e6, -1e6, 1e6)}, {"scale": 1e-3}], ids=str)
 def test_the_world_may_lie_anywhere_and_have_any_unit(usual, move):
     assert verdicts(**move) | {"in a tree": "inside an object"} == usual

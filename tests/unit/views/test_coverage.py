@@ -37,16 +37,6 @@ def gain(cells, taken, one, importance=None):
     return coverage.DirectionalCoverage(cells, cells.view(taken), cells.view([one]), importance).gain(0)
 
 
-def test_pixels_are_shared_among_the_cells_that_a_picture_shows_whose_middles_are_where_their_gaussians_are(cells):
-    inside = cells.view([look(1.6, 1.7, 3.0)]).pixels[0]
-    assert inside.sum() == pytest.approx(64 * 64, rel=0.03)
-    corner = cells.view([look(0.4, 0.5, 1.0, (0.4, 0.4, 0.0))]).pixels[0].reshape(coverage.CELLS, -1)
-    assert corner[:14, :14].sum() > 0.99 * corner.sum()
-    side = 3.2 / coverage.CELLS
-    x, y = cells.middle.reshape(coverage.CELLS, -1, 3)[3, 20, :2]
-    assert abs(x - 20.5 * side) < side and abs(y - 3.5 * side) < side
-
-
 def test_gains_are_what_the_formula_says(cells):
     """K_gb and the logarithm, cell by cell."""
     taken, one = look(3.6, 1.6, 2.0), look(1.6, 3.0, 1.0)

@@ -8,8 +8,7 @@ from fixtures import ground as patch
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.poses import Pose, pose_of_camera
-from dav_gswt.prior import conditions
+from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.views import coverage, pose_maps, scores, scoring
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import FrozenScales
@@ -101,27 +100,6 @@ def test_without_a_prior_only_geometric_terms_are_computed_of_which_coverage_is_
     assert np.array_equal(found.scores.terms["coverage"], coverage.DirectionalCoverage(cells, taken, wanted).gains())
     unseen = scoring.score_poses(patch.field(), patch.grid(), pool(), [], patch.FRAME)
     assert (unseen.scores.terms["coverage"] > found.scores.terms["coverage"]).all()
-
-
-def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
-    wide = pool([1.6, 1.6, 5.0], width=60)[0][1]
-    cut = conditions.crop_camera(wide)
-    assert (cut.width, cut.height) == (40, 40) and cut.cx == wide.cx - 10
-    np.testing.assert_allclose(cut.rays()[1], wide.rays()[1][:, 10:50])
-    picture = np.random.default_rng(0).random((40, 60, 3), np.float32)
-    assert np.array_equal(conditions.crop_image(picture), picture[:, 10:50])
-    photos = patch.photos()
-    large = conditions.prepare_photos(photos, patch.FRAME, 64).photos
-    assert large.shape == (3, 64, 64, 3)  # smaller photos are enlarged
-    known = conditions.prepare_photos(photos, patch.FRAME, 24)
-    near = photos[1].camera.centre + [0, 0, 0.1]
-    condition = conditions.build_condition(patch.field(), pool(near), known, 6.0, 24)
-    assert np.array_equal(condition.photo[0], known.photos[1])
-    assert condition.relative[0] == pytest.approx([0, 0, 1, 0], abs=0.05) and condition.colour.shape == (1, 24, 24, 3)
-    turned = conditions.relative_pose(Pose("", 10.0, 20.0, 3.0), Pose("", 40.0, 110.0, 6.0), 6.0)
-    assert turned == pytest.approx([np.pi / 6, 1, 0, 0.5], abs=1e-6)
-    up = conditions.render_view(patch.field(), pool([1.6, 1.61, 3.0])[0][1], 6.0)
-    assert up.inverse_depth[20, 20] == pytest.approx(6 / 3, rel=0.02) and up.alpha[20, 20] > 0.95
 
 
 def test_a_prior_is_not_shown_what_no_photo_shows():

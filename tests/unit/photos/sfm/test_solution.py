@@ -59,29 +59,6 @@ def test_the_best_of_several_ways_is_taken_and_all_are_named(solutions):
     assert found.verdict.tried[0] == "incremental mapping: refused (tilt is odd; GPS is odd)"
 
 
-def test_a_model_of_few_photos_does_not_win(solutions):
-    found, _ = solutions(verdict("doubtful", "tilt"), verdict("good"), verdict("refused", "tilt"), placed=(8, 3, 8))
-    assert found.verdict.grade == "doubtful"
-
-
-def test_photos_left_out_though_they_match_are_tried_with_the_other_mapper(solutions):
-    found, asked = solutions(verdict("good"), verdict("good"), placed=(14, 19), unsure=5)
-    assert asked == [Approach("incremental"), Approach("global")] and found.best.num_reg_images() == 19
-
-
-def test_where_the_first_way_gives_no_model_others_are_tried(solutions, monkeypatch):
-    monkeypatch.setattr(mapping, "_read_pairs", lambda _: [(0, 1, 50)])
-    found, asked = solutions(None, verdict("doubtful", "tilt"), verdict("good"))
-    assert asked[1:] == [Approach("incremental", hold_focal=True), Approach("global", hold_focal=True)]
-    assert found.verdict.grade == "good" and found.verdict.tried[0] == "incremental mapping: way 1 places nothing"
-
-
-def test_photos_none_of_which_match_are_mapped_once(solutions, monkeypatch):
-    monkeypatch.setattr(mapping, "_read_pairs", lambda _: [(0, 1, 12)])
-    with pytest.raises(InputError, match="way 1 places nothing"):
-        solutions(None)
-
-
 def test_photos_without_a_place_are_named_with_what_they_share():
     photos = [SfmPhoto(Path(f"{i}.jpg"), f"{i}.png", (4, 3), 4, 3, None) for i in range(5)]
     pairs = [(0, 1, 90), (0, 2, 40), (2, 1, 50), (2, 3, 70), (4, 0, 1)]

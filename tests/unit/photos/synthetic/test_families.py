@@ -4,9 +4,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy import ndimage
 
-from dav_gswt.photos.synthetic import oasis, scene
+from dav_gswt.photos.synthetic import scene
 from dav_gswt.photos.synthetic.land import make_ground_mesh  # as it is before `small_land` replaces it
 
 every_family = pytest.mark.parametrize("name", scene.FAMILIES)
@@ -69,19 +68,3 @@ def test_the_mesh_of_the_ground_is_fine_about_the_origin_and_faces_up():
     assert axis[-1] == -axis[0] == y.max() == -y.min() and axis[-1] > 500
     a, b, c = (mesh.vertices[mesh.faces[:, i]].astype(float) for i in range(3))
     assert (np.cross(b - a, c - a)[:, 2] > 0).all() and len(mesh.faces) == 2 * (side - 1) ** 2
-
-
-def test_materials_hold_their_share_of_the_exemplar_on_both_sides_of_a_narrow_path():
-    material = np.roll(oasis.draw_layout(np.random.default_rng(0), 512, 6.0).material, (256, 256), (0, 1))
-    material = material[160:-160, 160:-160]  # the exemplar
-    for number, share in ((oasis.MEADOW, 0.33), (oasis.BOULDERS, 0.165)):
-        assert (material == number).mean() == pytest.approx(share, abs=0.01)
-        pieces, _ = ndimage.label(material == number)
-        areas = np.sort(np.bincount(pieces.ravel())[1:])[::-1]
-        assert areas[0] > 0.5 * areas.sum() and areas[:3].sum() > 0.85 * areas.sum()
-    path = material == oasis.PATH
-    pieces, _ = ndimage.label(path, np.ones((3, 3)))
-    longest = pieces == 1 + np.argmax(np.bincount(pieces.ravel())[1:])
-    rows, columns = np.nonzero(longest)
-    assert max(np.ptp(rows), np.ptp(columns)) == len(path) - 1  # all the way through
-    assert 0.3 < 2 * ndimage.distance_transform_edt(path).max() * 16 / 512 < 0.7

@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 from dav_gswt.geometry.cameras import pinhole
-from dav_gswt.images.srgb import encode_srgb
 from dav_gswt.photos.synthetic import mitsuba_scene
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.synthetic.land import Land, Light
 from dav_gswt.photos.synthetic.meshes import Mesh
 
 mi = pytest.importorskip("mitsuba")
-ENTRY = {"family": "desert", "seed": 0, "photo_count": 8, "test": 6, "size": 64, "candidates": 20}
 
 
 @pytest.fixture(autouse=True)
@@ -101,10 +99,3 @@ def test_a_picture_repeats_to_the_byte_whatever_the_threads():
     assert one.dtype == np.float32 and one.shape == (38, 50, 3)
     assert one.tobytes() == three.tobytes()
     assert one.min() >= 0 and one.max() <= 1 and one.std() > 0.02
-
-
-@pytest.mark.parametrize(
-    "light, code", [(0.0, 0.0), (1.0, 1.0), (7.0, 1.0), (-1.0, 0.0), (0.5, 0.7353570), (0.002, 0.02584)]
-)
-def test_light_is_encoded_as_srgb(light, code):
-    assert encode_srgb(np.array([light]))[0] == pytest.approx(code, abs=1e-6)

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dav_gswt.reconstruction.fitting import densification, state
-from dav_gswt.reconstruction.fitting.plan import EVENTS, FINAL_RATE, GROWTH_END, PRUNE_AT, FitPlan, Schedule
-from dav_gswt.reconstruction.ground_constraints import FLAT, NEEDLE, clip_sizes
+from dav_gswt.reconstruction.fitting.plan import GROWTH_END, FitPlan, Schedule
 from dav_gswt.reconstruction.objects import make_blobs
 
 
@@ -71,27 +70,6 @@ def test_only_the_nearly_transparent_are_shaken_and_steps_along_a_gaussians_axes
     np.testing.assert_allclose(step, [[0, 0.2, 0]], atol=1e-6)
 
 
-LEAST, MOST = 0.01, 10.0
-
-
-def clip_plainly(row):
-    row = [np.float32(min(max(v, np.float32(np.log(LEAST))), np.float32(np.log(MOST)))) for v in row]
-    longest = max(row)
-    row = [max(v, np.float32(longest - FLAT)) for v in row]
-    middle = sorted(range(3), key=lambda k: row[k])[1]
-    row[middle] = max(row[middle], np.float32(longest - NEEDLE))
-    return row
-
-
-def test_sizes_are_those_of_a_plain_loop():
-    sizes = np.random.default_rng(0).normal(0, 3, (400, 3)).astype(np.float32)
-    sizes[:50, 2] = sizes[:50, 0]
-    sizes[50:70] = sizes[50:70, :1]
-    expected = np.array([clip_plainly(row) for row in sizes], np.float32)
-    clip_sizes(sizes, LEAST, MOST)
-    np.testing.assert_array_equal(sizes, expected)
-
-
 def grown(plan, start):
     """Steps at which a fit grows, and how many Gaussians it ends with."""
     schedule, now, at = Schedule(plan, start), start, []
@@ -108,24 +86,3 @@ def test_a_fit_reaches_its_cap_by_the_end_of_its_growth_and_never_exceeds_it(ste
     at, now = grown(FitPlan(steps, cap), start)
     assert now == max(start, cap) or (now == start and not at)
     assert all(step <= GROWTH_END * steps for step in at)
-
-
-@settings(max_examples=40)
-@given(st.integers(20, 200))
-def test_events_are_even_and_counted_down_to_and_pruning_comes_after_them(steps):
-    schedule = Schedule(FitPlan(steps, 100), 10)
-    at, _ = grown(schedule.plan, 10)
-    for step in range(1, steps):
-        assert schedule.to_growth(step) == min((due - step for due in at if due >= step), default=None)
-    assert len(set(np.diff(at))) <= 1 and EVENTS <= len(at) <= 2 * EVENTS
-    (pruned,) = (step for step in range(1, steps + 1) if schedule.prunes(step))
-    assert at[-1] < pruned == int(PRUNE_AT * steps) < steps
-
-
-@pytest.mark.parametrize("first", [1.0, 0.3])
-def test_rates_begin_where_the_plan_says_and_fall_to_what_is_left_of_them(first):
-    schedule = Schedule(FitPlan(80, 1, first_rate=first), 1)
-    rates = [schedule.rate(step) for step in range(81)]
-    assert rates[0] == first and rates[-1] == pytest.approx(FINAL_RATE) and (np.diff(rates) < 0).all()
-    assert rates[40] == pytest.approx((first * FINAL_RATE) ** 0.5)
-    assert Schedule(FitPlan(0, 1), 1).rate(0) == 1
