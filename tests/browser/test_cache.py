@@ -55,21 +55,6 @@ def test_at_rest_nothing_is_composed_twice_and_the_nearest_ground_is_fine(visit,
 
 
 @pytest.mark.slow
-def test_on_a_walk_nothing_is_read_twice_and_the_cache_is_never_exceeded(visit, large):
-    seen = visit(160, 100)
-    asked = watch(seen)
-    seen.open(f"{large}?still")
-    for step in range(40):
-        seen.page.evaluate("place => davgswt.set(place)", dict(x=7.0 * step, y=3.0 * step, yaw=37.0 * step))
-        seen.page.evaluate("davgswt.settle()")
-        assert seen.state["work"]["bytes"] <= CACHE
-        assert seen.state["missing"] == 0
-    assert max(asked.values()) == 1
-    assert {cell["level"] for cell in seen.state["drawn"]} >= {1, 2}
-    assert seen.state["work"]["composed"] > CACHE / 33, "some were composed again"
-
-
-@pytest.mark.slow
 def test_a_phone_asks_before_it_loads_a_large_set(visit, large):
     """The threshold of 50 MB is replaced by one of 10 kB."""
     seen = visit(**PHONE)

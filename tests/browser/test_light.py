@@ -102,24 +102,6 @@ def test_ground_has_the_light_and_the_shadows_of_the_library(modules):
     assert found["turns"] > 50, "nobody waits for long"
 
 
-@pytest.mark.parametrize("elevation", [3.0, 40.0, 85.0, 90.0])
-def test_open_level_ground_keeps_its_colours_below_the_captured_sun(modules, elevation):
-    level, margins, soft = modules.evaluate(
-        """async (elevation) => {
-          const { lightBelow } = await import("./terrain/light.js");
-          const { createShadows } = await import("./terrain/shadows.js");
-          const { placeSun } = await import("./terrain/sun.js"), sun = placeSun(elevation, 200);
-          const made = createShadows({ at: () => [7, 0, 0] }, 4);
-          while (!made.step(9, 9, sun, 1000));
-          const grey = { sky: { zenith: [0, 0, 0], horizon: [0, 0, 0] }, ground_colour: [0, 0, 0] };
-          return [lightBelow(grey, sun, sun).level, [...made.made.margins], made.made.soft];
-        }""",
-        elevation,
-    )
-    np.testing.assert_allclose(level, 1, atol=1e-12)
-    assert min(margins) >= soft, "the whole sun is seen"
-
-
 @pytest.fixture(scope="module")
 def hilly(page_of):
     """The folder of a page of hills that knows its sun."""

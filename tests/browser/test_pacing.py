@@ -1,6 +1,5 @@
 """What is drawn while something moves, and at rest, where all Gaussians are drawn in the end on every device."""
 
-import numpy as np
 import pytest
 from fixtures.browser import served
 from fixtures.bundles import Ground
@@ -20,25 +19,6 @@ BUDGETS = """async ([drawn, all]) => {
   }
   return [seen, progress, rest.whole];
 }"""
-SLICES = """async ([blocks, cost]) => {
-  // slices of a picture of so many blocks, of `cost` milliseconds each
-  const { createSlicedPicture } = await import("./draw/renderer.js");
-  let now = 0, done = 0;
-  const gl = new Proxy({}, { get: (_, name) => ({
-    SIGNALED: 1, fenceSync: () => 1, getSyncParameter: () => Number(now >= done), createTexture: () => ({}),
-  })[name] ?? (/^[A-Z]/.test(name) ? 0 : () => null) });
-  const slices = [], splats = {
-    length: blocks,
-    draw(camera, options, from, many) {
-      slices.push([from, many]);
-      done = now + cost * Math.min(many, blocks - from);
-    },
-  };
-  const picture = createSlicedPicture(gl, { draw() {} }, splats);
-  picture.begin({ width: 8, height: 8 }, {});
-  while (now < 1e6 && !picture.advance(now)) now += 16;
-  return [slices, picture.share, now];
-}"""
 
 
 @pytest.mark.parametrize(
@@ -55,17 +35,6 @@ def test_budgets_grow_until_all_is_drawn_whatever_the_device(modules, drawn, all
     assert [budget for _, budget in seen] == budgets and whole
     assert seen[0][0] - 1000 >= 300
     assert progress == sorted(progress) and progress[0] >= 0 and progress[-1] <= 1
-
-
-@pytest.mark.parametrize("cost", [0.0, 0.1, 5.0, 300.0])
-def test_slices_follow_each_other_and_are_short(modules, cost):
-    slices, share, _ = modules.evaluate(SLICES, [3000, cost])
-    ends = np.cumsum([many for _, many in slices])
-    assert [first for first, _ in slices] == [0, *ends[:-1]] and ends[-1] >= 3000 > ends[-2]
-    assert share == 1
-    # after the first ones a slice takes about 40 ms, or is one of 250
-    assert max(many for _, many in slices[3:]) * cost <= max(60, 12 * cost)
-    assert len(slices) <= 252
 
 
 @pytest.mark.slow
@@ -108,11 +77,6 @@ def pace(modules, frames, a_splat=0.0, a_pixel=0.0, refresh=1000 / 60) -> tuple[
 def test_a_fast_machine_has_all_within_two_seconds_and_few_frames_say_nothing(modules):
     budgets, scales = pace(modules, 120)
     assert budgets[-1] == 6_000_000 and scales[-1] == 1 and set(budgets[:2]) == {100_000}
-
-
-def test_a_slow_machine_gets_the_least_and_no_less(modules):
-    budgets, _ = pace(modules, 30, 0.01)
-    assert min(budgets) == budgets[-1] == 20_000
 
 
 @pytest.mark.parametrize("refresh", [1000 / 60, 1000 / 120])

@@ -75,25 +75,6 @@ def test_no_more_is_painted_than_the_page_keeps(modules, manifest):
     assert run(modules, manifest, act) == ["full", 2**18, "far"]
 
 
-def test_densities_and_offsets_are_bounded_steps_of_the_history(modules, manifest):
-    act = """
-      const [{ probability }] = manifest.objects;
-      painting.setDensity(0, 0.52, true);
-      painting.setDensity(0, 9, true);
-      painting.load({ runs: [], densities: painting.densities, offsets: [0.03, -8] });
-      const set = [...painting.densities, ...painting.paint.offsets];
-      painting.undo();
-      painting.undo();
-      const before = [...painting.densities, ...painting.paint.offsets];
-      const chances = sent.flatMap(({ probabilities }) => probabilities ?? []).map(chance => chance / probability);
-      return { set, before, chances, offsets: sent.map(({ offsets }) => offsets) };
-    """
-    found = run(modules, manifest, act)
-    assert found["set"] == [3, 0.03, -8] and found["before"] == [0.5, 0, 0]
-    assert found["chances"] == pytest.approx([0.5, 3, 0.5])
-    assert found["offsets"] == [None, None, [0.03, -8], [0, 0], None]
-
-
 def test_links_and_files_restore_what_was_painted_and_set(modules, manifest):
     act = """
       const blank = await encodePaint(painting.paint, manifest);

@@ -1,4 +1,4 @@
-"""Bundles of stored records: values by hand, round trips, refusals, and the public renderer's rules."""
+"""Bundles of stored records: values by hand, round trips, refusals."""
 
 import hashlib
 import json
@@ -106,16 +106,6 @@ def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
     with pytest.raises(InputError, match="a tile has no splat"):
         build.write_bundle(one(broken), tmp_path / "b", build.BundleOptions(tau=0.5), {})
     assert not (tmp_path / "b").exists() and not (tmp_path / ".b.part").exists()
-
-
-def test_a_new_bundle_replaces_the_old_one_and_leaves_its_neighbours(tiles, tmp_path):
-    out = tmp_path / "b"
-    (out / "parts").mkdir(parents=True)
-    (out / "parts" / "stale.bin").write_bytes(b"x")
-    (out / "terrain").mkdir()
-    build.write_bundle(one(tiles), out, build.BundleOptions(tau=1.0), {})
-    assert sorted(p.name for p in out.iterdir()) == ["davgswt.json", "parts", "terrain"]
-    assert not (out / "parts" / "stale.bin").exists()
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Bundles of tile sets with recipes: composed tiles are those that were cut, fit together, and take little room."""
+"""Bundles of tile sets with recipes: composed tiles are those that were cut, with the same bytes each time."""
 
 from types import SimpleNamespace
 
@@ -12,7 +12,7 @@ from dav_gswt.field import concatenate_fields
 from dav_gswt.reconstruction import discs
 from dav_gswt.tiles.compose import find_underlay
 
-LEVELS, COMPOSED, CELLS = 4, 3, 48  # of the tiles; the last level is merged from their cells
+LEVELS, COMPOSED = 4, 3  # of the tiles; the last level is merged from their cells
 
 
 @pytest.fixture(scope="module")

@@ -79,13 +79,6 @@ def test_folders_in_the_way_and_other_inputs_are_refused(folder):
     assert (folder / "full/letter.txt").read_text() == "dear"
 
 
-@pytest.mark.parametrize("option", [("--budget", "1"), ("--test", "-1"), ("--cores", "0"), ("--cores", "two")])
-def test_a_number_that_cannot_be_is_a_wrong_call(folder, option, capsys):
-    with pytest.raises(SystemExit) as stopped:
-        main.main(["make", "pit", *option])
-    assert stopped.value.code == 2 and f"{option[1]}" in capsys.readouterr().err
-
-
 def test_a_wrong_option_is_not_kept(folder):
     wrong = {"--preset": ("fast", "no 'fast'; presets has draft"), "--focal": ("-3", "focal")}
     wrong |= {key: ("nowhere", f"{key} nowhere: there is no such") for key in ("--model", "--masks")}

@@ -159,13 +159,6 @@ def test_a_bad_file_stops_its_own_scene_only(root, tmp_path, text, reason, caplo
         check_config(add_scene_files(usual | {"k": 0}, tmp_path))
 
 
-def test_files_of_editors_and_file_systems_are_no_scenes(tmp_path):
-    (tmp_path / "sand.yml").write_text(str(FIELD))
-    (tmp_path / "._sand.yaml").write_bytes(b"\0\5\x16\7")
-    (tmp_path / ".#sand.yaml").symlink_to(tmp_path / "gone")
-    assert add_scene_files({}, tmp_path)["scenes"] == {"sand": FIELD}
-
-
 def test_two_scenes_of_one_name_are_named(tmp_path):
     (tmp_path / "sand.yaml").write_text(str(FIELD))
     with pytest.raises(InputError, match=r"sand\.yaml: the config has a scene sand of kind synthetic, too"):

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from dav_gswt.geometry import camera_layouts, cameras
-from dav_gswt.geometry.cameras import camera_from_json, camera_to_json
 
 
 def test_a_pinhole_sees_its_target_in_the_middle_and_up_is_up():
@@ -30,14 +29,6 @@ def test_a_point_on_a_pixels_ray_projects_to_that_pixel(orthographic):
     x, y = np.meshgrid(np.arange(7) + 0.5, np.arange(5) + 0.5)
     np.testing.assert_allclose(pixels, np.stack([x.ravel(), y.ravel()], 1), atol=1e-9)
     np.testing.assert_allclose(depth, 2.5)
-
-
-def test_a_camera_comes_back_from_json_as_it_was():
-    camera = cameras.pinhole([1.0, -2, 3], [0, 0, 0], 64, 48, 50.0)
-    back = camera_from_json(camera_to_json(camera))
-    np.testing.assert_array_equal(back.rotation, camera.rotation)
-    np.testing.assert_array_equal(back.translation, camera.translation)
-    assert (back.fx, back.width, back.orthographic) == (camera.fx, 64, False)
 
 
 def camera(elevation, azimuth, radius=7.0, target=(1.0, 2.0, 0.5)):

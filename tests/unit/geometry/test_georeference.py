@@ -1,8 +1,13 @@
+"""Places on earth against pyproj, and the sun over them against published ones."""
+
+from datetime import UTC, datetime, timedelta, timezone
+
 import numpy as np
 import pytest
 from pyproj import Transformer
 
 from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.geometry.sun import locate_sun
 
 
 def test_what_goes_to_the_earth_comes_back():
@@ -20,3 +25,20 @@ def test_metres_from_the_earths_centre_are_those_of_pyproj(latitude, longitude):
     project = Transformer.from_crs("EPSG:4979", "EPSG:4978")
     np.testing.assert_allclose(found[:, :3], np.stack(project.transform(*place.to_earth(points).T), 1), atol=1e-6)
     np.testing.assert_array_equal(found[:, 3], 1)
+
+
+WITHIN = 0.01  # degrees, that the formula claims, which leaves out 0.002 of parallax
+
+
+def test_the_sun_stands_where_the_example_of_nrels_algorithm_has_it():
+    """Reda and Andreas, Solar Position Algorithm (2004), appendix A.5, without refraction."""
+    time = datetime(2003, 10, 17, 12, 30, 30, tzinfo=timezone(timedelta(hours=-7)))
+    assert locate_sun(time, 39.742476, -105.1786) == pytest.approx((39.872046, 194.340241), abs=WITHIN)
+
+
+@pytest.mark.parametrize(("latitude", "elevation", "azimuth"), [(40.0, 42.21493, 180), (-40.0, 57.78507, 0)])
+def test_at_noon_the_sun_is_highest_and_stands_towards_the_equator(latitude, elevation, azimuth):
+    """Meeus, Astronomical Algorithms, 25.a and 28.b: declination -7.78507, equation of time 3.427351 degrees."""
+    found = locate_sun(datetime(1992, 10, 13, tzinfo=UTC), latitude, 180 - 3.427351)
+    assert found[0] == pytest.approx(elevation, abs=WITHIN)
+    assert (found[1] - azimuth + 180) % 360 - 180 == pytest.approx(0, abs=WITHIN)

@@ -1,18 +1,21 @@
+"""Levels of detail: merged moments, coarser fits, and their files."""
+
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from fixtures import ground as made
+from fixtures.frames import scene_frame
 
 from dav_gswt import field as field_module
 from dav_gswt.errors import InputError
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.lod import build, merge, store
 from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.raster import render
-from dav_gswt.reconstruction.discs import find_underlay
-from dav_gswt.reconstruction.objects import make_blobs
+from dav_gswt.reconstruction import discs, ground
 
 
 @pytest.fixture(scope="module")
@@ -27,35 +30,6 @@ def test_a_coarser_level_has_a_quarter_of_the_discs_and_a_larger_mean_scale(leve
     assert 4 * len(level) == len(field)
     assert coarse.exemplar == pytest.approx(grid.exemplar)
     assert np.exp(level.log_scales).mean() > 1.5 * np.exp(field.log_scales).mean()
-
-
-def test_discs_keep_the_mean_heights_of_what_they_cover():
-    field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
-    hills = 0.1 * np.sin(5 * grid.centres[:, 0])
-    n = grid.heights.size
-    means = field.means.copy()
-    means[:n, 2] += hills.astype(np.float32)
-    grid = replace(grid, heights=grid.heights + hills.reshape(grid.shape))
-    level, coarse = build.fit_coarser_level(replace(field, means=means), grid, 5, np.random.default_rng(0))
-    rows, columns = coarse.shape
-    four = grid.heights.reshape(rows, 2, columns, 2).mean((1, 3))
-    np.testing.assert_allclose(level.means[: four.size, 2].reshape(four.shape), four, atol=1e-6)
-
-
-def test_a_level_is_as_uncertain_as_what_it_was_merged_from():
-    """So are the objects, of which the fit drops one, and the underlay."""
-    field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
-    places, sizes = np.array([[1.0, 1.0, 0.1], [1.5, 1.5, -2.0], [2.0, 2.0, 0.1]]), np.full(3, 0.1)
-    things = replace(make_blobs(places, np.full((3, 3), 0.5), sizes), uncertainty=np.float32([0.25, 0.5, 0.75]))
-    discs = field.ground
-    east = np.where(discs, field.means[:, 0] / 3.2, 0).astype(np.float32)
-    field = field_module.concatenate_fields([replace(field, uncertainty=east), things])
-    level, coarse = build.fit_coarser_level(field, grid, 5, np.random.default_rng(0))
-    n = coarse.heights.size
-    np.testing.assert_allclose(level.uncertainty[:n], coarse.centres[:, 0] / 3.2, atol=1e-6)
-    assert level.uncertainty[-2:].tolist() == [0.25, 0.75]  # the one below the ground is gone
-    under = find_underlay(level, coarse)
-    np.testing.assert_allclose(level.uncertainty[under], level.means[under, 0] / 3.2, atol=0.07)  # a coarse cell's
 
 
 def test_levels_are_fitted_while_the_exemplar_has_room():
@@ -106,3 +80,66 @@ def test_a_finished_field_gets_a_ground_on_its_first_coarser_level():
     inner = np.arange(coarse.heights.size).reshape(coarse.shape)[2:-2, 2:-2].ravel()
     true = made.look(*half.means[inner, :2].T)
     assert np.abs(half.base_colours[inner] - true).mean() < 0.03
+
+
+FRAME = scene_frame(exemplar=(0.0, 0.0, 3.2), extent=(-1.0, -1.0, 4.2, 4.2))
+
+
+@pytest.fixture
+def scene():
+    grid = ground.fit_ground(FRAME, np.zeros((0, 3)), spacing=0.1, max_cells=10**6, block=8, margin=0.2)
+    x, y, _ = grid.centres.T
+    grid = replace(grid, heights=(0.1 * x).reshape(grid.shape), seen=np.ones(grid.shape, bool))
+    colours = np.stack([x / 10, y / 10, 0 * x + 0.5], 1)
+    return concatenate_fields([discs.make_ground_discs(grid, colours), things(3)]), grid
+
+
+def things(n, seed=0):
+    rng = np.random.default_rng(seed)
+    return GaussianField(
+        rng.uniform(0.5, 2.5, (n, 3)).astype(np.float32),
+        np.log(rng.uniform(0.02, 0.06, (n, 3))).astype(np.float32),
+        rng.normal(size=(n, 4)).astype(np.float32),
+        rng.normal(size=n).astype(np.float32),
+        rgb_to_sh(rng.uniform(0, 1, (n, 3))),
+        rng.uniform(0, 1, n).astype(np.float32),
+        np.zeros(n, bool),
+    )
+
+
+def test_four_discs_become_one_of_their_mean(scene):
+    field, grid = merge.crop_to_blocks(*scene, 8)
+    half, coarse = merge.halve_resolution(field, grid)
+    n = coarse.heights.size
+    assert 4 * n == grid.heights.size
+    assert coarse.spacing == pytest.approx(2 * grid.spacing)
+    assert coarse.exemplar == pytest.approx(grid.exemplar)
+    # both colour and height are linear in place, so the mean of four is the value in their middle
+    np.testing.assert_allclose(half.base_colours[:n, 0], half.means[:n, 0] / 10, atol=1e-5)
+    np.testing.assert_allclose(half.means[:n, 2], 0.1 * half.means[:n, 0], atol=1e-5)
+    assert np.exp(half.log_scales).mean() > np.exp(field.log_scales).mean()
+
+
+def test_merged_moments_are_those_of_the_mixture():
+    a = things(2)
+    upright = np.tile(np.array([1, 0, 0, 0], np.float32), (2, 1))
+    a = replace(a, means=np.array([[0.1, 0, 0], [0.3, 0, 0]], np.float32), quats=upright)
+    a = replace(a, log_scales=np.full((2, 3), np.log(0.05), np.float32), opacity_logits=np.zeros(2, np.float32))
+    back = merge.merge_by_voxel(a, voxel=1.0)
+    np.testing.assert_allclose(back.means, [[0.2, 0, 0]], atol=1e-6)
+    # variance along x: 0.05^2 + 0.1^2, across: 0.05^2
+    np.testing.assert_allclose(np.diag(merge.compute_covariances(back)[0]), [0.0125, 0.0025, 0.0025], rtol=1e-4)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("change", [{"opacity_logits": -800.0}, {"log_scales": -400.0}], ids=["clear", "tiny"])
+def test_gaussians_that_weigh_nothing_are_left_out(change):
+    """Alone in their voxel they would be divided by 0."""
+    faint = things(2, seed=1)
+    faint = replace(faint, **{name: np.full_like(getattr(faint, name), value) for name, value in change.items()})
+    faint = replace(faint, means=faint.means + np.float32(10))
+    found = merge.merge_by_voxel(concatenate_fields([things(3), faint]), 0.5)
+    alone = merge.merge_by_voxel(things(3), 0.5)
+    for name, values in vars(alone).items():
+        np.testing.assert_array_equal(getattr(found, name), values)
+    assert len(merge.merge_by_voxel(faint, 0.5)) == 0

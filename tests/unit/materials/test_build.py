@@ -6,7 +6,6 @@ from fixtures import mixed_ground as made
 
 from dav_gswt.errors import InputError
 from dav_gswt.materials import build, extraction, store
-from dav_gswt.materials.objects import Footprint
 from dav_gswt.reconstruction import discs, top_view
 
 
@@ -31,26 +30,6 @@ def test_an_exemplar_shows_its_material_alone_by_a_disc_a_cell_uncertain_if_fill
     assert found.materials[number].filled == pytest.approx(np.mean(uncertain > 0), abs=1e-6)
 
 
-def test_objects_stand_around_their_foot_as_dense_as_on_their_material(found):
-    for each in found.objects:
-        assert np.abs(each.field.means[:, :2].mean(0)).max() < 2 * made.SPACING
-        assert each.height == pytest.approx((made.HEIGHT - 2) * made.SPACING, abs=made.SPACING)
-        assert each.radius == pytest.approx(made.RADIUS * made.SPACING, abs=3 * made.SPACING)
-    area = found.classes.shares[0] * (~found.classes.excluded).sum() * made.SPACING**2
-    assert sum(each.density for each in found.objects) == pytest.approx(len(made.SHRUBS) / area)
-
-
-def test_an_object_on_a_slope_stands_on_level_ground():
-    field, grid = made.field(mixed=False, slope=0.3), made.grid(0.3)
-    maps = build.measure_ground(field, grid)
-    rows, columns = np.mgrid[: made.CELLS, : made.CELLS]
-    r, c = made.SHRUBS[0]
-    cells = (rows - r) ** 2 + (columns - c) ** 2 <= made.RADIUS**2
-    own = extraction.extract_object(field, grid, maps, extraction.bin_standing(field, grid, maps), Footprint(cells, 0))
-    ground = own.means[own.ground]
-    assert np.abs(ground[:, 2] - extraction.LIFT * made.SPACING).max() < 0.02 * made.SPACING
-
-
 @pytest.mark.parametrize("has_layer", [False, True])
 def test_a_field_without_a_ground_layer_or_of_which_nothing_is_left_is_tiled_as_one(
     found, monkeypatch, caplog, has_layer
@@ -63,20 +42,6 @@ def test_a_field_without_a_ground_layer_or_of_which_nothing_is_left_is_tiled_as_
     whole = build.find_materials(field, made.grid(), 0)
     assert [each.field is field for each in whole.materials] == [True] and not whole.objects
     assert "all of the ground is tiled as one" in caplog.text
-
-
-def test_a_material_of_which_next_to_nothing_is_left_is_left_out(found, monkeypatch, caplog):
-    classes = found.classes
-    grass = classes.materials == 1
-    few = grass & (np.cumsum(grass.ravel()).reshape(grass.shape) <= 0.02 * grass.size)
-    monkeypatch.setattr(
-        build, "classify_ground", lambda *given: replace(classes, excluded=classes.excluded | grass & ~few)
-    )
-    left, whole = build.find_materials(made.field(), made.grid(), 0), classes.source(0)
-    assert [each.info.name for each in left.materials] == [classes.names[0]]
-    assert left.materials[0].info.share == pytest.approx(1)
-    assert left.tile_side == build.choose_tile_side(made.maps(), [whole])  # no smaller tiles for what is left out
-    assert f"left of {classes.names[1]}" in caplog.text and "left out" in caplog.text
 
 
 def test_even_ground_is_given_back_as_it_is():

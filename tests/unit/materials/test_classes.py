@@ -5,7 +5,7 @@ import pytest
 from fixtures import mixed_ground as made
 
 from dav_gswt.materials import classes
-from dav_gswt.materials.maps import NO_CLASS, GroundMaps, GroundMasks
+from dav_gswt.materials.maps import GroundMaps, GroundMasks
 from dav_gswt.tiles.layout import Exemplar
 
 
@@ -34,17 +34,6 @@ def test_shade_of_a_material_is_no_material():
     found = classes.classify_ground(replace(maps, colour=colour))
     assert found.number == 1
     assert found.excluded[:, 80:].mean() > 0.9
-
-
-def test_a_class_of_which_a_strip_is_the_wide_part_is_no_material():
-    """A road and what looks like it beside it, in rests too narrow for patches."""
-    columns = np.broadcast_to(np.arange(128), (128, 128))
-    road, rests = np.abs(columns - 60) < 9, (columns % 16 == 0) & (columns > 90)
-    colour = np.where((road | rests)[..., None], (0.7, 0.6, 0.5), (0.3, 0.4, 0.2))
-    labels = (road | rests).astype(int)
-    assert classes.choose_materials(labels, colour, np.ones((128, 128))) == [0, 1]
-    apart = np.where(road, NO_CLASS, labels)
-    assert classes.choose_materials(apart, colour, np.ones((128, 128))) == [0]
 
 
 def test_darker_ground_of_coarser_grain_is_a_material():

@@ -53,12 +53,6 @@ ROWS, COLUMNS = np.mgrid[:K, :K]
 NOISE = gaussian_filter(np.random.default_rng(0).normal(size=(K, K)), 8)
 
 
-def test_a_winding_path_that_is_found_twice_counts_once():
-    path = np.abs(COLUMNS - 100 - 30 * np.sin(ROWS / 35)) < 8
-    (found,) = strips.find_strips([path.astype(int), 2 * path.astype(int)])
-    assert (found & path).sum() > 0.95 * path.sum()
-
-
 def test_a_fork_of_roads_is_found_whole_also_with_something_lying_across():
     road = (np.abs(ROWS - 150) < 7) | ((np.abs(COLUMNS - 90) < 7) & (ROWS < 150))
     across = (np.abs(COLUMNS - 60) < 4) | (np.abs(ROWS - 80) < 4)
@@ -83,13 +77,3 @@ def test_a_fork_of_roads_is_found_whole_also_with_something_lying_across():
 )
 def test_other_ground_is_none(cells):
     assert strips.find_strips([cells.astype(int)]) == []
-
-
-@pytest.mark.parametrize(("own", "transition"), [(0.5, True), (0.0, True), (-1.0, False), ("other", False)])
-def test_a_mixture_of_both_sides_is_a_transition(own, transition):
-    one, two, other = np.array([40.0, 0, 0]), np.array([60.0, 20, 10]), np.array([50.0, -10, 20])
-    labels = (COLUMNS > 100).astype(int)
-    strip = np.abs(COLUMNS - 100) < 8
-    colours = np.where(labels[..., None] == 1, two, one)
-    colours[strip] = other if own == "other" else one + own * (two - one)
-    assert strips.is_transition(strip, colours, labels) == transition

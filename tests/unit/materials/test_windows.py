@@ -55,24 +55,6 @@ def cells_of(place, square):
     return tuple(slice(k, k + round(square.side / place.spacing)) for k in first)
 
 
-def test_cells_are_as_narrow_as_the_preset_asks_for_or_as_the_gaussians_allow(plan, views):
-    width = 8.0 / views[0].camera.fx
-    fine = windows.choose_windows(plan, views, replace(SETTINGS, max_gaussians=10**6))
-    assert fine.spacing == pytest.approx(SETTINGS.spacing * width, rel=0.02)
-    coarse = windows.choose_windows(plan, views, replace(SETTINGS, max_gaussians=2000))
-    area = sum(each.square.side**2 for each in coarse.windows)
-    assert area / coarse.spacing**2 <= 2000 and coarse.spacing > fine.spacing
-    assert sum(each.square.side**2 for each in fine.windows) >= area
-
-
-def test_a_window_lies_where_pixels_are_finest(views):
-    sand = build.plan_ground(made.maps(mixed=False, shrubs=False), True)
-    near = [photo(x, y, 3.0) for x in (9.0, 10.0) for y in (9.0, 10.0, 10.5)]
-    focus = windows.choose_windows(sand, [*views, *near], replace(SETTINGS, max_gaussians=5000))
-    (window,) = focus.windows
-    assert window.square.side < SIDE and window.square.west > 0 and window.square.south > 0
-
-
 def test_a_material_and_objects_are_cut_from_fitted_windows(plan, tmp_path):
     field, grid = made.field(), made.grid()
     whole = build.FocusedFields([(field, grid)], [True], plan.maps)

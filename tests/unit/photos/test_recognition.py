@@ -105,22 +105,6 @@ def test_a_point_cloud_beside_photos_is_no_splat(tmp_path):
         recognize_input([folder / "cloud.ply"])
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "kind"),
-    [
-        ("a.spz", b"\x1f\x8b\x08" + b"0" * 40, ".spz"),
-        ("a.compressed.ply", b"ply\nelement vertex 1\nproperty uint packed_position\n", ".ply"),
-        ("a.ply", b"ply\nelement vertex 1\nproperty double f_dc_0\n", ".ply"),
-    ],
-)
-def test_splats_of_every_kind_that_is_read(tmp_path, name, content, kind):
-    (tmp_path / name).write_bytes(content)
-    found = recognize_input([tmp_path / name])
-    assert (
-        found.entry == {"kind": "field", "field": str(tmp_path / name)} and found.about == f"a finished splat ({kind})"
-    )
-
-
 def test_splats_that_are_not_read_are_named_with_what_converts_them(tmp_path):
     command = "convert it: npx @playcanvas/splat-transform"
     with zipfile.ZipFile(tmp_path / "a.sog", "w") as archive:

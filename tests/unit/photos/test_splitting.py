@@ -10,7 +10,6 @@ from fixtures.frames import scene_frame
 from dav_gswt.errors import InputError
 from dav_gswt.photos import view_split
 from dav_gswt.photos.view_split import (
-    find_aim_point,
     measure_visible_share,
     split_views,
 )
@@ -58,14 +57,6 @@ def test_test_views_are_the_same_for_every_seed_and_start_views_are_not(flown):
     assert all(p.test == parts[0].test for p in parts)
     assert len({tuple(p.start) for p in parts}) > 1
     assert split(flown, 3) == split(flown, 3)
-
-
-def test_test_views_look_at_the_inner_exemplar_and_stay_apart(flown):
-    chosen = [flown.camera(name) for name in split(flown).test]
-    aims = np.array([find_aim_point(camera) for camera in chosen])
-    assert np.abs(aims).max() <= 0.6 * 0.5**0.5
-    apart = np.linalg.norm(aims[:, None] - aims[None], axis=2)[~np.eye(len(aims), dtype=bool)]
-    assert apart.min() > 0.25  # more than the step between neighbours in a flight line
 
 
 def test_photos_of_other_ground_take_no_part_and_are_counted(flown, caplog):

@@ -148,17 +148,6 @@ def test_hdr_is_shown_as_bright_as_it_was(filmed, tmp_path):
     assert b[middle].mean() == pytest.approx(0.598 * 255, abs=4)
 
 
-def test_frames_at_a_variable_rate_are_told_apart_by_the_way_not_by_time(filmed, tmp_path):
-    """Half of the frames are shown for a second each."""
-    times = np.cumsum([67] * 30 + [1000] * 30).tolist()
-    steady, varied = (
-        write_frames(filmed(), tmp_path / "a"),
-        write_frames(filmed(name="v.mp4", times=times), tmp_path / "b"),
-    )
-    assert len(steady) == len(varied)
-    assert np.abs(np.subtract(numbers(steady), numbers(varied))).max() <= 2  # the encoder spends other bits
-
-
 def test_blur_that_leaves_a_gap_is_said_with_its_time(filmed, tmp_path, caplog):
     write_frames(filmed(videos.walk(120), blurred=range(30, 90)), tmp_path / "out")
     assert "walk.mp4: is blurred from 2 s to 6 s" in caplog.text

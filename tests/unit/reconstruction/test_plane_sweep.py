@@ -1,15 +1,13 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from fixtures import ground as made
 
 from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.reconstruction import objects, plane_sweep
+from dav_gswt.reconstruction import plane_sweep
 from dav_gswt.reconstruction.ground import Ground
 
-SIDE, TALL = 3.2, 0.5
+TALL = 0.5
 BOX = (1.2, 2.0)  # from, to, in x and y
 
 
@@ -64,41 +62,6 @@ def test_what_stands_is_found_where_it_stands_and_as_high_as_it_is_and_the_groun
     assert np.abs(found.above[around]).max() <= 2 * found.step
 
 
-def test_sand_that_looks_like_sand_is_no_tower_over_what_no_two_photos_show_alike():
-    """Nearly plain sand, and in the middle what looks otherwise in every photo, as thin leaves do."""
-    views, rng = [], np.random.default_rng(0)
-    for dx, dy in [(0, 0), (0.9, 0), (-0.9, 0), (0, 0.9), (0, -0.9), (0.6, 0.6), (-0.6, 0.6)]:
-        view = photo([1.6 + dx, 1.6 + dy, 4.0])
-        x, y = meet(view.camera, 0.0)
-        leaves, sand = (np.hypot(x - 1.6, y - 1.6) < 0.25)[..., None], 0.5 + 0.04 * (texture(x, y, 2) - 0.5)
-        views.append(view.with_pixels(image=np.where(leaves, rng.random(sand.shape), sand).astype(np.float32)))
-    found = plane_sweep.sweep_heights(made.grid(0.05), views, flying_height=4.0, pixel=0.04)
-    assert found.above.max() < 0.25  # of 1.2 that are tried
-
-
 def test_on_ground_that_fewer_than_two_photos_see_nothing_stands(photos):
     alone = plane_sweep.sweep_heights(made.grid(0.1), photos[:1], flying_height=4.0, pixel=0.08)
     assert not alone.stands.any() and not alone.above.any()
-
-
-def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
-    shell = objects.make_shell(found, photos)
-    heights = shell.means[:, 2]
-    assert not shell.ground.any()
-    assert heights.max() == pytest.approx(TALL, abs=2 * found.step)
-    assert heights.min() < 0.2 * TALL  # walls reach down
-    grid = made.grid(0.05)
-    ceiling = objects.compute_ceiling(grid, found, shell)
-    assert ceiling[inner(grid, 0.3, 0.7)].max() < 0.3 * TALL  # free space over bare ground
-    assert ceiling[inner(grid, 1.4, 1.8)].min() > TALL
-
-
-def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_nothing():
-    grid = made.grid()
-    flat = plane_sweep.Relief(grid, np.zeros(grid.shape), np.zeros(grid.shape, bool), 0.1)
-    crowd = np.array([[1.0, 1.0, 0.5], [1.1, 1.0, 0.5], [1.0, 1.1, 0.5], [1.1, 1.1, 0.55]])
-    points = np.concatenate([crowd, [[2.5, 2.5, 0.5], [1.0, 1.05, 3.0], [1.0, 1.0, 0.05]]])
-    field = objects.make_isolated_points(grid, flat, points, np.full((7, 3), 0.5), band=1.0)
-    np.testing.assert_allclose(field.means, crowd, atol=1e-6)
-    taken = replace(flat, stands=inner(grid, 0.8, 1.3))
-    assert not len(objects.make_isolated_points(grid, taken, points, np.full((7, 3), 0.5), band=1.0))

@@ -9,7 +9,7 @@ from fixtures import ground as made
 from dav_gswt.reconstruction import update
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.evaluation import evaluate_field
-from dav_gswt.reconstruction.fitting.plan import UPDATE_RATE, FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.reconstruction.update import UpdateInput
 
@@ -52,13 +52,6 @@ def test_rounds_and_chosen_photos_are_one_fit_to_all_photos_unless_the_preset_sa
         np.testing.assert_array_equal(found.grid.heights, once.grid.heights)
         assert found.report.steps == 52
     assert continued.report.steps == 40
-
-
-def test_steps_grow_with_the_photos_and_an_update_begins_with_lower_rates():
-    assert [SETTINGS.plan_coarse_fit(n).steps for n in (3, 8, 10)] == [12, 12, 52]
-    assert [SETTINGS.from_scratch(start, 12).steps for start in (3, 10)] == [12 + 9 * 20, 52 + 2 * 20]
-    plans = [SETTINGS.plan_update(n, 3) for n in (2, 0)]
-    assert [plan.steps for plan in plans] == [60, 60] and [plan.first_rate for plan in plans] == [UPDATE_RATE, 1.0]
 
 
 def grained(count):

@@ -7,15 +7,9 @@ import pytest
 from fixtures import ground as made
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry.scene_frame import Square
-from dav_gswt.raster import make_rasterizer
 from dav_gswt.reconstruction import windows
-from dav_gswt.reconstruction.fitting import state, trainer
-from dav_gswt.reconstruction.fitting.descent import TrainingState, TrainingTask
-from dav_gswt.reconstruction.fitting.exposure import ExposureTracker
-from dav_gswt.reconstruction.fitting.plan import FitPlan, FitSettings, Schedule
-from dav_gswt.reconstruction.ground_constraints import GroundConstraints
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.reconstruction.windows import Draft, FitWindow
 
 SETTINGS = FitSettings(fit_size=96, spacing=1.0, max_gaussians=4000, steps=40)
@@ -69,23 +63,6 @@ def test_a_joined_field_is_the_window_inside_and_the_draft_outside(fitted):
     outside = draft.field[~windows.find_inside(own.grid, draft.field)]
     np.testing.assert_array_equal(joined.means[~within], outside.means)
     np.testing.assert_array_equal(joined.sh[~within], outside.sh)
-
-
-def test_frozen_gaussians_stay_to_the_bit_and_none_grow_beside_them():
-    grid, field = made.grid(), made.field()
-    around = replace(field[:50], means=field.means[:50] + np.array([0, 0, 0.3], np.float32))
-    start = concatenate_fields([field, around])
-    constraints = GroundConstraints(grid, np.full(grid.shape, 0.5), frozen=len(around))
-    assert constraints.frozen == slice(len(field), len(start)) and constraints.fixed == len(start)
-    plan = FitPlan(60, len(start) + 200)
-    fit = trainer.fit_field(start, made.photos(), plan, constraints, np.random.default_rng(0))
-    for name in ("means", "log_scales", "quats", "opacity_logits", "sh"):
-        np.testing.assert_array_equal(getattr(fit.field, name)[constraints.frozen], getattr(around, name))
-    run = TrainingState(state.from_field(start), np.random.default_rng(0), ExposureTracker(3), step=10)
-    run.errors = np.zeros(len(start), np.float32)
-    run.errors[constraints.frozen] = 1
-    trainer._grow(run, TrainingTask(made.photos(), plan, Schedule(plan, len(start)), constraints, make_rasterizer()))
-    assert len(run.state) == len(start)
 
 
 def test_masks_count_where_a_view_looks_at_a_square():

@@ -1,4 +1,4 @@
-"""Light of the place: the numbers shared with the page, and what a sun does to hills, shadows, objects and the sky."""
+"""Light of the place: the numbers shared with the page, and what a sun does to hills, shadows and the sky."""
 
 import json
 from dataclasses import replace
@@ -12,7 +12,6 @@ from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.bundle.land_cover import LightEntry
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.terrain import endless, stills
-from dav_gswt.terrain.finite import Area, list_cells, place_block
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills, Sphere
 from dav_gswt.terrain.light import Light, apply_light, light_of, place_light, relight
 from dav_gswt.terrain.sun import Sun, find_hour, sun_at
@@ -139,18 +138,3 @@ def test_a_page_takes_its_sun_from_the_config_or_the_photos(covered):
     planet = apply_light(by_photos, "auto", 1.0, Sphere(9.0, 1.0, 13))
     assert planet.light is None and planet.wind is None
     assert type(info).from_dict(apply_light(by_photos, "auto", 2.0, surface).to_dict()).wind == 2
-
-
-def test_objects_are_lit_as_the_ground_below_them(covered):
-    _, terrain = covered
-    cells = list_cells(terrain, Area(-4, -4, 8, 8))
-    found = terrain.scatter.instances_in(cells.i, cells.j)
-    assert len(found) > 3
-    light = place_light(Light(NOON, Sun(25.0, 80.0)), terrain.heights, terrain.side, np.zeros(3))
-    dark = place_block(terrain, cells, 0, np.zeros(3))()
-    bright = place_block(replace(terrain, light=light), cells, 0, np.zeros(3))()
-    things = slice(-len(found) * len(terrain.objects[0][0]), None)  # objects come last
-    x, y = dark.means[things, :2].astype(float).T
-    expected = relight(dark.base_colours[things], light.ground_ratio(x, y))
-    np.testing.assert_allclose(bright.base_colours[things], expected, atol=2e-3)
-    assert np.abs(expected - dark.base_colours[things]).max() > 0.05

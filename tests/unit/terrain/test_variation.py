@@ -63,16 +63,6 @@ def test_ground_has_the_colours_of_its_place_and_an_object_those_of_its_foot(pla
     assert np.abs(at_feet).max() > 0.05
 
 
-def test_stills_show_what_exports_hold_at_every_level(varied):
-    eye = np.array([18.0, 22.0, 3.0])
-    cell = replace(list_cells(varied, Area(4, 5, 1, 1)), nearest=np.array([0.1]), farthest=np.array([9.0]))
-    for level in (0, 1):
-        terrain = replace(varied, switches=[(np.inf, 0.0)[level], np.inf], bands=[0.0, 0.0])
-        seen, _ = placement.place_cell(terrain, cell, eye)
-        held = placement.collect_tiles(varied, cell, [level])[level]
-        assert sorted(seen.sh[:, 0].tolist()) == sorted(held.sh[:, 0].tolist())
-
-
 def cut_ground(wide, blob=0.0):
     """Tiles of an exemplar of grain and wide light and dark (standard deviation `wide`), and perhaps a bright blob."""
     sample, rng = tile_sets.exemplar(), np.random.default_rng(1)

@@ -1,19 +1,10 @@
-"""Geometry of tiles, by hand."""
+"""Geometry of tiles, and landmarks, which are kept out of what all tiles share."""
 
 import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.tiles import layout
-from dav_gswt.tiles.layout import NE, NW, SE, SW, E, Layout, PatchPlaces, W
-
-PLAN = Layout(exemplar=40, levels=1, side=10, strip=2, corner=3)
-PLACES = PatchPlaces(
-    np.array([30, 20]),
-    np.array([[0, 1], [5, 2]]),
-    np.array([[3, 30], [4, 25]]),
-    np.tile([11, 12], (16, 1)),
-)
+from dav_gswt.tiles import energy, layout, patches, search
 
 
 @pytest.mark.parametrize("levels", [1, 3, 6, 8, layout.AUTO])
@@ -42,18 +33,40 @@ def test_an_exemplar_smaller_than_any_tile_is_refused():
         layout.plan_layout(9, 3, 0.5, 0.16)
 
 
-def test_a_vertical_strip_goes_on_from_a_tile_into_its_right_neighbour():
-    left, right = layout.label_shifts(PLAN, PLACES, 2), layout.label_shifts(PLAN, PLACES, 8)
-    y, n = 4, PLAN.side
-    for step in (1, 2):  # cells from the border: strip columns 1, 0 on the left and 2, 3 on the right
-        np.testing.assert_array_equal(left[E] + [n - step, y], PLACES.vertical[1] + [2 - step, y])
-        np.testing.assert_array_equal(right[W] + [step - 1, y], PLACES.vertical[1] + [1 + step, y])
+def own(picture):
+    """A patch's own square, which is not charged."""
+    return (picture**2).sum(-1).mean()
 
 
-def test_the_corner_patch_is_whole_where_four_tiles_meet():
-    shift = layout.label_shifts(PLAN, PLACES, 0)
-    n, middle = PLAN.side, PLACES.corner + PLAN.corner
-    np.testing.assert_array_equal(shift[SW] + [0, 0], middle)
-    np.testing.assert_array_equal(shift[SE] + [n - 1, 0], middle + [-1, 0])
-    np.testing.assert_array_equal(shift[NW] + [0, n - 1], middle + [0, -1])
-    np.testing.assert_array_equal(shift[NE] + [n - 1, n - 1], middle - 1)
+def test_a_landmark_is_what_stands_out_of_its_surroundings_not_a_shade_or_grain():
+    y, x = np.mgrid[:120, :120]
+    maps = np.random.default_rng(0).normal(0, 0.02, (120, 120, 2)) + 0.05 * np.sin(x / 40)[..., None]
+    maps[(x - 30) ** 2 + (y - 80) ** 2 < 20, 1] += 0.5
+    found = patches.find_landmarks(maps, 60)
+    spot = (x - 30) ** 2 + (y - 80) ** 2 < 300
+    assert found[80, 30] > 0 and (found[~spot] > 0).mean() < 0.01
+    assert found.mean() == pytest.approx(1)
+    assert not patches.find_landmarks(np.ones((120, 120, 2)), 60).any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_hardly_a_landmark_lies_in_what_all_tiles_share(seed):
+    rng, m = np.random.default_rng(seed), 160
+    colour = 0.5 + 0.05 * rng.normal(size=(m, m, 1)).repeat(3, 2)
+    spots = [(24 + 28 * (k % 5), 24 + 28 * (k // 5)) for k in range(25)]
+    y, x = np.mgrid[:m, :m]
+    for place in spots:
+        colour[(x - place[0]) ** 2 + (y - place[1]) ** 2 < 7] += 0.4
+    plan = layout.Layout(m, 1, 60, 6, 9)
+    flat = np.zeros((m, m))
+    guide = patches.make_guidance(colour, flat, flat, plan)
+    energy_of = energy.SeamEnergy("colour", 2.0, energy.make_colour_layer(colour), None)
+    problem = search.SearchProblem(plan, guide, energy_of, 300, 2)
+    found = search.search_patches(problem, 1, np.random.default_rng(seed))
+    labels, shifts = found.labels, [layout.label_shifts(plan, found.places, tile) for tile in range(16)]
+    shown = [guide.landmarks[layout.source_cells(*pair)] > 0 for pair in zip(labels, shifts, strict=True)]
+    frame, centre = (
+        np.mean([marks[pick(own)].mean() for marks, own in zip(shown, labels, strict=True)])
+        for pick in (lambda own: own > 0, lambda own: own == 0)
+    )
+    assert frame < 0.2 * centre

@@ -227,16 +227,6 @@ def read_transforms(values, photos):
     return import_nerfstudio(Path("t.json"), values, PhotoFolder(photos).stored_size)
 
 
-def test_frames_may_have_intrinsics_of_their_own_and_a_field_of_view_instead(photos):
-    values = transforms()
-    angle = 2 * np.arctan(0.5 * WIDTH / 310.0)
-    values["frames"][3] |= {"camera_angle_x": angle, "fl_y": 311.0, "cx": 150.0, "k1": 0.0, "camera_model": "OPENCV"}
-    given = read_transforms(values, photos)
-    own = [310, 311, 150, *NUMBERS[3:4], 0, *NUMBERS[5:]]
-    assert given.images[3].lens.params == pytest.approx(np.array(own))
-    assert given.images[2].lens.params == pytest.approx(np.array(NUMBERS))
-
-
 def test_a_file_without_sizes_takes_those_of_the_photos(photos):
     """Blender's scenes name no suffix."""
     frames = transforms()["frames"]

@@ -135,17 +135,3 @@ def test_values_that_are_no_longer_finite_end_a_fit_with_their_gaussian(device):
     run.state.values["log_scales"][7, 1] = torch.nan
     with pytest.raises(ValueError, match="log_scales of Gaussian 7 is not finite"):
         descent.check(run)
-
-
-def test_bytes_say_values_to_half_a_step_and_keep_what_is_unknown(device):
-    rng, cpu = np.random.default_rng(0), torch.device("cpu")
-    for low, high in ((0.0, 1.0), (-0.4, 1.0), (0.1, 1.7)):
-        values = rng.uniform(low, high, (9, 7, 3)).astype(np.float32)
-        packed = device.module.pack_image(values, cpu)
-        assert packed.bytes.dtype == torch.uint8
-        np.testing.assert_allclose(packed.unpack().numpy(), values, atol=(max(high, 1) - min(low, 0)) / 509)
-    values[2:4] = np.nan
-    found = device.module.pack_image(values, cpu).unpack().numpy()
-    np.testing.assert_array_equal(np.isnan(found), np.isnan(values))
-    np.testing.assert_allclose(found, values, atol=1.7 / 507)
-    assert np.isnan(device.module.pack_image(np.full((2, 2, 3), np.nan, np.float32), cpu).unpack().numpy()).all()

@@ -50,34 +50,3 @@ def test_grain_that_lies_beside_its_place_takes_no_contrast_from_the_photos(grid
     for view, before in zip(levelled, spread, strict=True):
         assert view.image.std() / view.image.mean() == pytest.approx(before, rel=0.05)
         np.testing.assert_allclose(view.image.mean((0, 1)), texture.mean((0, 1)), rtol=0.02)
-
-
-def test_gain_and_offset_are_the_ratio_of_powers_and_what_is_left_of_the_means():
-    """By hand: y = 1.2 x + 0.1 but for some pairs that are far off; the power is the variance and .2 of the mean's
-    square, so that the gain of what is brighter and has the same contrast leaves colours above 0."""
-    x = np.repeat(np.random.default_rng(0).uniform(0.2, 0.6, (400, 1)), 3, 1)
-    y = 1.2 * x + 0.1
-    power = [each[8:, 0].var() + 0.2 * each[8:, 0].mean() ** 2 for each in (x, y)]
-    y[:4], x[4:8] = 3.0, np.nan
-    a, b = exposure.fit_gain_and_offset(x, y)
-    np.testing.assert_allclose(a, np.sqrt(power[1] / power[0]), rtol=2e-3)
-    np.testing.assert_allclose(b, y[8:].mean() - a * x[8:].mean(), atol=2e-3)
-    assert exposure.fit_gain_and_offset(x, 9 * y)[0].max() == np.float32(1.6)
-    few = exposure.fit_gain_and_offset(x[8:17], y[8:17])
-    np.testing.assert_array_equal(few, (np.ones(3), np.zeros(3)))
-
-
-def test_a_pictures_exposure_is_found_beside_what_moves_and_flat_pictures_and_pixels_without_weight_give_no_gain():
-    picture = np.random.default_rng(1).uniform(0.2, 0.8, (40, 40, 3)).astype(np.float32)
-    image = (1.1 * picture - 0.03).astype(np.float32)
-    image[:6] = 1.0  # something else
-    none, ones = (np.ones(3, np.float32), np.zeros(3, np.float32)), np.ones((40, 40), np.float32)
-    a, b = exposure.update_gain_and_offset(picture, (image, ones), none)
-    # the prior's share: 1e-3 against the variance of the picture, 0.03
-    np.testing.assert_allclose(a, 1.1, atol=0.01)
-    np.testing.assert_allclose(b, -0.03, atol=0.01)
-    flat = np.full((40, 40, 3), 0.5, np.float32), ones
-    a, b = exposure.update_gain_and_offset(np.full((40, 40, 3), 0.4, np.float32), flat, none)
-    np.testing.assert_allclose(a, 1, atol=1e-6)
-    np.testing.assert_allclose(b, 0.1, atol=1e-6)
-    np.testing.assert_array_equal(exposure.update_gain_and_offset(picture, (image, 0 * ones), none), none)

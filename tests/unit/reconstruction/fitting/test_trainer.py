@@ -85,12 +85,3 @@ def test_photos_without_a_pixel_that_counts_change_nothing():
     field = made.field()
     found = fitted(field, FitPlan(10, 1), photos=[blind(p) for p in made.photos()]).field
     np.testing.assert_array_equal(found.base_colours[found.ground], field.base_colours[field.ground])
-
-
-def test_what_hardly_shows_in_any_photo_goes_before_the_end():
-    points = np.array([[1.6, 1.6, 0.1], [1.4, 1.4, 0.1]])
-    field = concatenate_fields([made.field(), make_blobs(points, np.full((2, 3), 0.5), np.full(2, 0.05), logit=0.0)])
-    field.opacity_logits[-1] = -3.7  # an opacity of .024, above that with which a Gaussian stays
-    found = fitted(field, FitPlan(10, len(field) + 1)).field.means[len(made.field()) :]
-    firm, faint = (np.linalg.norm(found - point, axis=1).min(initial=9.0) for point in points)
-    assert firm < 0.1 < faint
