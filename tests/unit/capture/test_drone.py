@@ -1,11 +1,12 @@
 import json
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 from fixtures.frames import scene_frame
 
-from dav_gswt.capture import drone, drop_folder
+from dav_gswt.capture import drone, drop_folder, route
 from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts
@@ -127,3 +128,21 @@ def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, requested
     assert "fly this mission" in said_on_a_slope(site, requested, 2.0)
     # pose_4 and pose_5 are planned at 3.5 and 3.1 m, 27 m from where the drone takes off: 4.8 m off
     assert "min_altitude to 10 or more" in said_on_a_slope(site, requested, 10.0, clearance=12)
+
+
+def way(places, ordered, start=None, end=None):
+    stops = [p for p in (start, *places[list(ordered)], end) if p is not None]
+    return route.path_length(np.array(stops))
+
+
+@pytest.mark.parametrize("start, end", [(None, None), (0.0, None), (0.0, 0.0), (0.0, 1.0)])
+def test_every_place_is_visited_once_and_no_stretch_can_be_turned_round_to_shorten_the_way(start, end):
+    for seed in range(20):
+        places = np.random.default_rng(seed).random((9, 2))
+        first, last = (None if at is None else np.full(2, at) for at in (start, end))
+        ordered = route.order_stops(places, first, last)
+        assert sorted(ordered) == list(range(9))
+        long = way(places, ordered, first, last)
+        for i, j in combinations(range(10), 2):
+            turned = [*ordered[:i], *ordered[i:j][::-1], *ordered[j:]]
+            assert way(places, turned, first, last) >= long - 1e-9

@@ -129,3 +129,15 @@ def blob(place, sizes, colour):
         np.zeros(1, np.float32),
         np.zeros(1, bool),
     )
+
+
+MIDDLE = [1.6, 1.6, 0.0]
+
+
+def test_no_camera_is_inside_an_object_or_under_the_ground():
+    def place(target, *more):
+        return build.place_camera(target, concatenate_fields([patch.field(), *more]), patch.grid(), patch.FRAME, 32)
+
+    ((_, camera),) = place(np.array(MIDDLE))
+    assert place(np.array(MIDDLE), blob(list(camera.centre), [0.4, 0.4, 0.4], [0.5, 0.5, 0.5])) == []
+    assert place(np.array([1.6, 1.6, -9.0])) == []

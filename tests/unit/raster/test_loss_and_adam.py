@@ -120,3 +120,18 @@ def test_rows_left_out_stay_with_their_moments(backend):
     for all_moved, moved, before in zip(every, some, (start, first, second), strict=True):
         np.testing.assert_array_equal(moved[~rows], before[~rows])
         np.testing.assert_allclose(moved[rows], all_moved[rows], rtol=1e-6)
+
+
+def test_what_is_no_step_is_refused(backend):
+    def step(values, rate=0.1, number=1):
+        zeros = np.zeros((5, 3), np.float32)
+        backend.adam(values, zeros, zeros.copy(), zeros.copy(), rate=rate, step=number)
+
+    frozen, free = np.zeros((5, 3), np.float32), np.zeros((5, 3), np.float32)
+    frozen.flags.writeable = False
+    with pytest.raises(ValueError, match="counts from 1"):
+        step(free, number=0)
+    with pytest.raises(ValueError, match="values is read-only"):
+        step(frozen)
+    with pytest.raises(ValueError, match="one number or 3, one a column, not 5"):
+        step(free, rate=np.ones(5, np.float32))

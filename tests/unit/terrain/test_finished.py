@@ -4,11 +4,15 @@ import hashlib
 
 import numpy as np
 import pytest
+from fixtures.finite_cells import collect_cells
 from fixtures.land_covers import SIDE, write_cover_bundle
 
 from dav_gswt.bundle import store
 from dav_gswt.errors import InputError
-from dav_gswt.terrain import endless, heights
+from dav_gswt.geometry import cameras
+from dav_gswt.images.metrics import psnr
+from dav_gswt.raster import render
+from dav_gswt.terrain import endless, heights, stills
 from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills, make_sphere
 from dav_gswt.terrain.page import write_page
 
@@ -17,6 +21,7 @@ SURFACES = {
     "hills": Hills(2.0, 30.0),
     "image": HeightMap(np.random.default_rng(1).uniform(0, 3, (9, 7)).astype(np.float32), 60.0),
 }
+HILLS = {"kind": "hills", "height": 0.4, "wavelength": 4}
 NOT_FINITE = np.full((9, 7), np.nan, np.float32).tobytes()
 RULE = [{"kind": "noise"}, {"kind": "height", "material": "grass", "low": 0.1, "soft": 0.2}]
 
@@ -61,3 +66,26 @@ def test_a_surface_that_is_damaged_is_named(tmp_path, changes, said):
     (tmp_path / "nan.bin").write_bytes(NOT_FINITE)
     with pytest.raises(InputError, match=said):
         heights.read_surface(tmp_path, entry | changes, 4.0)
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cover") / "b"
+    write_cover_bundle(folder)
+    return store.read_bundle(folder)
+
+
+@pytest.mark.parametrize("surface, corner", [({"kind": "flat"}, (0, 0)), (HILLS, (4000, -7000))], ids=["flat", "hills"])
+def test_it_looks_as_the_terrain_does(bundle, surface, corner):
+    terrain = endless.terrain_from_bundle(bundle, surface)
+    west, south = corner
+    field = collect_cells(terrain, west - 4, south - 4, 9, 9, 0)
+    x, y = (west + 0.5) * SIDE, (south + 0.5) * SIDE
+    ground = float(terrain.heights.at(np.array([x]), np.array([y]))[0][0])
+    eye = np.array([x, y, ground + 2 * SIDE])
+    camera = cameras.pinhole(eye, eye + [0.3, 0.2, -1.0], 96, 96, 40.0)
+    expected = stills.render_view(terrain, camera, bundle.manifest.sky, bundle.manifest.ground_colour)
+    origin = np.array([(west - 4) * SIDE, (south - 4) * SIDE, 0.0])
+    near = cameras.pinhole(eye - origin, eye - origin + [0.3, 0.2, -1.0], 96, 96, 40.0)
+    assert psnr(render(field, near).colour, expected, np.ones((96, 96))) > 35
+    assert np.abs(field.means[:, :2]).max() < 10 * SIDE, "positions count from the corner"
