@@ -63,16 +63,6 @@ def test_ground_has_the_colours_of_its_place_and_an_object_those_of_its_foot(pla
     assert np.abs(at_feet).max() > 0.05
 
 
-def test_stills_show_what_exports_hold_at_every_level(varied):
-    eye = np.array([18.0, 22.0, 3.0])
-    cell = replace(list_cells(varied, Area(4, 5, 1, 1)), nearest=np.array([0.1]), farthest=np.array([9.0]))
-    for level in (0, 1):
-        terrain = replace(varied, switches=[(np.inf, 0.0)[level], np.inf], bands=[0.0, 0.0])
-        seen, _ = placement.place_cell(terrain, cell, eye)
-        held = placement.collect_tiles(varied, cell, [level])[level]
-        assert sorted(seen.sh[:, 0].tolist()) == sorted(held.sh[:, 0].tolist())
-
-
 def cut_ground(wide, blob=0.0):
     """Tiles of an exemplar of grain and wide light and dark (standard deviation `wide`), and perhaps a bright blob."""
     sample, rng = tile_sets.exemplar(), np.random.default_rng(1)
@@ -116,14 +106,6 @@ def test_nothing_is_added_where_it_is_turned_off_or_tiles_are_known_by_their_gau
     cells = list_cells(plain, Area(0, 0, 1, 1))
     tile = placement.collect_tiles(replace(plain, classes=None), cells, [0])[0]
     assert tile is plain.tiles[0, int(cells.tile[0])]
-
-
-def test_power_of_an_octave_is_the_variance_of_its_waves():
-    y, x = np.mgrid[:96, :96]
-    for period, octave in ((32, 1), (15, 2)):  # windows of 48 cells; octaves 24 to 48 and 12 to 24
-        power = variation.measure_octaves(np.sin(2 * np.pi * x / period), 96, 24)
-        # a plane is subtracted without the window's weights, so that parts do not add up exactly
-        assert power[octave] == pytest.approx(0.5, rel=0.3) and power.argmax() == octave and len(power) == 3
 
 
 @pytest.mark.parametrize("waves", [[], [WaveEntry(0.63, [[0.1] * 3])]])
