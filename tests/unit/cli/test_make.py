@@ -213,5 +213,5 @@ def test_help_says_where_the_pages_lie_that_messages_name(capsys):
         main.main(["--help"])
     said = capsys.readouterr().out.strip()
     assert "dav-gswt make PHOTOS" in said
-    place = said.rpartition(" lie in ")[2].removesuffix(".")
-    assert (Path(place) / "docs/reference/config.md").is_file() and (Path(place) / "docs/photos.md").is_file()
+    place = said.rpartition(" are in ")[2].removesuffix(".")
+    assert all((Path(place) / name).is_file() for name in ("workflow/schemas/config.schema.json", "docs/photos.md"))
