@@ -1,4 +1,4 @@
-"""The examples of docs/architecture.md and of a tutorial: each extension is one function or class, and works as shown."""
+"""The examples of docs/architecture.md and of a tutorial: an extension is one function or class, and works as shown."""
 
 import importlib
 import re
