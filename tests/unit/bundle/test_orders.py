@@ -40,13 +40,13 @@ def bundle(tmp_path_factory):
     return store.read_bundle(folder)
 
 
-def with_orders(bundle, orders):
-    tiles = [replace(tile, orders=orders) for tile in bundle.manifest.tiles]
+def with_orders(bundle, kept):
+    tiles = [replace(tile, orders=kept) for tile in bundle.manifest.tiles]
     return replace(bundle, manifest=replace(bundle.manifest, tiles=tiles))
 
 
 def test_orders_are_counted_and_more_of_them_lose_less(bundle):
-    few, many = (orders.measure_orders(with_orders(bundle, orders)) for orders in ([8], list(range(9))))
+    few, many = (orders.measure_orders(with_orders(bundle, kept)) for kept in ([8], list(range(9))))
     assert (few["orders"], many["orders"]) == (16 * 2, 9 * 16 * 2)
     # 64 and 16 discs, 20 things at both levels, 4 bytes each
     assert few["order_mb"] == pytest.approx(4 * 16 * (64 + 16 + 40) / 1e6)

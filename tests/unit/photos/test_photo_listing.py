@@ -13,9 +13,8 @@ from fixtures.frames import scene_frame
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos.geo_file import read_geo_files
-from dav_gswt.photos.importers.splat import MARGIN
 from dav_gswt.photos.photo_listing import drop_twins, list_photos
-from dav_gswt.photos.photo_set import PhotoMasks, find_borders, prepare_photos, read_picture, write_photo_folder
+from dav_gswt.photos.photo_set import MARGIN, PhotoMasks, find_borders, prepare_photos, read_picture, write_photo_folder
 from dav_gswt.photos.sfm import gps
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions
 from dav_gswt.photos.training_views import read_training_view
