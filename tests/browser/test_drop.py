@@ -23,7 +23,7 @@ READ = """async text => {
   // what the page says against a zip: null if all of it is read
   const { openSource, readParts } = await import("./data/bundle.js");
   const { PageError } = await import("./data/checks.js");
-  const { createComposer } = await import("./data/compose.js"), { run } = await import("./terrain/steps.js");
+  const { createComposer } = await import("./data/compose.js"), { run } = await import("./terrain/draw_order.js");
   const { readTerrain } = await import("./scene/open_terrain.js");
   const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
   try {

@@ -21,8 +21,8 @@ NORTH, UP, EAST = np.cos(np.radians(20)), np.tan(np.radians(40)), np.sin(np.radi
 CAPTURED = 6 + np.degrees(np.arctan2(np.hypot(NORTH, UP), EAST)) / 15  # hours
 
 BELOW = """async (cases) => {
-  const { createSky } = await import("./draw/sky.js"), { lightBelow } = await import("./terrain/light.js");
-  const { findHour, placeSun, sunAt } = await import("./terrain/sun.js");
+  const { createSky } = await import("./draw/sky.js");
+  const { findHour, lightBelow, placeSun, sunAt } = await import("./terrain/light.js");
   const gl = new OffscreenCanvas(1, 1).getContext("webgl2"), bytes = new Uint8Array(4);
   return cases.map(({ captured: [elevation, azimuth], north, hour, zenith, horizon, colours, rays }) => {
     const captured = placeSun(elevation, azimuth), manifest = { sky: { zenith, horizon }, ground_colour: [0, 0, 0] };
@@ -47,7 +47,7 @@ SHADED = (
   // the shader's functions, run by transform feedback: of light, and of the texture of shadows
   const { createShadowTexture, lightCode, shineCode } = await import("./draw/lighting.js");
   const { createHeights } = await import("./terrain/heights.js");
-  const { createShadows } = await import("./terrain/shadows.js"), { placeSun } = await import("./terrain/sun.js");
+  const { createShadows, placeSun } = await import("./terrain/light.js");
   const vertex = `#version 300 es
     ${shineCode(true)}
     ${lightCode("hills")}
