@@ -6,7 +6,7 @@ The functions of `dav_gswt.api` are offered here: `dav_gswt.read_field(path)`. O
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 
 def __getattr__(name: str) -> Any:
