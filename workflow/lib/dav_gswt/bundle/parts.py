@@ -40,8 +40,15 @@ PLANES = 19  # bytes of a Gaussian
 
 @dataclass(frozen=True)
 class PartEntry(Entry):
-    """A file in the manifest: what it holds, its path relative to the manifest, bytes of the file, bytes that it
-    inflates to, digest of the file. level: that a part of kind `level` holds.
+    """A file of the bundle.
+
+    Attributes:
+        kind: what the file contains. A reader may skip parts of unknown kinds.
+        file: path relative to the manifest.
+        bytes: size of the file.
+        size: number of bytes after decompression.
+        sha256: digest of the file.
+        level: level of the exemplars in the file; only for parts of kind `level`.
     """
 
     kind: Annotated[str, Field(min_length=1, max_length=40)]
@@ -54,8 +61,13 @@ class PartEntry(Entry):
 
 @dataclass(frozen=True)
 class ChunkEntry(Entry):
-    """A tile or an object at a level: its number of Gaussians. part, first: where its records are stored, the index of
-    the part and the number of the first record in it; without them the tile is composed.
+    """One tile or one object at one level. Without `part` and `first`, the tile is composed.
+
+    Attributes:
+        level: index into `levels`.
+        count: number of Gaussians.
+        part: index into `parts` of the part in which its records are stored.
+        first: number of its first record in that part.
     """
 
     level: Natural
