@@ -102,7 +102,7 @@ bench: .venv/installed-test
 docs: .venv/installed-docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
-# docs/reference/config.md and policies.md, and the schema: made from the config models
+# docs/reference/policies.md and the schemas: made from the models
 reference: .venv/installed
 	@$(BIN)/python workflow/reference.py
 

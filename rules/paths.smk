@@ -7,10 +7,9 @@ from dav_gswt import paths
 from dav_gswt.capture.agents import AGENTS
 from dav_gswt.code_digest import LIBRARY, digest_code
 from dav_gswt.config.base import select_keys
-from dav_gswt.config.exports import Export
 from dav_gswt.config.load import add_scene_files, check_config, merge_tables, parse_command_line
 from dav_gswt.config.scenes import SCENES
-from dav_gswt.config.settings import Preset
+from dav_gswt.config.settings import Export, Preset
 from dav_gswt.errors import InputError
 from dav_gswt.files import is_from_future, locate_path
 from dav_gswt.images.lpips_weights import locate_weights

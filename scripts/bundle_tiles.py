@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dav_gswt.bundle import build
-from dav_gswt.bundle.captured_light import find_light
+from dav_gswt.bundle.content import find_light
 from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to

@@ -9,13 +9,13 @@ from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import prior_sampling, scoring
+from dav_gswt.views import scoring
 
 with logging_to(snakemake.log[0]):
     paths, out, params = snakemake.input, snakemake.output, snakemake.params
     fitted, grid, names = read_field(paths.field), ground.read_ground(paths.ground), read_view_split(paths.views).start
     photos = read_training_views(paths.images, paths.model, names, list(paths.captures), scoring.PHOTO_WIDTH)
-    config = prior_sampling.open_prior(params.prior, 0.0, params.seed)
+    config = scoring.open_prior(params.prior, 0.0, params.seed)
     result = build.inpaint_field(fitted, grid, read_scene_frame(paths.frame), photos, config)
     if result.field is fitted:
         copy_file(paths.field, out.field)

@@ -6,7 +6,7 @@ from dav_gswt.logs import logging_to
 from dav_gswt.materials.store import read_exemplars
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import pose_maps
+from dav_gswt.views import scores
 
 with logging_to(snakemake.log[0]):
     paths, params = snakemake.input, snakemake.params
@@ -16,8 +16,8 @@ with logging_to(snakemake.log[0]):
     else:
         exemplars = [(read_field(paths.field), ground.read_ground(paths.ground))]
         if paths.get("maps"):  # scored by a prior: tiles use its uncertainty instead of the field's own
-            maps = pose_maps.read_pose_maps(paths.maps)[1]
-            exemplars = [(pose_maps.apply_uncertainty(field, maps), grid) for field, grid in exemplars]
+            maps = scores.read_pose_maps(paths.maps)[1]
+            exemplars = [(scores.apply_uncertainty(field, maps), grid) for field, grid in exemplars]
     steps = params.preset["level_steps"]
     cropped = [merge.crop_to_blocks(*exemplar, 1) for exemplar in exemplars]
     sets = [build.build_levels(*each, params.levels, steps, params.seed) for each in cropped]

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dav_gswt.bundle.order_costs import measure_orders
+from dav_gswt.bundle.orders import measure_orders
 from dav_gswt.bundle.store import read_bundle
 from dav_gswt.files import write_json
 from dav_gswt.logs import logging_to

@@ -8,7 +8,7 @@ from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import candidates, pose_maps, prior_sampling, scores, scoring
+from dav_gswt.views import candidates, scores, scoring
 
 with logging_to(snakemake.log[0]):
     paths, out, params = snakemake.input, snakemake.output, snakemake.params
@@ -19,11 +19,11 @@ with logging_to(snakemake.log[0]):
     remaining = filter_attainable(scene, frame, grid, fitted, remaining)
     taken = read_training_views(paths.images, paths.model, split.start, captures, scoring.PHOTO_WIDTH)
     given, lpips = params.prior, paths.get("lpips")
-    prior = prior_sampling.open_prior(given, params.p_drop, params.seed, lpips) if given else None
+    prior = scoring.open_prior(given, params.p_drop, params.seed, lpips) if given else None
     first = scores.read_frozen_scales(paths.frozen) if paths.get("frozen") else None
     scored = scoring.score_poses(fitted, grid, remaining, taken, frame, prior, first)
     scores.write_scores(out.scores, scored.scores)
-    pose_maps.write_pose_maps(out.maps, scored.maps, scored.gaussians)
+    scores.write_pose_maps(out.maps, scored.maps, scored.gaussians)
     shown = {"uncertainty": scoring.render_above(scored, fitted, grid)}, {"camera": "straight above"}
     image_files.write_exr_parts(out.shown, {"above": shown})
     inputs = {name: paths[name] for name in ("field", "ground", "views", "weights", "lpips") if paths.get(name)}

@@ -1,4 +1,7 @@
-"""The key reference, the page of policies and the JSON schema: `make reference` writes them from the config models."""
+"""Pages and schemas that are made from the config models.
+
+`make reference` writes the page of policies and the JSON schemas; `make docs` makes the page of the config's keys.
+"""
 
 import json
 from pathlib import Path
@@ -13,7 +16,7 @@ from dav_gswt.views.policies import POLICIES
 
 HEAD = """# Config reference
 
-Made from the models in `workflow/lib/dav_gswt/config/` by `make reference`. The config is closed: a misspelt or
+Made from the models in `workflow/lib/dav_gswt/config/` with the site. The config is closed: a misspelt or
 out-of-range key stops the program before the first job with one message. `config/config.yaml` is the experiment, and
 each `config/scenes/<name>.yaml` is one scene. Lay single keys over them on the command line (`snakemake --cores 2
 --config rounds=3`), or a file (`--configfile mine.yaml`). A key whose default is *required* must be given. A key
@@ -50,6 +53,11 @@ def describe_tables(model: type[BaseModel], place: Place = ()) -> str:
     return "\n\n".join(_describe_table(places, table) for places, table in found.values())
 
 
+def describe_config() -> str:
+    """The page reference/config.md of the site."""
+    return f"{HEAD}\n\n{describe_tables(Config)}\n"
+
+
 def describe_policies() -> str:
     """The page docs/reference/policies.md."""
     rows = [f"| `{spec.name}` | {spec.chooses} | {spec.describe_inputs()} |" for spec in POLICIES.values()]
@@ -67,7 +75,6 @@ def make_schema() -> str:
 def make_reference() -> dict[str, str]:
     """The text of each file that is made from the config models, by its path in the repository."""
     return {
-        "docs/reference/config.md": f"{HEAD}\n\n{describe_tables(Config)}\n",
         "docs/reference/policies.md": describe_policies(),
         "workflow/schemas/config.schema.json": make_schema(),
         "workflow/schemas/davgswt.schema.json": manifest.make_schema(),

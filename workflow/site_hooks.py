@@ -1,6 +1,7 @@
-"""Hooks of mkdocs: write reference/api.md, the list of modules and their public names, from the source's docstrings.
+"""Hooks of mkdocs: pages that are not in the repository.
 
-Nothing is imported, so the site builds without the library's dependencies.
+reference/api.md lists modules and their public names, from the source's docstrings. reference/config.md lists the
+config's keys. In a clone, pages link to the config's schema instead; on the site these links lead to the page.
 """
 
 import ast
@@ -8,8 +9,10 @@ import re
 from pathlib import Path
 
 from mkdocs.structure.files import File, Files
+from reference import describe_config  # beside this file
 
 LIBRARY = Path(__file__).parent / "lib/dav_gswt"
+SCHEMA = re.compile(r"\]\(((?:\.\./)*)\.\./workflow/schemas/config\.schema\.json")
 HEAD = """# Python API
 
 The first line of every module's, class's and function's docstring. The source has the rest: formulas, shapes, units,
@@ -18,9 +21,15 @@ edge cases and errors. Import packages as `dav_gswt.<package>.<module>`.
 
 
 def on_files(files: Files, config) -> Files:
-    """Add the page to the site."""
+    """Add the pages to the site."""
     files.append(File.generated(config, "reference/api.md", content=api_page(LIBRARY)))
+    files.append(File.generated(config, "reference/config.md", content=describe_config()))
     return files
+
+
+def on_page_markdown(markdown: str, **_) -> str:
+    """Turn links to the config's schema into links to the page of its keys."""
+    return SCHEMA.sub(r"](\1reference/config.md", markdown)
 
 
 def api_page(library: Path) -> str:

@@ -11,7 +11,7 @@ const EXPORT = "/exports/terrain/";
 /** What lies where: the export's own coordinates count from its `origin`. */
 async function open() {
   const response = await fetch(`${EXPORT}terrain.json`);
-  if (!response.ok) throw new Error("There is no export: see examples/README.md");
+  if (!response.ok) throw new Error("There is no export: see docs/tutorials/three-js.md");
   const facts = await response.json(), terrain = await load("/page/");
   terrain.end(); // heights need no tiles
   const splats = new SplatMesh({ url: `${EXPORT}terrain.spz` });

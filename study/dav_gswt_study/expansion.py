@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from numpy import ndarray as Array
 
-from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import Levels
 from dav_gswt.tiles.build import TileSet, TilingOptions, cut_levels
 from dav_gswt.tiles.energy import Cells, CostLayer, divide_terms
 from dav_gswt.tiles.layout import CENTRE, LABELS, NE, NW, SE, SW, E, Layout, N, S, W

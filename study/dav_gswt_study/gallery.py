@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.bundle import level_distances
+from dav_gswt.bundle import manifest
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.files import atomic_file, read_json
 from dav_gswt.images import image_files
@@ -38,7 +38,7 @@ def draw_scene(photo: Path | str, above: Path | str, walker: Path | str, out: Pa
 
 def suit_width(terrain: EndlessTerrain, width: int) -> EndlessTerrain:
     """The terrain with levels that begin where they do in pictures of the reference's width: nearer in smaller ones."""
-    factor = min(1.0, width / level_distances.WIDTH)
+    factor = min(1.0, width / manifest.WIDTH)
     scaled = ([factor * value for value in values] for values in (terrain.switches, terrain.bands))
     return replace(terrain, **dict(zip(("switches", "bands"), scaled, strict=True)))
 

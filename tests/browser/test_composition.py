@@ -14,7 +14,7 @@ OPEN = """
   const { openSource, readManifest, readParts } = await import("./data/bundle.js");
   const { PageError } = await import("./data/checks.js");
   const { createComposer } = await import("./data/compose.js");
-  const { run } = await import("./terrain/steps.js");
+  const { run } = await import("./terrain/draw_order.js");
   const blob = new Blob([Uint8Array.from(atob(text), c => c.charCodeAt(0))]), source = await openSource(blob);
   const list = words => Array.from(new Uint8Array(words.buffer, words.byteOffset, words.byteLength));
 """

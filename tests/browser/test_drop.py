@@ -13,11 +13,9 @@ from fixtures.bundles import Ground
 from fixtures.dropped_files import drop, files_of, with_values, zipped
 from fixtures.land_covers import write_cover_bundle
 
-from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.export import gswt
-from dav_gswt.field import GaussianField, rgb_to_sh
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 OTHER = Ground(discs=8, salt=99, speckle=20)
@@ -25,7 +23,7 @@ READ = """async text => {
   // what the page says against a zip: null if all of it is read
   const { openSource, readParts } = await import("./data/bundle.js");
   const { PageError } = await import("./data/checks.js");
-  const { createComposer } = await import("./data/compose.js"), { run } = await import("./terrain/steps.js");
+  const { createComposer } = await import("./data/compose.js"), { run } = await import("./terrain/draw_order.js");
   const { readTerrain } = await import("./scene/open_terrain.js");
   const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
   try {
@@ -322,52 +320,6 @@ def test_a_file_of_the_web_has_the_size_that_was_promised(modules, answer, size,
         size,
     )
     assert told == found if isinstance(found, int) else found in told
-
-
-def test_the_page_rounds_a_set_as_the_library_does(modules):
-    rng = np.random.default_rng(4)
-    fields = [rounded_before(rng, n) for n in (40, 300)]
-    encoding = Encoding.fit(fields, 4.0, 0.01)
-    lists = [[bytes_of(f), *(v.ravel().tolist() for v in (f.means, f.log_scales, f.quats))] for f in fields]
-    told, found = modules.evaluate(
-        """async sets => {
-          const { fitEncoding, writeRecords } = await import("./data/quantize.js");
-          const made = sets.map(([paint, ...rest]) => {
-            const [centres, logScales, turns] = rest.map(list => new Float32Array(list));
-            return { count: paint.length / 4, paint: new Uint8Array(paint), centres, logScales, turns };
-          });
-          const encoding = fitEncoding(made, 4, 0.01);
-          return [encoding, made.map(one => {
-            const out = new ArrayBuffer(16 * one.count);
-            writeRecords(out, one, encoding);
-            return [...new Uint8Array(out)];
-          })];
-        }""",
-        lists,
-    )
-    for key, values in vars(encoding).items():
-        np.testing.assert_allclose(told[key], values, rtol=1e-12, err_msg=key)
-    for field, own in zip(fields, found, strict=True):
-        assert bytes(own) == encoding.encode(field).tobytes()
-
-
-def rounded_before(rng, n: int) -> GaussianField:
-    """Gaussians whose colours and opacities are bytes already."""
-    opacity = np.clip(rng.integers(1, 255, n) / 255, 1e-6, 1)
-    return GaussianField(
-        rng.uniform(-0.2, 4.3, (n, 3)).astype(np.float32),
-        rng.uniform(-12, 3, (n, 3)).astype(np.float32),  # some are cut, below and above
-        rng.normal(size=(n, 4)).astype(np.float32),
-        np.log(opacity / (1 - opacity)).astype(np.float32),
-        rgb_to_sh((rng.integers(0, 256, (n, 3)) / 255).astype(np.float32)),
-        np.zeros(n, np.float32),
-        np.zeros(n, bool),
-    )
-
-
-def bytes_of(field: GaussianField) -> list[int]:
-    opacity = 1 / (1 + np.exp(-field.opacity_logits.astype(float)))
-    return np.rint(255 * np.concatenate([field.base_colours, opacity[:, None]], 1)).astype(int).ravel().tolist()
 
 
 def open_dropped(target, data: bytes) -> None:

@@ -3,8 +3,6 @@
 import importlib.util
 import io
 import json
-import shutil
-import subprocess
 import threading
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,7 +17,7 @@ from PIL import Image
 
 from dav_gswt.bundle import store
 from dav_gswt.bundle.manifest import Manifest, Sky
-from dav_gswt.config.exports import Export
+from dav_gswt.config.settings import Export
 from dav_gswt.export import ground_files, terrain_files
 from dav_gswt.export.axes import Y_DOWN, turn_field
 from dav_gswt.field import read_field
@@ -44,23 +42,6 @@ def serve(root):
     module = importlib.util.module_from_spec(found)
     found.loader.exec_module(module)
     return module
-
-
-@pytest.fixture(scope="module")
-def node_modules(root):
-    """examples/node_modules, which `npm ci` fetches on the first run."""
-    folder = root / "examples"
-    if not (folder / "node_modules/cesium").is_dir():  # nor is it after `npm ci --omit=dev`
-        if not (npm := shutil.which("npm")):
-            pytest.skip("needs npm (Node.js 20 or newer) for three.js and Spark")
-        try:
-            command = [npm, "ci", "--no-audit", "--no-fund", "--ignore-scripts"]
-            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
-        except subprocess.TimeoutExpired:
-            pytest.skip("npm cannot be reached")
-        if done.returncode:
-            pytest.skip(f"npm ci --prefix examples does not work here: {done.stderr[-300:]}")
-    return folder / "node_modules"
 
 
 @contextmanager

@@ -31,12 +31,6 @@ def overlaps(boxes: dict, panels_hide: bool = True) -> list[tuple[str, str]]:
     return found
 
 
-def test_common_areas_are_found():
-    boxes = {"menu": (0, 0, 10, 10), "toast": (9, 9, 12, 12), "pad": (10, 0, 20, 9), "map": (0, 0, 1, 1)}
-    assert overlaps(boxes) == [("menu", "toast")]
-    assert overlaps(boxes, False) == [("menu", "toast"), ("menu", "map")]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("width, height, touch", SIZES)
 def test_nothing_lies_over_anything_else(visit, address, width, height, touch):
@@ -72,36 +66,6 @@ def test_nothing_lies_over_anything_else(visit, address, width, height, touch):
     check("materials", "paint", "toast", "map", "tools", *pad)
     assert {state: pairs for state, pairs in found.items() if pairs} == {}
     assert {state: names for state, names in shown.items() if names} == {}
-
-
-DRAW = """async () => {
-  const { drawGaussians, SIZE } = await import("./ui/thumbnails.js");
-  const [c, s] = [20, 70].map(d => Math.cos(d * Math.PI / 180)), size = 0.1;
-  const dots = [ // place, colour; the hidden ones lie behind the red one, as seen from the south and from above
-    [[-1, 3 * c, -3 * s], [1, 1, 1]], [[-1, 0, 0], [1, 0, 0]], [[-1, 2 * c, -2 * s], [1, 1, 1]],
-    [[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [0, 0, 1]]];
-  const bytes = drawGaussians({
-    count: dots.length, centres: Float32Array.from(dots.flatMap(([place]) => place)),
-    deviations: new Float32Array(15).fill(size), turns: Float32Array.from(dots.flatMap(() => [1, 0, 0, 0])),
-    colours: Float32Array.from(dots.flatMap(([, colour]) => [...colour, 1])) });
-  return [SIZE, [...bytes]];
-}"""
-
-
-def test_a_small_picture_shows_an_object_from_the_side_nearest_things_in_front(modules):
-    size, data = modules.evaluate(DRAW)
-    picture = np.array(data).reshape(size, size, 4)
-
-    def middle(channel):
-        """Row and column of what has only this colour."""
-        pure = (picture[..., channel] > 250) & (picture[..., :3].sum(-1) < 270) & (picture[..., 3] > 100)
-        return np.argwhere(pure).mean(0)
-
-    red, green, blue = middle(0), middle(1), middle(2)
-    scale = (size - 6) / 2  # pixels a unit: the picture is 2 wide, with a margin of 3
-    np.testing.assert_allclose(green - red, [0, 2 * scale], atol=0.5)
-    np.testing.assert_allclose(blue - red, [-np.cos(np.radians(20)) * scale, scale], atol=0.5)
-    assert picture[0, 0, 3] == 0 and picture[..., 3].max() > 250
 
 
 @pytest.mark.slow

@@ -21,8 +21,8 @@ NORTH, UP, EAST = np.cos(np.radians(20)), np.tan(np.radians(40)), np.sin(np.radi
 CAPTURED = 6 + np.degrees(np.arctan2(np.hypot(NORTH, UP), EAST)) / 15  # hours
 
 BELOW = """async (cases) => {
-  const { createSky } = await import("./draw/sky.js"), { lightBelow } = await import("./terrain/light.js");
-  const { findHour, placeSun, sunAt } = await import("./terrain/sun.js");
+  const { createSky } = await import("./draw/sky.js");
+  const { findHour, lightBelow, placeSun, sunAt } = await import("./terrain/light.js");
   const gl = new OffscreenCanvas(1, 1).getContext("webgl2"), bytes = new Uint8Array(4);
   return cases.map(({ captured: [elevation, azimuth], north, hour, zenith, horizon, colours, rays }) => {
     const captured = placeSun(elevation, azimuth), manifest = { sky: { zenith, horizon }, ground_colour: [0, 0, 0] };
@@ -47,7 +47,7 @@ SHADED = (
   // the shader's functions, run by transform feedback: of light, and of the texture of shadows
   const { createShadowTexture, lightCode, shineCode } = await import("./draw/lighting.js");
   const { createHeights } = await import("./terrain/heights.js");
-  const { createShadows } = await import("./terrain/shadows.js"), { placeSun } = await import("./terrain/sun.js");
+  const { createShadows, placeSun } = await import("./terrain/light.js");
   const vertex = `#version 300 es
     ${shineCode(true)}
     ${lightCode("hills")}
@@ -100,24 +100,6 @@ def test_ground_has_the_light_and_the_shadows_of_the_library(modules):
     # half floats, and cards that interpolate in steps of 1/256 of a texel
     np.testing.assert_allclose(found["drawn"], visible, rtol=0, atol=0.03)
     assert found["turns"] > 50, "nobody waits for long"
-
-
-@pytest.mark.parametrize("elevation", [3.0, 40.0, 85.0, 90.0])
-def test_open_level_ground_keeps_its_colours_below_the_captured_sun(modules, elevation):
-    level, margins, soft = modules.evaluate(
-        """async (elevation) => {
-          const { lightBelow } = await import("./terrain/light.js");
-          const { createShadows } = await import("./terrain/shadows.js");
-          const { placeSun } = await import("./terrain/sun.js"), sun = placeSun(elevation, 200);
-          const made = createShadows({ at: () => [7, 0, 0] }, 4);
-          while (!made.step(9, 9, sun, 1000));
-          const grey = { sky: { zenith: [0, 0, 0], horizon: [0, 0, 0] }, ground_colour: [0, 0, 0] };
-          return [lightBelow(grey, sun, sun).level, [...made.made.margins], made.made.soft];
-        }""",
-        elevation,
-    )
-    np.testing.assert_allclose(level, 1, atol=1e-12)
-    assert min(margins) >= soft, "the whole sun is seen"
 
 
 @pytest.fixture(scope="module")

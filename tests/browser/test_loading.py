@@ -19,62 +19,6 @@ def test_no_request_leaves_the_page_and_nothing_is_complained_about(visit, plain
     assert len(asked) > 32 and 0 < len(parts) == len(set(parts))
 
 
-def test_parts_are_read_in_order_each_once_and_told_in_bytes(modules):
-    listed, told, asked, most = modules.evaluate(
-        """async () => {
-          const { listParts, readManifest, readParts } = await import("./data/bundle.js");
-          const { webSource } = await import("./data/source.js");
-          const source = webSource(new URL("./", location.href)), manifest = await readManifest(source);
-          const told = [], asked = [];
-          let open = 0, most = 0;
-          const read = async (file, ...rest) => {
-            asked.push(file);
-            most = Math.max(most, ++open);
-            return source.read(file, ...rest).finally(() => { open -= 1; });
-          };
-          await readParts(manifest, { read }, { take: () => {}, onProgress: progress => told.push({ ...progress }) });
-          return [listParts(manifest).map(({ part }) => [part.file, part.bytes]), told, asked, most];
-        }"""
-    )
-    assert asked == [file for file, _ in listed] and most <= 3
-    total = sum(size for _, size in listed)
-    assert told[-1] == {"bytes": total, "total": total, "parts": len(listed), "of": len(listed)}
-    assert [one["bytes"] for one in told] == sorted(one["bytes"] for one in told)
-
-
-FAIL = """async ({ failures, pauses, many }) => {
-  // `many` parts, of which the third fails so often
-  const { readParts } = await import("./data/bundle.js");
-  const parts = Array.from({ length: many }, (_, k) => ({ kind: "plain", file: `p${k}`, bytes: 16, size: 16 }));
-  const asked = [], told = [];
-  const read = async (file, size, { onBytes }) => {
-    asked.push(file);
-    await new Promise(done => setTimeout(done, 5));
-    onBytes(7);
-    if (file === "p2" && asked.filter(name => name === file).length <= failures) throw new Error("the third");
-    onBytes(9);
-    return new ArrayBuffer(16);
-  };
-  const taken = [], take = index => void taken.push(index), onProgress = ({ bytes }) => told.push(bytes);
-  const said = await readParts({ parts }, { read, pauses }, { take, onProgress }).catch(error => error.message);
-  return { said: said ?? null, asked, taken, bytes: told.at(-1) };
-}"""
-
-
-def test_the_first_failure_ends_all_reading_and_is_thrown(modules):
-    found = modules.evaluate(FAIL, {"failures": 9, "pauses": [], "many": 90})
-    assert found["said"] == "the third" and len(found["asked"]) <= 6
-
-
-def test_a_part_that_fails_is_asked_for_again_before_that_is_told(modules):
-    found = modules.evaluate(FAIL, {"failures": 3, "pauses": [5, 10, 20], "many": 6})
-    assert found["said"] is None and sorted(found["taken"]) == list(range(6))
-    assert found["asked"].count("p2") == 4 and len(found["asked"]) == 9
-    assert found["bytes"] == 6 * 16, "what came in vain does not count"
-    found = modules.evaluate(FAIL, {"failures": 4, "pauses": [5, 10, 20], "many": 6})
-    assert found["said"] == "the third" and found["asked"].count("p2") == 4
-
-
 def test_a_part_that_the_server_misses_once_is_no_failure(visit, plain):
     seen, asked = visit(160, 100), []
 

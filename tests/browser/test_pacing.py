@@ -1,9 +1,11 @@
-"""What is drawn while something moves, and at rest, where all Gaussians are drawn in the end on every device."""
+"""What is drawn while something moves and at rest, on every device, and what a small cache holds."""
 
-import numpy as np
+from collections import Counter
+
 import pytest
 from fixtures.browser import served
 from fixtures.bundles import Ground
+from fixtures.page_visit import VIEWER
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 BUDGETS = """async ([drawn, all]) => {
@@ -19,25 +21,6 @@ BUDGETS = """async ([drawn, all]) => {
     rest.finish(next, next >= all);
   }
   return [seen, progress, rest.whole];
-}"""
-SLICES = """async ([blocks, cost]) => {
-  // slices of a picture of so many blocks, of `cost` milliseconds each
-  const { createSlicedPicture } = await import("./draw/renderer.js");
-  let now = 0, done = 0;
-  const gl = new Proxy({}, { get: (_, name) => ({
-    SIGNALED: 1, fenceSync: () => 1, getSyncParameter: () => Number(now >= done), createTexture: () => ({}),
-  })[name] ?? (/^[A-Z]/.test(name) ? 0 : () => null) });
-  const slices = [], splats = {
-    length: blocks,
-    draw(camera, options, from, many) {
-      slices.push([from, many]);
-      done = now + cost * Math.min(many, blocks - from);
-    },
-  };
-  const picture = createSlicedPicture(gl, { draw() {} }, splats);
-  picture.begin({ width: 8, height: 8 }, {});
-  while (now < 1e6 && !picture.advance(now)) now += 16;
-  return [slices, picture.share, now];
 }"""
 
 
@@ -55,17 +38,6 @@ def test_budgets_grow_until_all_is_drawn_whatever_the_device(modules, drawn, all
     assert [budget for _, budget in seen] == budgets and whole
     assert seen[0][0] - 1000 >= 300
     assert progress == sorted(progress) and progress[0] >= 0 and progress[-1] <= 1
-
-
-@pytest.mark.parametrize("cost", [0.0, 0.1, 5.0, 300.0])
-def test_slices_follow_each_other_and_are_short(modules, cost):
-    slices, share, _ = modules.evaluate(SLICES, [3000, cost])
-    ends = np.cumsum([many for _, many in slices])
-    assert [first for first, _ in slices] == [0, *ends[:-1]] and ends[-1] >= 3000 > ends[-2]
-    assert share == 1
-    # after the first ones a slice takes about 40 ms, or is one of 250
-    assert max(many for _, many in slices[3:]) * cost <= max(60, 12 * cost)
-    assert len(slices) <= 252
 
 
 @pytest.mark.slow
@@ -110,11 +82,6 @@ def test_a_fast_machine_has_all_within_two_seconds_and_few_frames_say_nothing(mo
     assert budgets[-1] == 6_000_000 and scales[-1] == 1 and set(budgets[:2]) == {100_000}
 
 
-def test_a_slow_machine_gets_the_least_and_no_less(modules):
-    budgets, _ = pace(modules, 30, 0.01)
-    assert min(budgets) == budgets[-1] == 20_000
-
-
 @pytest.mark.parametrize("refresh", [1000 / 60, 1000 / 120])
 def test_a_machine_in_between_comes_to_rest_below_what_it_can_do_on_its_display(modules, refresh):
     a_splat = 20 / 500_000 * refresh / (1000 / 60)
@@ -123,18 +90,66 @@ def test_a_machine_in_between_comes_to_rest_below_what_it_can_do_on_its_display(
     assert 1.0 * refresh < a_splat * settled[-1] <= 1.44 * refresh
 
 
-def test_where_pixels_are_slow_the_resolution_is_lower_and_the_budget_stays(modules):
-    budgets, scales = pace(modules, 600, 0.0, 100.0)
-    # 24 ms allow 0.49 of the resolution along each side, 19 ms 0.44
-    assert min(scales[200:]) > 0.4 and max(scales[200:]) < 0.5 and len(set(scales[200:])) < 4
-    assert set(budgets[200:]) == {100_000}
+GROUND = Ground(discs=64, levels=3, speckle=20)  # 16 tiles of 4096, 1024 and 256 Gaussians: 2.8 MB in memory
+GAUSSIANS = 16 * (4096 + 1024 + 256)
+CACHE = 960e3  # bytes: a third
+PHONE = dict(width=390, height=720, is_mobile=True, has_touch=True, screen={"width": 390, "height": 844})
 
 
-@pytest.mark.parametrize("took, scale", [(5, 1), (21, 0.5), (84, 0.3), (10, 0.7246)])
-def test_the_first_picture_says_which_resolution_to_begin_with(modules, took, scale):
-    begin = """async took => {
-      const { createFramePacing } = await import("./draw/pacing.js"), pacing = createFramePacing();
-      pacing.begin(took);
-      return pacing.scale;
-    }"""
-    assert modules.evaluate(begin, took) == pytest.approx(scale, abs=1e-3)
+@pytest.fixture(scope="module")
+def large(page_of):
+    with served(page_of(GROUND)) as address:
+        yield address
+
+
+def set_cache(tab, cache: float) -> None:
+    """Give the viewer's modules in a tab a cache of another size."""
+    text = (VIEWER / "data/layout.js").read_text()
+    assert text.count("CACHE_BYTES = 192e6") == 1
+    text = text.replace("CACHE_BYTES = 192e6", f"CACHE_BYTES = {cache:.0f}")
+    tab.route("**/layout.js", lambda route: route.fulfill(body=text, content_type="text/javascript"))
+
+
+def watch(seen, cache: float = CACHE) -> Counter:
+    """Give the page a cache of another size; returns requests by part, counted as they are made."""
+    set_cache(seen.page, cache)
+    asked = Counter()
+    count = lambda request: asked.update([request.url]) if "/parts/" in request.url else None  # noqa: E731
+    seen.page.on("request", count)
+    return asked
+
+
+def test_at_rest_nothing_is_composed_twice_and_the_nearest_ground_is_fine(visit, large):
+    seen = visit(320, 200)
+    asked = watch(seen)
+    seen.open(large)
+    seen.until("davgswt.state.whole")
+    seen.page.wait_for_timeout(500)  # the next finer levels of uncertain tiles are composed as far as there is room
+    before = seen.state["work"]
+    seen.page.wait_for_timeout(1500)  # a loop would go on
+    work = seen.state["work"]
+    assert work["composed"] == before["composed"] < GAUSSIANS
+    assert max(asked.values()) == 1
+    assert work["bytes"] <= CACHE
+    levels = [cell["level"] for cell in seen.state["drawn"]]
+    assert levels[-1] == 0 and max(levels) == 2  # back to front
+    # a picture to keep comes to its end
+    assert seen.page.evaluate("davgswt.grab().then(([width]) => width)") == 320
+
+
+@pytest.mark.slow
+def test_a_phone_asks_before_it_loads_a_large_set(visit, large):
+    """The threshold of 50 MB is replaced by one of 10 kB."""
+    seen = visit(**PHONE)
+    asked = watch(seen, 192e6)
+    text = (VIEWER / "ui/hud.js").read_text()
+    assert text.count("50e6") == 1
+    seen.page.route(
+        "**/hud.js", lambda route: route.fulfill(body=text.replace("50e6", "1e4"), content_type="text/javascript")
+    )
+    seen.open(large, wait=False)
+    seen.until("!agree.hidden")
+    assert not asked and "Load up to " in seen.page.locator("#agree").inner_text()
+    seen.page.locator("#agree").click()
+    seen.page.evaluate("davgswt.ready.then(() => 0)")
+    assert set(asked.values()) == {1}

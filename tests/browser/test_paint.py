@@ -75,25 +75,6 @@ def test_no_more_is_painted_than_the_page_keeps(modules, manifest):
     assert run(modules, manifest, act) == ["full", 2**18, "far"]
 
 
-def test_densities_and_offsets_are_bounded_steps_of_the_history(modules, manifest):
-    act = """
-      const [{ probability }] = manifest.objects;
-      painting.setDensity(0, 0.52, true);
-      painting.setDensity(0, 9, true);
-      painting.load({ runs: [], densities: painting.densities, offsets: [0.03, -8] });
-      const set = [...painting.densities, ...painting.paint.offsets];
-      painting.undo();
-      painting.undo();
-      const before = [...painting.densities, ...painting.paint.offsets];
-      const chances = sent.flatMap(({ probabilities }) => probabilities ?? []).map(chance => chance / probability);
-      return { set, before, chances, offsets: sent.map(({ offsets }) => offsets) };
-    """
-    found = run(modules, manifest, act)
-    assert found["set"] == [3, 0.03, -8] and found["before"] == [0.5, 0, 0]
-    assert found["chances"] == pytest.approx([0.5, 3, 0.5])
-    assert found["offsets"] == [None, None, [0.03, -8], [0, 0], None]
-
-
 def test_links_and_files_restore_what_was_painted_and_set(modules, manifest):
     act = """
       const blank = await encodePaint(painting.paint, manifest);
@@ -144,36 +125,6 @@ def test_a_broken_link_is_refused(modules, manifest, link):
 def test_a_bad_file_is_refused(modules, manifest, change, message):
     act = f"try {{ readPaint({json.dumps(BLANK | change)}, manifest); }} catch (error) {{ return error.message; }}"
     assert message in run(modules, manifest, act)
-
-
-def test_only_cells_that_a_dab_touches_are_made_again(modules, manifest):
-    """Borders of other cells keep their identity, so their Gaussians are not tested again."""
-    found = modules.evaluate(
-        """async manifest => {
-          const { createTerrainTables } = await import("./worker/terrain_tables.js");
-          const { createHeights } = await import("./terrain/heights.js");
-          const { lookUpCell } = await import("./terrain/cells.js");
-          const { paintPoints } = await import("./worker/terrain_tables.js");
-          const terrain = createTerrainTables(manifest, createHeights());
-          const borders = () => {
-            const found = new Map();
-            for (let j = -20; j < 20; j++) for (let i = -20; i < 20; i++) {
-              found.set(`${i},${j}`, terrain.cache.border[lookUpCell(terrain, i, j)]);
-            }
-            return found;
-          };
-          const before = borders();
-          paintPoints(terrain, Int32Array.of(20, 36, 1));
-          const after = borders();
-          return {
-            borders: [...before.values()].filter(Boolean).length,
-            changed: [...before].filter(([key, one]) => one !== after.get(key)).map(([key]) => key),
-          };
-        }""",
-        manifest,
-    )
-    assert found["borders"] > 100
-    assert set(found["changed"]) <= {"2,4"}
 
 
 def test_a_dab_changes_the_picture_there_and_nowhere_else_and_undo_restores_it(seen):

@@ -92,18 +92,6 @@ def test_two_to_the_32_cells_out_the_same_tiles_and_steps_give_the_same_bits(sti
     assert (pictures[0][0] != pictures[0][1]).any()
 
 
-def test_each_tile_keeps_the_order_of_its_own_direction(still, plain):
-    seen = still(plain)
-    seen.at(x=2.0, y=2.0, eye=0.5, yaw=0, pitch=0)
-    orders = {(cell["i"], cell["j"]): cell["order"] for cell in seen.state["drawn"]}
-    assert orders[5, 0] == 0, "eastwards along +x"
-    assert orders[0, 0] == orders[1, 1] == 255, "the 3 x 3 about the eye are sorted exactly"
-    slanted = bundles.directions()[6]  # (-1, 1, -sqrt 2)
-    seen.at(x=2.0 + 4 * SIDE, y=2.0 - 4 * SIDE, eye=4 * SIDE * np.sqrt(2), yaw=135, pitch=-45)
-    assert np.allclose(slanted * 2, [-1, 1, -np.sqrt(2)])
-    assert {(c["i"], c["j"]): c["order"] for c in seen.state["drawn"]}[0, 0] == 6
-
-
 def test_discs_underfoot_do_not_haze_the_sky(visit, page_of):
     # Discs of deviation 0.35 half a unit below the eye: drawn by their own tangent plane alone they reach the zenith.
     with served(page_of(Ground(discs=8, levels=1))) as address:
@@ -150,17 +138,3 @@ def test_uncertain_tiles_are_warm_and_sure_ones_cool(still, uncertain):
         assert (red > blue + 30) == (tile >= 8) and (blue > red + 30) == (tile < 8)
         found.add(tile >= 8)
     assert found == {True, False}
-
-
-def test_frame_times_have_means_and_deviations_of_the_last_120(modules):
-    found = modules.evaluate(
-        """async () => {
-          const { createFrameStats } = await import("./draw/pacing.js"), stats = createFrameStats();
-          for (let k = 0; k < 200; k++) {
-            stats.addTime("sort", k < 80 ? 1000 : k % 2 ? 3 : 5);
-            stats.addFrame(k % 4 === 0);
-          }
-          return stats.summary();
-        }"""
-    )
-    assert found == {"share": 0.25, "sort": {"mean": 4, "sd": pytest.approx((120 / 119) ** 0.5), "n": 120}}

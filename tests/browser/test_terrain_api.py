@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 from fixtures.browser import served
 from fixtures.bundles import Ground, directions, tile_at
-from fixtures.land_covers import write_cover_bundle
-from fixtures.page_visit import VIEWER, Visit
+from fixtures.page_visit import Visit
 
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
-from dav_gswt.files import read_json, write_json
 from dav_gswt.terrain.heights import Hills
-from dav_gswt.terrain.page import write_page
 
 GROUND = Ground(levels=3, speckle=40, things=4)
 HILLS = Hills(2.0 * GROUND.side, 12.0 * GROUND.side, 3, 5)
@@ -123,56 +120,6 @@ def test_a_ray_meets_the_ground_where_it_lies(other):
     assert other.evaluate("terrain.pick([3, 5, 30], [0, 0, 1])") is None
 
 
-def test_a_steep_place_elsewhere_hides_no_ground(other):
-    """A tower of 100 above a plain: the ray comes down 40 beside it, or does not within reach."""
-    found = other.evaluate(
-        """async () => {
-          const { createHeights } = await import("./terrain/heights.js");
-          const { hitGround } = await import("./terrain/camera.js");
-          const pixels = new Float32Array(64 * 64), entry = { kind: "image", rows: 64, columns: 64, width: 640 };
-          pixels[64 * 20 + 20] = 100;
-          const heights = createHeights(entry, pixels), long = Math.hypot(1, 0.05);
-          const cast = (east, up, farthest) => (
-            hitGround([0, 0, 2.5], [east / long, 0, up / long], heights, { lift: 0.5, farthest }));
-          return [cast(1, -0.05, 200), cast(1, -0.05, 39), cast(1, 0.05, 200), cast(0.05, 1, 200)];
-        }"""
-    )
-    assert found[0] == pytest.approx([40.0, 0.0], abs=40 * 1e-4)
-    assert found[1:] == [None, None, None]
-
-
-def test_a_ray_over_hills_ends_where_it_first_comes_down(other):
-    """Rays at a grazing angle, beside the first change of sign on a fine grid of distances."""
-    ways = [[np.cos(yaw), np.sin(yaw), -0.12] for yaw in np.radians(np.arange(0, 360, 30))]
-    hits = other.evaluate("ways => ways.map(way => terrain.pick([3, 5, 12], way))", ways)
-    for way, hit in zip(ways, hits, strict=True):
-        far = np.linspace(0, 48 * GROUND.side, 100_001)
-        x, y, z = (at + far * one for at, one in zip((3, 5, 12), way / np.linalg.norm(way), strict=True))
-        below = np.flatnonzero(z < HILLS.at(x, y)[0])
-        if len(below):
-            assert hit["distance"] == pytest.approx(far[below[0]], rel=1e-4)
-        else:
-            assert hit is None
-
-
-def test_an_object_counts_from_its_foot(blank, tmp_path):
-    """Its ground is another height than 0: the chunk's z counts from the foot already."""
-    write_cover_bundle(tmp_path / "bundle")
-    manifest = read_json(tmp_path / "bundle/davgswt.json")
-    manifest["objects"][0]["ground"] = 0.3
-    write_json(tmp_path / "bundle/davgswt.json", manifest)
-    write_page(tmp_path / "bundle", VIEWER, tmp_path / "page")
-    with served(tmp_path / "page") as address:
-        tab = blank(address)
-        tab.evaluate(OPEN, [160, 100])
-        number = len(manifest["tiles"])
-        centres = tab.evaluate(f"terrain.gaussians({number}, 0).then(({{ centres }}) => Array.from(centres))")
-        feet = tab.evaluate("terrain.feet")
-    assert feet == [0.3]
-    field = Bundle(tmp_path / "page", Manifest.from_dict(manifest)).object_chunk(0, 0)
-    assert np.allclose(np.reshape(centres, (-1, 3)), field.means, atol=1e-6)
-
-
 def test_gaussians_and_orders_are_those_of_the_bundle(hilly, other):
     found = other.evaluate(
         """async () => {
@@ -212,23 +159,3 @@ def test_gaussians_and_orders_are_those_of_the_bundle(hilly, other):
 def test_what_makes_no_sense_is_refused_in_words(other, call, said):
     message = other.evaluate(f"(async () => {call})().then(() => null, (error) => error.message)")
     assert message is not None and said in message
-
-
-@pytest.mark.parametrize("late", [pytest.param(False, id="waiting at the end"), pytest.param(True, id="after the end")])
-def test_an_update_of_an_ended_terrain_is_rejected_and_nothing_is_left_running(other, late):
-    told = other.evaluate(
-        """async (late) => {
-          const { load, TerrainError } = await import("./terrain_api.js"), errors = [];
-          const other = await load(".", { onError: (error) => errors.push(error.message) });
-          if (!late) await other.loaded;
-          const camera = other.camera({ x: 1, y: 2, eye: 1, yaw: 0, pitch: -20 }, 160, 100);
-          if (late) other.end();
-          const update = other.update(camera, { exact: true });
-          if (!late) other.end();
-          await other.loaded;
-          const told = update.then(() => "answered", (error) => [error instanceof TerrainError, error.message, errors]);
-          return Promise.race([told, new Promise((go) => setTimeout(go, 5000, "never"))]);
-        }""",
-        late,
-    )
-    assert told == [True, "The terrain was ended: load it again.", []]

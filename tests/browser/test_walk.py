@@ -1,7 +1,8 @@
-"""Walking, orbiting and the map: keys, mouse, the eye's floor, the link, and what survives a lost context."""
+"""Walking, orbiting, the map and the tour: keys, mouse, the eye's floor, the link, and what survives a lost context."""
 
 import math
 
+import numpy as np
 import pytest
 from fixtures.bundles import Ground
 from fixtures.page_visit import Visit
@@ -46,38 +47,6 @@ def test_each_key_does_what_the_help_says(moving, key, condition):
     moving.page.keyboard.down(key)
     moving.until(f"(s => {condition})(davgswt.state)")
     moving.page.keyboard.up(key)
-
-
-STEP = """async ([place, mode, held, seconds]) => {
-  const { createWalker, stepWalker } = await import("./ui/walker.js");
-  const walker = createWalker({ tile_side: 4, eye_floor: 0.5 }, place);
-  walker.mode = mode;
-  for (const action of held) walker.held.add(action);
-  const moved = stepWalker(walker, seconds);
-  return [moved, walker.x, walker.y, walker.eye, walker.yaw, walker.pitch];
-}"""
-AHEAD = dict(x=3.0, y=5.0, eye=2.0, yaw=90.0, pitch=-30.0)
-
-
-@pytest.mark.parametrize(
-    "mode, held, seconds, expected",
-    [
-        # half a second at 1.2 eye heights of 2 a second
-        ("walk", ["forward"], 0.5, [True, 3, 6.2, 2, 90, -30]),
-        ("walk", ["back", "run"], 0.5, [True, 3, 0.2, 2, 90, -30]),
-        ("walk", ["right"], 0.5, [True, 4.2, 5, 2, 90, -30]),
-        ("walk", ["left", "forward"], 0.5, [True, 3 - 1.2 / 2**0.5, 5 + 1.2 / 2**0.5, 2, 90, -30]),
-        ("walk", ["forward", "back"], 0.5, [False, 3, 5, 2, 90, -30]),
-        ("walk", ["turnLeft"], 0.5, [True, 3, 5, 2, 125, -30]),
-        ("walk", ["turnRight", "higher"], 0.5, [True, 3, 5, 2 * 2.718281828**0.6, 55, -30]),
-        ("walk", ["lower"], 9, [True, 3, 5, 0.5, 90, -30]),
-        ("walk", ["higher"], 9, [True, 3, 5, 64, 90, -30]),
-        ("fly", ["forward"], 0.5, [True, 3, 5 + 1.2 * 0.75**0.5, 1.4, 90, -30]),
-    ],
-    ids=lambda value: str(value)[:40],
-)
-def test_a_step_goes_where_one_looks_within_bounds(modules, mode, held, seconds, expected):
-    assert modules.evaluate(STEP, [AHEAD, mode, held, seconds]) == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -163,36 +132,6 @@ def test_a_lost_context_comes_back_with_the_same_picture(visit, plain):
     assert (seen.picture() == before).all()
 
 
-def test_the_budget_takes_fewer_splats_and_still_draws_near_tiles_back_to_front(modules):
-    result = modules.evaluate(
-        """async () => {
-          const { createTerrainTables } = await import("./worker/terrain_tables.js");
-          const { selectCells } = await import("./terrain/budget.js");
-          const { createHeights } = await import("./terrain/heights.js");
-          const { cameraAt } = await import("./terrain/camera.js");
-          const { createWalker } = await import("./ui/walker.js");
-          const manifest = await (await fetch("davgswt.json")).json();
-          const terrain = createTerrainTables(manifest, createHeights());
-          for (const tile of terrain.tiles) tile.arrived = (1 << manifest.levels.length) - 1;
-          const camera = cameraAt(createWalker(manifest, { eye: 1, pitch: -10 }), 1280, 720);
-          return [1e9, 20000, 5000, 300].map(budget => {
-            const { cells, count, reach } = selectCells(terrain, camera, budget);
-            return { budget, count, reach, cells: cells.map(({ di, dj }) => [di, dj]),
-              steps: cells.map(({ di, dj }) => Math.abs(di) + Math.abs(dj)) };
-          });
-        }"""
-    )
-    assert result[0]["count"] > 20000
-    for now, tighter in zip(result, result[1:], strict=False):
-        assert tighter["count"] <= tighter["budget"]
-        assert tighter["count"] > 0.5 * tighter["budget"], "the budget is used"
-        assert tighter["reach"] <= now["reach"]
-    for each in result:
-        assert each["steps"] == sorted(each["steps"], reverse=True)
-        assert len({tuple(cell) for cell in each["cells"]}) == len(each["cells"])
-        assert min(each["steps"]) == 0, "the tile underfoot is drawn"
-
-
 ORBIT = """async ([place, turns, factor]) => {
   // where the eye is at first, after turns and after a zoom, over level ground
   const { createOrbit } = await import("./ui/controls.js");
@@ -234,14 +173,6 @@ def test_orbiting_keeps_what_one_looks_at_and_zooming_nears_it(modules):
         assert distance_of(place) == pytest.approx((4.0, 2.0)[place is near], rel=1e-3)
 
 
-def test_orbiting_in_the_sky_turns_about_a_place_ahead(modules):
-    up, turned, _ = modules.evaluate(ORBIT, [OBLIQUE | {"pitch": 10}, [[180, 0]], 1])
-    # about a place four tile sides ahead: on its other side
-    far = 2 * 16 * math.cos(math.radians(10))
-    assert turned["x"] - up["x"] == pytest.approx(far * math.cos(math.radians(20)), abs=1e-6)
-    assert (turned["yaw"], turned["eye"]) == (pytest.approx(200), pytest.approx(2))
-
-
 @pytest.mark.slow
 def test_the_map_takes_one_elsewhere(visit, plain):
     seen = visit(640, 400).open(plain)
@@ -253,3 +184,58 @@ def test_the_map_takes_one_elsewhere(visit, plain):
     seen.until("davgswt.state.x !== 3")
     now = seen.state
     assert (now["x"], now["y"]) == (pytest.approx(11, abs=0.3), pytest.approx(9, abs=0.3))
+
+
+FLY = """async ([heights, rate, seconds]) => {
+  const { createTour } = await import("./ui/tour.js");
+  const { createHeights } = await import("./terrain/heights.js");
+  const { createWalker } = await import("./ui/walker.js");
+  const surface = createHeights(heights);
+  const walker = createWalker({ tile_side: 4, eye_floor: 0.5 }, { yaw: 200, pitch: 5 });
+  const tour = createTour(), seen = [];
+  tour.start(walker, surface);
+  for (let k = 0; k < seconds * rate; k++) {
+    tour.step(walker, surface, 1 / rate);
+    const ground = surface.at(walker.x, walker.y)[0];
+    seen.push([walker.x, walker.y, ground + walker.eye, walker.yaw, walker.pitch, ground]);
+  }
+  return seen;
+}"""
+HILLS = {"kind": "hills", "height": 2.0, "wavelength": 9.0, "octaves": 3, "salt": 5}
+
+
+def test_a_tour_is_smooth_and_above_the_ground(modules):
+    rate = 60
+    x, y, z, yaw, pitch, ground = np.array(modules.evaluate(FLY, [HILLS, rate, 120])).T
+    assert (z - ground >= 0.5 - 1e-9).all(), "never below the eye's floor"
+    turned = np.unwrap(np.radians(yaw))
+    speed = np.hypot(np.diff(x), np.diff(y)) * rate
+    assert speed[0] < 0.01, "it begins at rest"
+    # units, radians and degrees a second each second: nothing jolts
+    assert np.abs(np.diff(speed)).max() * rate < 0.5
+    assert np.abs(np.diff(turned, 2)).max() * rate**2 < np.radians(6)
+    assert np.abs(np.diff(pitch, 2)).max() * rate**2 < 8
+    assert np.abs(np.diff(turned)).max() * rate < np.radians(12)
+    assert (np.abs(np.diff(z)) * rate < 1.5).all()
+    clear = (z - ground)[10 * rate :]
+    assert clear.max() > 2.5 * clear.min(), "it sinks and rises"
+    assert np.hypot(x - x[0], y - y[0]).max() > 10, "it goes somewhere"
+
+
+@pytest.mark.slow
+def test_any_input_ends_the_tour(visit, plain):
+    seen = visit(480, 300).open(plain)
+    inputs = {
+        "key": lambda page: page.keyboard.press("ArrowRight"),
+        "mouse": lambda page: page.mouse.click(240, 60),
+        "wheel": lambda page: page.mouse.wheel(0, 50),
+    }
+    for name, touch in inputs.items():
+        start = seen.state["x"]
+        seen.page.keyboard.press("t")
+        seen.until(f"davgswt.tour && davgswt.state.x !== {start}")
+        touch(seen.page)
+        seen.until("!davgswt.tour")
+        place = seen.state
+        seen.page.wait_for_timeout(100)
+        assert seen.state["x"] == place["x"], name

@@ -33,7 +33,7 @@ STEM = """async ([tile, level, heights, radius]) => {
 }"""
 BLOW = """async ([gap, took, turns]) => {
   // share of the wind after each turn; `turns`: [how many, what there is]
-  const { createWind } = await import("./ui/wind.js"), wind = createWind(), shares = [];
+  const { createWind } = await import("./ui/weather.js"), wind = createWind(), shares = [];
   for (const [many, there] of turns) for (let k = 0; k < many; k++) {
     if (there.on !== undefined) wind.switch(there.on);
     wind.step(gap, took, { sways: true, whole: false, moving: false, ...there });

@@ -8,7 +8,7 @@ const viewer = pathToFileURL(`${process.argv[2]}/`);
 const load = (name) => import(new URL(name, viewer));
 const { readHeightMap, readManifest, readParts, sourceOf } = await load("data/bundle.js");
 const { PageError } = await load("data/checks.js");
-const { openZip } = await load("data/zip.js");
+const { openZip } = await load("data/source.js");
 const { cameraAt } = await load("terrain/camera.js");
 const { createHeights } = await load("terrain/heights.js");
 const { createFrameBuilder } = await load("worker/frame_builder.js");

@@ -1,6 +1,5 @@
 """The structure of the code: what linters do not check."""
 
-import re
 import subprocess
 import sys
 
@@ -10,12 +9,6 @@ SCRIPTS_WITHOUT_TORCH = {
     *("bundle_tiles", "capture_views", "find_materials", "fit_coarse", "make_levels", "make_page", "render_photos"),
     *("render_terrain", "report_photos", "select_poses", "split_views", "update_field"),
 }
-
-
-def test_rules_and_scripts_of_the_product_do_not_know_the_study(root):
-    """import-linter checks this for the library."""
-    files = [path for folder in ("rules", "scripts") for path in (root / folder).iterdir() if path.is_file()]
-    assert files and not [f.name for f in files if re.search(r"scripts/study|dav_gswt\.study", f.read_text("utf-8"))]
 
 
 def test_folders_of_the_viewer_depend_on_each_other_one_way(root):

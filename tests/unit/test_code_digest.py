@@ -1,6 +1,7 @@
 """What counts as a change of the code that a script runs."""
 
 import ast
+import shutil
 from pathlib import Path
 
 import pytest
@@ -74,3 +75,15 @@ def forget():
     """Digests of made-up libraries are no other test's."""
     yield
     digest_afresh(Path(__file__))
+
+
+@pytest.mark.parametrize(("script", "same"), [("render_photos", True), ("fit_coarse", True), ("select_poses", False)])
+def test_a_new_policy_makes_no_photos_and_fits_again(script, same, root, tmp_path):
+    library = shutil.copytree(LIBRARY, tmp_path / "dav_gswt", ignore=shutil.ignore_patterns("__pycache__"))
+    file = root / f"scripts/{script}.py"
+    before = digest_code(file, library)
+    with (library / "views/policies.py").open("a") as policies:
+        policies.write("def another():\n    return 1\n")
+    for cached in (digest_code, code_digest._read_code):
+        cached.cache_clear()
+    assert (digest_code(file, library) == before) == same

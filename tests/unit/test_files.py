@@ -1,9 +1,13 @@
-import threading
+"""Files and folders that are whole or not at all, tables, threads in order, and logs."""
+
+import logging
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from dav_gswt import files
+from dav_gswt import files, logs
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_file, atomic_folder, digest_files
 from dav_gswt.provenance import record_provenance
@@ -28,13 +32,6 @@ def test_json_has_no_nan(tmp_path):
         (tmp_path / "a.json").write_text(text)
         with pytest.raises(InputError, match=r"a\.json: not readable as JSON"):
             files.read_json(tmp_path / "a.json")
-
-
-def test_the_name_of_a_file_is_no_path():
-    assert files.require_file_name("a b.png") == "a b.png"
-    for name in ("", "..", "a/b", "a\\b", "a\n", "x" * 256, None):
-        with pytest.raises(ValueError, match="is no name of a file"):
-            files.require_file_name(name)
 
 
 @pytest.mark.parametrize("write", [atomic_file, atomic_folder])
@@ -105,14 +102,6 @@ def test_results_come_in_the_order_of_the_items_and_an_error_where_its_result_is
             next(results)
 
 
-def test_the_next_items_are_worked_on_while_one_is_taken_but_no_more_than_there_are_threads():
-    both = threading.Barrier(2, timeout=10)  # broken unless two threads meet here
-    assert list(map_ahead(lambda item: both.wait() >= 0, range(4), 2)) == [True] * 4
-    begun = []
-    for taken, _ in enumerate(map_ahead(begun.append, range(20), 3), start=1):
-        assert len(begun) <= taken + 3
-
-
 def test_a_table_has_five_digits_and_empty_fields_and_one_without_rows_is_an_empty_file(tmp_path):
     files.write_table(tmp_path / "a.csv", [{"a": 1 / 3, "b": 123456, "c": None, "d": True, "e": "x, y"}, {"a": 2}])
     assert (tmp_path / "a.csv").read_bytes() == b'a,b,c,d,e\n0.33333,123456,,True,"x, y"\n2,,,,\n'
@@ -120,3 +109,58 @@ def test_a_table_has_five_digits_and_empty_fields_and_one_without_rows_is_an_emp
     assert (tmp_path / "a.csv").read_bytes() == b""
     with pytest.raises(ValueError, match="not in fieldnames: 'b'"):
         files.write_table(tmp_path / "a.csv", [{"a": 1}, {"a": 1, "b": 2}])
+
+
+FULL = OSError(28, "No space left on device", "results/field.ply")
+FREE_SPACE = "results/field.ply: No space left on device; free some space, then run the same again"
+
+
+@pytest.mark.parametrize(
+    "error, code, said, traced",
+    [
+        (InputError("photo.jpg: cut short; copy it again"), 1, "photo.jpg: cut short; copy it again", False),
+        (FULL, 1, FREE_SPACE, True),
+        (KeyboardInterrupt(), 130, "stopped on request", False),
+        (MemoryError(), 1, "out of memory", True),
+        (ZeroDivisionError(), None, "failed", True),
+    ],
+)
+def test_a_job_ends_with_a_message_and_only_faults_leave_a_traceback(tmp_path, capfd, error, code, said, traced):
+    with pytest.raises(SystemExit if code else ZeroDivisionError) as ended, logs.logging_to(tmp_path / "a.log"):
+        raise error
+    assert getattr(ended.value, "code", None) == code
+    text, shown = (tmp_path / "a.log").read_text(), capfd.readouterr().err
+    assert said in text and said in shown
+    assert ("Traceback" in text) == traced and "Traceback" not in shown
+
+
+def test_the_last_words_of_a_library_that_aborts_are_in_the_log(tmp_path):
+    """It writes past Python, and the process ends at once."""
+    code = (
+        "import os, logging\nfrom dav_gswt import logs\n"
+        "with logs.logging_to('a.log'):\n"
+        "    logging.warning('at work')\n    os.write(2, b'database is locked\\n')\n    os.abort()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    text = (tmp_path / "a.log").read_text()
+    assert done.returncode == -6 and "at work" in text and "database is locked" in text
+    assert "at work" in done.stderr and "locked" not in done.stderr
+
+
+def test_the_terminal_has_warnings_and_progress_and_the_log_has_all(tmp_path, capfd):
+    with logs.logging_to(tmp_path / "a.log"):
+        logging.info("a detail")
+        logging.warning("a warning")
+        list(logs.progress(range(3), "count", every=0.0))
+    text, shown = (tmp_path / "a.log").read_text(), capfd.readouterr().err
+    assert all(words in text for words in ("a detail", "a warning", "count: 3/3"))
+    assert "a detail" not in shown and "a warning" in shown and "count: 3/3" in shown
+
+
+def test_a_log_on_a_full_disk_leaves_the_terminal_its_messages(capfd):
+    with logs.logging_to("/dev/full"):
+        logging.warning("a message")
+    assert capfd.readouterr().err == "  a message\n"
+    with pytest.raises(SystemExit) as ended, logs.logging_to("/none/a.log"):
+        pass
+    assert ended.value.code == 1 and capfd.readouterr().err == "  /none/a.log: No such file or directory\n"

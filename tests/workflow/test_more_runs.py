@@ -12,7 +12,7 @@ from dav_gswt.field import read_field
 from dav_gswt.files import digest_files, read_json
 from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import pose_maps, scores
+from dav_gswt.views import scores
 
 pytestmark = pytest.mark.slow
 CONFIGS = (USUAL, TINY)
@@ -31,7 +31,7 @@ def test_a_round_may_use_the_uncertainty_of_a_prior(snakemake, tiny, tmp_path):
     assert chosen == [first.names[i] for i in best]
     later = scores.read_scores(way / "scores.csv")
     assert later.scales == first.scales and not set(later.names) & set(chosen)
-    uncertainty, level = pose_maps.read_pose_maps(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
+    uncertainty, level = scores.read_pose_maps(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
     assert len(uncertainty) == len(read_field(way / "field.ply"))
     top = level.ground & (level.uncertainty > 0)  # the underlay of a level has none
     assert top.any() and np.isin(level.uncertainty[top], uncertainty).all()

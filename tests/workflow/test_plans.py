@@ -1,8 +1,5 @@
 """Dry runs in empty folders: what is planned once, what a second spelling of a path finds, what is refused."""
 
-import re
-from collections import Counter
-
 import numpy as np
 import pytest
 from fixtures.runs import TINY, USUAL
@@ -109,13 +106,6 @@ def test_the_last_fit_of_a_preset_that_chooses_with_another_is_of_windows_unless
         assert plan["evaluate_round"] == (rounds or focused)
 
 
-def test_a_finished_field_goes_from_field_to_terrain(planned, tmp_path):
-    (tmp_path / "finished.ply").touch()
-    plan = planned(tmp_path, "--config", "scene=finished", configs=(USUAL, TINY))
-    assert plan["import_field"] == plan["prepare_external_field"] == plan["make_page"] == plan["render_terrain"] == 1
-    assert not plan["fit_coarse"] and not plan["copy_coarse_field"]
-
-
 def test_a_height_map_of_the_config_is_an_input_of_the_page_if_it_can_be_read(planned, snakemake, tmp_path):
     image_files.write_grey16(tmp_path / "hills.png", np.zeros((4, 5), np.uint16))
     (tmp_path / "hills.yaml").write_text("heights: {kind: image, file: hills.png, width: 9, height: 2}\n")
@@ -132,12 +122,6 @@ def test_the_frames_of_a_video_are_chosen_before_they_are_registered(planned, tm
     (tmp_path / "video.yaml").write_text(f"scene: walk\nscenes: {{walk: {entry}}}\n")
     plan = planned(tmp_path, configs=(USUAL, TINY, tmp_path / "video.yaml"))
     assert plan["choose_frames"] == plan["register_photos"] == plan["make_page"] == 1
-
-
-def test_a_round_is_tiled_as_it_is_and_completed(planned, tmp_path):
-    tiles = FARTHEST + "{}/tiles_small/seams.json"
-    plan = planned(tmp_path, tiles.format(""), tiles.format("/inpainted_terrain"))
-    assert plan["make_levels"] == plan["cut_tiles"] == 2 and plan["inpaint_field"] == plan["update_field"] == 1
 
 
 @pytest.mark.parametrize(
@@ -172,17 +156,3 @@ def test_a_config_that_is_wrong_stops_before_the_first_job(snakemake, run, check
 def test_scenes_of_the_real_photos_are_planned(planned, root, tmp_path, scene):
     (tmp_path / "resources").symlink_to(root / "resources")
     assert planned(tmp_path, "--config", f"scene={scene}")["register_photos"] == 1
-
-
-@pytest.mark.slow
-def test_a_completed_field_lies_between_the_round_and_its_levels(planned, tmp_path):
-    without, made = (planned(tmp_path, "--config", f"inpaint={on}", configs=(USUAL, TINY)) for on in (False, True))
-    assert made == without + Counter(inpaint_field=1)
-
-
-@pytest.mark.slow
-def test_the_workflow_is_lint_clean_but_for_its_environment(snakemake, tmp_path):
-    """One pip environment serves all rules, so lint's wish for a conda or container directive a rule is not met."""
-    done = snakemake(tmp_path, "--lint", check=False)
-    wishes = re.findall(r"^\s*\* .+$", done.stdout, re.M)
-    assert not [wish for wish in wishes if "No conda/container" not in wish and "environment" not in wish], done.stdout

@@ -1,14 +1,19 @@
-"""The profiles are found and read, and ask for what their comments say."""
+"""The profiles are found and read, and ask for what their comments say; what of Snakemake is no public API."""
 
+import inspect
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 import yaml
 from fixtures.runs import TINY, USUAL
+from snakemake.scheduling import job_scheduler
+from snakemake.settings.types import MaxJobsPerTimespan
 
 from dav_gswt.cli import run as make_run
+from dav_gswt.workflow import lift_job_rate_limit
 
 PROFILES = "workflow/profiles"
 ROUND = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k2/iter{t}"
@@ -117,3 +122,23 @@ def test_who_asks_people_or_devices_stays_here_and_asks_once(checkout, tmp_path)
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 1 and "localrule request_views" in done.stderr, done.stderr
     assert done.stderr.count("Error in rule request_views") == 1 and "Trying to restart" not in done.stderr
+
+
+def scheduler(limit: str) -> SimpleNamespace:
+    return SimpleNamespace(job_rate_limiter=job_scheduler.JobRateLimiter(MaxJobsPerTimespan.parse_choice(limit)))
+
+
+def test_the_scheduler_has_a_limiter_of_this_name():
+    assert "self.job_rate_limiter" in inspect.getsource(job_scheduler.JobScheduler.__init__)
+
+
+def test_the_default_limit_is_lifted():
+    lifted = scheduler("100/1s")
+    lift_job_rate_limit(lifted)
+    assert lifted.job_rate_limiter is None
+
+
+def test_a_limit_that_the_user_gave_stays():
+    kept = scheduler("10/1s")
+    lift_job_rate_limit(kept)
+    assert kept.job_rate_limiter.max_jobs == 10

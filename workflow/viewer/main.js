@@ -6,19 +6,18 @@ import { createContext } from "./draw/gl.js";
 import { BUDGET } from "./draw/pacing.js";
 import { parsePaint, syncAddress } from "./ui/address.js";
 import { createOrbit, listenToControls } from "./ui/controls.js";
-import { listenToDaylight } from "./ui/daylight.js";
 import { createPanel, element } from "./ui/dom.js";
 import { listenToDrops } from "./ui/drop.js";
 import { createFirstView } from "./ui/first_view.js";
 import { runFrameLoop } from "./ui/frame_loop.js";
 import { createHud } from "./ui/hud.js";
-import { createMinimap } from "./ui/minimap.js";
+import { createMinimap } from "./ui/legend.js";
 import { createPaintPanel } from "./ui/paint_panel.js";
 import { createStoryPanel } from "./ui/story.js";
 import { listenToTools } from "./ui/tools.js";
 import { listenToTour } from "./ui/tour.js";
 import { explainError, Viewer } from "./ui/viewer.js";
-import { listenToWind } from "./ui/wind.js";
+import { listenToDaylight, listenToWind } from "./ui/weather.js";
 
 document.documentElement.classList.add("running"); // hides the hint that nothing happens
 const hud = createHud(), menu = createPanel("menu");

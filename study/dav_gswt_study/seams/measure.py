@@ -18,7 +18,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.images import metrics
 from dav_gswt.images.lpips_weights import Weights
-from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import Levels
 from dav_gswt.logs import progress
 from dav_gswt.terrain import heights
 from dav_gswt.terrain.endless import EndlessTerrain

@@ -15,7 +15,7 @@ from numpy import ndarray as Array
 from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.field import GaussianField
-from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import Levels
 from dav_gswt.reconstruction import top_view
 from dav_gswt.terrain import endless
 from dav_gswt.terrain.choice import tiles_at

@@ -15,7 +15,7 @@ from dav_gswt.bundle.manifest import Sky
 from dav_gswt.field import SH0, GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster.interface import RIM
-from dav_gswt.terrain import draw_order, placement, splats, visibility
+from dav_gswt.terrain import draw_order, placement, stills, visibility
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.heights import displace_means
@@ -180,14 +180,14 @@ def render_pieces(
         field, slope = displace_means(field, terrain.heights, piece.corner, eye)
         distance = np.linalg.norm(field.means.astype(float), axis=1)
         field, active = placement.fade_levels(terrain, field, level, distance)
-        part, indices = splats.project(behind.blend_far(field, slope[active]), slope[active], here, terrain.near)
+        part, indices = stills.project(behind.blend_far(field, slope[active]), slope[active], here, terrain.near)
         parts.append((part, [recolour(field, eye)[indices] for recolour in recolourings], piece.close))
     parts.sort(key=lambda each: each[2])  # close pieces come last
-    ordered = splats.Splats.concatenate([splats.EMPTY, *(part for part, _, _ in parts)])
+    ordered = stills.Splats.concatenate([stills.EMPTY, *(part for part, _, _ in parts)])
     first = sum(len(part) for part, _, close in parts if not close)
-    order = np.concatenate([np.arange(first), first + splats.depth_order(ordered[first:])])
+    order = np.concatenate([np.arange(first), first + stills.depth_order(ordered[first:])])
     ordered = ordered[order]
-    footprint = splats.blend(ordered, here)
+    footprint = stills.blend(ordered, here)
     picture = np.clip(footprint.colour + (1 - footprint.alpha)[..., None] * behind.colours_along(here.rays()[1]), 0, 1)
     recoloured = (np.concatenate([own[k] for _, own, _ in parts])[order] for k in range(len(recolourings)))
-    return [picture, *(splats.blend(replace(ordered, colours=own), here).colour for own in recoloured)]
+    return [picture, *(stills.blend(replace(ordered, colours=own), here).colour for own in recoloured)]

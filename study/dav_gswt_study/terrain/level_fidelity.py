@@ -13,7 +13,7 @@ from jaxtyping import Float32, Int, UInt8
 from numpy import ndarray as Array
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from dav_gswt.bundle import level_distances
+from dav_gswt.bundle import manifest
 from dav_gswt.field import GaussianField, concatenate_fields, mean_scale
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
@@ -37,7 +37,7 @@ def measure_levels(tiles: TileSet, pixels: float, band: float) -> list[dict]:
     equal pictures, and of a tile that no pixel looks at.
     Args: pixels, band: see `bundle.build.Options`.
     """
-    table = level_distances.compute_levels([mean_scale(level) for level in tiles.fields], pixels, band)
+    table = manifest.compute_levels([mean_scale(level) for level in tiles.fields], pixels, band)
     found = []
     for level, fields in enumerate(progress(tiles.fields, "measure levels")):
         distance = (table[level - 1].distance or 0.0) if level else 0.0
@@ -90,9 +90,9 @@ def _camera(side: float, distance: float, elevation: float, height: float) -> Ca
     """From so far away onto the middle of the sixteen tiles, at the reference picture's focal length."""
     middle = np.array([2 * side, 2 * side, height])
     flat = np.cos(elevation) * np.array([np.cos(AZIMUTH), np.sin(AZIMUTH)])
-    width = max(8, int(np.ceil(ROOM * 2**0.5 * len(TORUS) * side * level_distances.FOCAL / distance)))
+    width = max(8, int(np.ceil(ROOM * 2**0.5 * len(TORUS) * side * manifest.FOCAL / distance)))
     lower = max(4, int(np.ceil(width * np.sin(elevation))))
-    fov = 2 * np.degrees(np.arctan(0.5 * width / level_distances.FOCAL))
+    fov = 2 * np.degrees(np.arctan(0.5 * width / manifest.FOCAL))
     return cameras.pinhole(middle + distance * np.array([*flat, np.sin(elevation)]), middle, width, lower, fov)
 
 

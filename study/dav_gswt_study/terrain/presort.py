@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.bundle import direction_search
+from dav_gswt.bundle import orders
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.images import figures
@@ -41,7 +41,7 @@ def measure_approximations(content: BundleContent, bundle: Bundle) -> list[dict]
     rows = []
     for shot in progress(VIEWS, "measure approximations"):
         for approximation, pair in _render_pairs(content, bundle, shot).items():
-            row = {"view": shot.name, "shortcut": approximation, "psnr": direction_search.compute_psnr([pair])}
+            row = {"view": shot.name, "shortcut": approximation, "psnr": orders.compute_psnr([pair])}
             rows.append(row | {"change": 255 * float(np.abs(pair[0] - pair[1]).max())})
     return rows
 

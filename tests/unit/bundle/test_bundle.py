@@ -1,22 +1,19 @@
-"""Bundles of stored records: values by hand, round trips, refusals, and the public renderer's rules."""
+"""Bundles of stored records: values by hand, round trips, refusals."""
 
 import hashlib
 import json
 import shutil
-import zipfile
 import zlib
 
 import numpy as np
 import pytest
 from fixtures.tile_sets import report_of
 
-from dav_gswt.bundle import build, level_distances, manifest, store
-from dav_gswt.bundle.blocks import unpack_block
+from dav_gswt.bundle import build, manifest, store
 from dav_gswt.bundle.content import BundleContent
-from dav_gswt.bundle.parts import read_part
+from dav_gswt.bundle.parts import read_part, unpack_block
 from dav_gswt.bundle.recipes import coarsen_rotation
 from dav_gswt.errors import InputError
-from dav_gswt.export import gswt
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.tiles.build import TileSet
 
@@ -56,25 +53,25 @@ def bundle(tiles, tmp_path_factory):
 
 def test_a_level_ends_where_the_next_one_has_its_size_in_pixels():
     # f = 960 / tan 30 degrees = 1662.77 px: 0.3 units cover 2 px at 249.4 units
-    table = level_distances.compute_levels([0.1, 0.3], pixels=2.0, band=0.1)
+    table = manifest.compute_levels([0.1, 0.3], pixels=2.0, band=0.1)
     assert table[0].distance == pytest.approx(249.415, abs=1e-3)
     assert table[0].band == pytest.approx(24.9415, abs=1e-4)
     assert table[1].distance is None
     # a scene in other units is the same scene
-    assert level_distances.compute_levels([1.0, 3.0], 2.0, 0.1)[0].distance == pytest.approx(10 * table[0].distance)
+    assert manifest.compute_levels([1.0, 3.0], 2.0, 0.1)[0].distance == pytest.approx(10 * table[0].distance)
     with pytest.raises(InputError, match="level 1"):
-        level_distances.compute_levels([0.1, 0.1], 1.0, 0.1)
+        manifest.compute_levels([0.1, 0.1], 1.0, 0.1)
 
 
 def test_eye_floor_shows_the_nearest_disc_at_the_size_asked_for():
-    height = level_distances.compute_eye_floor(spacing=0.01, pixels=8.0)
+    height = manifest.compute_eye_floor(spacing=0.01, pixels=8.0)
     v = np.arctan(9 / 16 * np.tan(np.radians(30)))  # half of the picture's height
     ray = height / np.sin(np.radians(30) + v)  # to the ground at the picture's lower edge
     assert 0.01 * 1662.768775 / (ray * np.cos(v)) == pytest.approx(8.0)
     assert (
-        level_distances.compute_eye_floor(0.02, 8.0)
+        manifest.compute_eye_floor(0.02, 8.0)
         == pytest.approx(2 * height)
-        == pytest.approx(level_distances.compute_eye_floor(0.01, 4.0))
+        == pytest.approx(manifest.compute_eye_floor(0.01, 4.0))
     )
 
 
@@ -101,52 +98,6 @@ def test_a_bundle_reads_back_as_the_tiles_it_was_made_of(bundle, tiles):
     assert uncertain == {every} and plain == {(every + 1) // 2}
 
 
-def test_parts_are_listed_coarse_before_fine_with_the_size_and_digest_of_their_files(bundle):
-    folder, written = bundle
-    assert [(part.kind, part.file) for part in written.parts] == [
-        ("records", "parts/records1.bin"),
-        ("records", "parts/records0.bin"),
-    ]
-    for part in written.parts:
-        data = (folder / part.file).read_bytes()
-        assert (len(data), hashlib.sha256(data).hexdigest()) == (part.bytes, part.sha256)
-        assert len(zlib.decompress(data)) == part.size
-
-
-def test_each_part_is_read_once_and_only_when_it_is_needed(copy_of, monkeypatch):
-    seen = []
-    monkeypatch.setattr(store, "read_part", lambda folder, part: seen.append(part.file) or read_part(folder, part))
-    (copy_of / "parts/records1.bin").unlink()
-    read = store.read_bundle(copy_of)
-    assert len(read.chunk(0, 0)) == len(read.chunk(15, 0)) == 60
-    assert seen == [PART]
-
-
-def test_the_same_tiles_give_the_same_bytes(bundle, tiles, tmp_path):
-    folder, _ = bundle
-    options = build.BundleOptions(tau=0.5, salt=7)
-    build.write_bundle(one(tiles), tmp_path / "again", options, {"from": "a test"})
-    names = sorted(p.relative_to(folder) for p in folder.rglob("*.*"))
-    assert len(names) == 1 + 2
-    for name in names:
-        assert (folder / name).read_bytes() == (tmp_path / "again" / name).read_bytes(), name
-
-
-def test_the_zip_holds_what_the_public_renderer_reads(bundle, tmp_path):
-    read = store.read_bundle(bundle[0])
-    gswt.export_archive(read, tmp_path / "gswt.zip")
-    with zipfile.ZipFile(tmp_path / "gswt.zip") as archive:
-        assert archive.namelist() == [f"lod{level}_tile_{t:02d}.ply" for level in range(2) for t in range(16)]
-        data = archive.read("lod1_tile_05.ply")
-    header, body = data.split(b"end_header\n", 1)
-    assert header.count(b"\n") == 65 and b"comment" not in header
-    values = np.frombuffer(body, "<f4").reshape(-1, 62)
-    source = read.chunk(5, 1)
-    np.testing.assert_allclose(values[:, :2], 2 * source.means[:, :2], rtol=1e-6)  # 2 wide to 4 wide, float32
-    np.testing.assert_allclose(values[:, 55:58], source.log_scales + np.log(2), atol=1e-6)
-    assert (values[:, 9:54] == 0).all() and (values[:, 3:6] == 0).all()
-
-
 def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
     fields = [list(level) for level in tiles.fields]
     fields[0][3] = fields[0][3][:0]
@@ -154,16 +105,6 @@ def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
     with pytest.raises(InputError, match="a tile has no splat"):
         build.write_bundle(one(broken), tmp_path / "b", build.BundleOptions(tau=0.5), {})
     assert not (tmp_path / "b").exists() and not (tmp_path / ".b.part").exists()
-
-
-def test_a_new_bundle_replaces_the_old_one_and_leaves_its_neighbours(tiles, tmp_path):
-    out = tmp_path / "b"
-    (out / "parts").mkdir(parents=True)
-    (out / "parts" / "stale.bin").write_bytes(b"x")
-    (out / "terrain").mkdir()
-    build.write_bundle(one(tiles), out, build.BundleOptions(tau=1.0), {})
-    assert sorted(p.name for p in out.iterdir()) == ["davgswt.json", "parts", "terrain"]
-    assert not (out / "parts" / "stale.bin").exists()
 
 
 @pytest.fixture

@@ -1,13 +1,15 @@
-"""Sixteen bytes: values by hand, errors as stated for any field, equal places across borders, smallest rotations."""
+"""Sixteen bytes and blocks: values by hand, errors as stated, equal places across borders, round trips."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
-from dav_gswt.bundle.encoding import MAX_COMPONENT, Encoding, find_smallest_rotations
+from dav_gswt.bundle.encoding import Encoding, find_smallest_rotations
+from dav_gswt.bundle.parts import PLANES, Block, pack_block, unpack_block
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
 
@@ -51,19 +53,6 @@ def test_a_splat_is_stored_as_its_16_bytes():
     np.testing.assert_allclose(
         covariance(back.quats, back.log_scales)[0], np.diag([1, np.exp(-4), np.exp(-2)]), rtol=0.01
     )
-
-
-@given(st.integers(0, 2**32 - 1))
-def test_the_smallest_rotation_gives_the_same_ellipsoid_within_an_eighth_of_a_turn(seed):
-    rng = np.random.default_rng(seed)
-    quats, sizes = rng.normal(size=(20, 4)), rng.normal(size=(20, 3))
-    rotation, axes = find_smallest_rotations(quats)
-    np.testing.assert_allclose(
-        covariance(rotation, np.take_along_axis(sizes, axes, 1)), covariance(quats, sizes), rtol=1e-9
-    )
-    assert (rotation[:, 0] > 0).all() and np.abs(rotation[:, 1:]).max() <= MAX_COMPONENT + 1e-9
-    same, _ = find_smallest_rotations(-7 * quats)
-    np.testing.assert_allclose(same, rotation, atol=1e-12)
 
 
 @settings(max_examples=60)
@@ -125,9 +114,37 @@ def test_a_cell_of_a_composed_tile_is_a_whole_number_of_steps_of_which_a_tile_ha
         Encoding.fit([field_of([[1, 1, 0], [201, 1, 0]], np.full((2, 3), 0.1))], SIDE, PIXEL, cells)
 
 
-def test_a_side_s_both_ends_are_places_of_the_grid_and_a_splat_miles_from_its_tile_is_refused():
-    field = field_of([[0, 0, 0], [SIDE, SIDE, 0], [-0.3, 1, 0]], np.full((3, 3), 0.1))
-    coding = Encoding.fit([field], SIDE, PIXEL)
-    np.testing.assert_allclose(coding.decode(coding.encode(field)).means[:2], field.means[:2], atol=1e-7)
-    with pytest.raises(InputError, match="5000 tile sides"):
-        Encoding.fit([field_of([[1, 1, 0], [1e4, 1, 0]], np.full((2, 3), 0.1))], SIDE, PIXEL)
+ENDS = {np.uint8: (0, 255), np.uint16: (0, 1, 32767, 32768, 65534, 65535), np.int16: (-32768, -1, 0, 1, 32767)}
+
+
+def values(kind, shape):
+    """Arrays in which the ends of the range are common."""
+    info = np.iinfo(kind)
+    return arrays(kind, shape, elements=st.sampled_from(ENDS[kind]) | st.integers(info.min, info.max))
+
+
+def blocks_of(count):
+    shapes = [(np.uint16, (count, 3)), (np.uint8, (count, 3)), (np.uint8, (count, 3)), (np.int16, (count, 3))]
+    return st.builds(Block, *(values(*each) for each in shapes), values(np.uint8, count))
+
+
+def test_a_block_is_stored_as_its_planes():
+    place = np.array([[1, 0x203, 5], [0xFFFF, 0, 3]], np.uint16)
+    scale, rotation = np.array([[[10, 11, 12], [20, 21, 22]], [[30, 31, 32], [40, 41, 42]]], np.uint8)
+    colours = np.array([[7, 5, 4], [-2, -1, 299]], np.int16)
+    block = Block(place, scale, rotation, colours, np.array([250, 251], np.uint8))
+    planes = [[1, 0xFF], [0, 0xFF], [3, 0], [2, 0], [10, 3], [0, 0]]  # z: 5, -2
+    planes += [[10, 20], [11, 21], [12, 22], [30, 40], [31, 41], [32, 42]]
+    planes += [[5, 0xFF], [0, 0xFF], [4, 1], [0, 0], [1, 0x58], [0, 0x02], [250, 251]]  # 2, -1; -1, 300
+    assert pack_block(block) == bytes(sum(planes, []))
+
+
+@given(st.integers(0, 40).flatmap(blocks_of))
+def test_any_block_reads_back(block):
+    data = pack_block(block)
+    assert len(data) == PLANES * len(block)
+    back = unpack_block(data)
+    for name, own in vars(block).items():
+        found = getattr(back, name)
+        assert found.dtype == own.dtype
+        np.testing.assert_array_equal(found, own, name)

@@ -1,33 +1,15 @@
-"""Orders: by hand, permutations by falling depth; directions by tau; how many directions a picture needs."""
+"""Orders: permutations by falling depth, directions by tau, what they cost and lose."""
+
+from dataclasses import replace
 
 import numpy as np
+import pytest
+from fixtures import bundles
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dav_gswt.bundle import direction_search, orders
+from dav_gswt.bundle import orders, store
 from dav_gswt.bundle.orders import DirectionRings
-from dav_gswt.field import GaussianField, rgb_to_sh
-
-SIDE = 2.0
-
-
-def ground(seed, stones=300, colours=1.0):
-    """A plain of discs, and stones of any colour that stand on it."""
-    rng = np.random.default_rng(seed)
-    flat = np.stack([*np.meshgrid(*[np.arange(0.0625, SIDE, 0.125)] * 2), np.zeros((16, 16))], -1).reshape(-1, 3)
-    means = np.concatenate([flat, rng.random((stones, 3)) * [SIDE, SIDE, 0.2]])
-    n = len(means)
-    sizes = np.full((n, 3), 0.08)
-    sizes[: len(flat), 2] = 0.002
-    return GaussianField(
-        means.astype(np.float32),
-        np.log(sizes).astype(np.float32),
-        np.tile(np.float32([1, 0, 0, 0]), (n, 1)),
-        np.full(n, 2.0, np.float32),
-        rgb_to_sh((0.5 + colours * (rng.random((n, 3)) - 0.5)).astype(np.float32)),
-        np.zeros(n, np.float32),
-        np.zeros(n, bool),
-    )
 
 
 def test_tau_0_keeps_all_orders_of_every_tile_tau_1_of_none_and_their_number_never_rises():
@@ -37,13 +19,6 @@ def test_tau_0_keeps_all_orders_of_every_tile_tau_1_of_none_and_their_number_nev
         counts = [len(rings.select_directions(u, tau)) for tau in (0.0, 0.2, 0.3, 0.31, 0.9, 1.0)]
         assert counts == sorted(counts, reverse=True)
     assert DirectionRings((20.0, 45.0), 8).select_directions(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
-
-
-def test_order_runs_from_back_to_front_and_is_stable():
-    means = np.float32([[0, 0, 0], [2, 0, 5], [1, 0, 0], [2, 9, 0]])
-    # looking east the largest x is at the back; 1 and 3 are equally deep
-    along = np.array([[1.0, 0, 0], [0, 0, -1]])
-    assert [orders.sort_back_to_front(means, a).tolist() for a in along] == [[1, 3, 2, 0], [0, 2, 3, 1]]
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 300), st.sampled_from([0.0, 1e-30, 1.0, 1e30]))
@@ -58,20 +33,23 @@ def test_orders_are_permutations_by_falling_depth(seed, count, size):
             assert (found == np.arange(count)).all()
 
 
-def test_one_colour_needs_the_fewest_directions():
-    rings = direction_search.search_directions([ground(0, colours=0.0)], SIDE, 40.0)
-    assert rings == DirectionRings((20.0,), 2 * direction_search.MIN_AZIMUTHS)
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bundle") / "b"
+    bundles.write_bundle(folder, bundles.Ground(discs=8, things=20, speckle=40))
+    return store.read_bundle(folder)
 
 
-def test_directions_are_added_until_the_error_is_small_or_the_room_is_full(monkeypatch):
-    monkeypatch.setattr(direction_search, "VIEWS", 2)
-    fields = [ground(seed, stones=150) for seed in range(2)]
-    few, many = (direction_search.search_directions(fields, SIDE, wanted) for wanted in (15.0, 60.0))
-    first, last = (len(rings.select_directions(0.0, 1.0)) for rings in (few, many))
-    assert first < last <= direction_search.MAX_ORDERS
-    good, bad = (
-        min(direction_search.measure_psnr(fields, SIDE, kept, down) for down in direction_search.ELEVATIONS.values())
-        for kept in (DirectionRings(rings.elevations, rings.azimuths // 2) for rings in (few, many))
-    )
-    assert good >= 15.0
-    assert bad < 60.0, "no room for what this asks for"
+def with_orders(bundle, kept):
+    tiles = [replace(tile, orders=kept) for tile in bundle.manifest.tiles]
+    return replace(bundle, manifest=replace(bundle.manifest, tiles=tiles))
+
+
+def test_orders_are_counted_and_more_of_them_lose_less(bundle):
+    few, many = (orders.measure_orders(with_orders(bundle, kept)) for kept in ([8], list(range(9))))
+    assert (few["orders"], many["orders"]) == (16 * 2, 9 * 16 * 2)
+    # 64 and 16 discs, 20 things at both levels, 4 bytes each
+    assert few["order_mb"] == pytest.approx(4 * 16 * (64 + 16 + 40) / 1e6)
+    assert many["order_mb"] == pytest.approx(9 * few["order_mb"])
+    assert 10 < few["order_db"] < many["order_db"]
+    assert min(each[key] for each in (few, many) for key in ("compose_s", "sort_s")) >= 0

@@ -1,4 +1,4 @@
-"""Tests of the capture agents, the photo store and the drop folder."""
+"""The capture agents, the photo store, the drop folder, and which candidates remain for an agent."""
 
 import json
 import os
@@ -7,18 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures import ground as patch
 from fixtures.frames import scene_frame
 from fixtures.photo_store import read_records
 
 from dav_gswt.capture import capturing, drop_folder
 from dav_gswt.capture.agents import AGENTS
-from dav_gswt.capture.store import PhotoStore, Site, pose_key
+from dav_gswt.capture.capturing import filter_attainable
+from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
-from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
+from dav_gswt.photos.capture_record import read_capture_record, write_capture_record
 from dav_gswt.photos.view_split import ViewSplit
+from dav_gswt.reconstruction.ground import Ground
 
 WHEN = "2026-05-04T10:00:00"
 
@@ -176,20 +180,37 @@ def test_a_photo_stored_for_a_pose_no_longer_asked_for_is_placed_again(site, mon
     assert len(read_records(site.store)) == 2
 
 
-def test_an_agent_knows_the_poses_of_this_round_and_the_earlier_ones(site, tmp_path, monkeypatch):
-    (before,) = requested(3.0)
-    (tmp_path / "before").mkdir()
-    record = CapturedPhoto("a.png", before[0], before[1], at(3.1), 0.0)
-    write_capture_record(tmp_path / "before", "handheld", [record])
-    now, seen = requested(0.0, 1.0), []
-    monkeypatch.setattr(capturing.pools, "list_remaining", lambda *_: now)
+FRAME = scene_frame(exemplar=(-1.0, -1.0, 2.0), flying_height=2.0)
+GRID = Ground(-3.0, -3.0, 6 / 48, 16, 16, 16, np.zeros((48, 48)), np.ones((48, 48), bool))
+EMPTY = patch.field()[:0]
+POOL = [
+    (Pose("above", 90.0, 0.0, 2.5), cameras.pinhole([0, 0.01, 2.5], [0, 0, 0], 64, 64, 100.0)),
+    (Pose("below", -90.0, 0.0, 0.2), cameras.pinhole([0, 0.01, -0.2], [0, 0, 0], 64, 64, 100.0)),
+]
 
-    def listen(site, _):
-        seen.extend(site.requested)
-        raise InputError("photos are missing")
 
-    monkeypatch.setitem(AGENTS, "handheld", replace(AGENTS["handheld"], take=listen))
-    chosen = [pose for pose, _ in now]
-    with pytest.raises(InputError, match="photos are missing"):
-        capturing.capture_views(site, ViewSplit((), (), ()), [tmp_path / "before"], chosen, tmp_path / "capture")
-    assert [pose_key(camera) for camera in seen] == [pose_key(at(x)) for x in (3.0, 0.0, 1.0)]
+def names(scene):
+    return [pose.name for pose, _ in filter_attainable(scene, FRAME, GRID, EMPTY, POOL)]
+
+
+def test_infeasible_poses_are_left_out_but_of_a_replayed_scene():
+    assert names({"agent": "replay"}) == ["above", "below"]
+    assert names({"agent": "handheld"}) == ["above"]
+    # the clearance is a share of the flying height
+    near = [*POOL, (Pose("near", 90.0, 0.0, 0.09), cameras.pinhole([0.5, 0.01, 0.09], [0, 0, 0], 64, 64, 100.0))]
+    found = filter_attainable({"agent": "render"}, FRAME, GRID, EMPTY, near)
+    assert [pose.name for pose, _ in found] == ["above"]
+
+
+def test_a_drone_is_sent_no_lower_than_it_may_fly():
+    place = replace(FRAME, georeference=Georeference(48.0, 11.0, 500.0, 0.0, metres_per_unit=4.0))
+    low = (Pose("low", 90.0, 0.0, 0.4), cameras.pinhole([0, 0.01, 0.4], [0, 0, 0], 64, 64, 100.0))
+
+    def kept(frame, altitude):
+        scene = {"agent": "plan", "drone": {"min_altitude": altitude}}
+        return [pose.name for pose, _ in filter_attainable(scene, frame, GRID, EMPTY, [*POOL, low])]
+
+    assert kept(FRAME, 2.0) == ["above", "low"] == kept(place, 1.5)
+    assert kept(place, 2.0) == ["above"]
+    with pytest.raises(InputError, match="all 3 candidate poses are lower than 12 m"):
+        kept(place, 12.0)

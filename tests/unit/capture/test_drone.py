@@ -9,7 +9,7 @@ from fixtures.frames import scene_frame
 from dav_gswt.capture import drone, drop_folder, route
 from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.errors import InputError
-from dav_gswt.geometry import camera_layouts, cameras
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.poses import pose_of_camera
 
@@ -82,12 +82,6 @@ def test_photos_are_taken_from_the_poses_with_their_views(items, requested):
         np.testing.assert_allclose(ahead, camera.forward, atol=2e-5)  # angles are written to a thousandth of a degree
         assert items[i + 3]["params"][:3] == [0, 0, 1]
     assert not left
-
-
-def test_looking_straight_down_the_nose_points_to_the_top_of_the_picture():
-    rotation, translation = cameras.look_at([0, 0, 5.0], [0, 0, 0.0])  # the picture's top is the world's +y
-    camera = cameras.Camera(rotation, translation, 50.0, 50.0, 32.0, 24.0, 64, 48)
-    assert drone.heading_and_pitch(camera, PLACE) == pytest.approx((30.0, -90.0))
 
 
 def test_sideways_ways_stay_above_the_clearance(items):

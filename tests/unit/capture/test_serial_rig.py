@@ -2,7 +2,6 @@
 
 import re
 import signal
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.config.scenes import SerialRig
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts
-from dav_gswt.geometry.cameras import look_at
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 
@@ -188,12 +186,6 @@ def test_nothing_moves_where_a_pose_or_the_way_is_barred(shoot, places, changed,
     assert device.verbs("HOME", "MOVE", "SHOOT") == []
 
 
-def test_a_pan_goes_the_short_way_round_where_the_limits_let_it():
-    limits = {"pan": [-270, 270], "tilt": [0, 90], "radius": [1, 9]}
-    there = serial_rig.combine_limits(limits, np.array([[-1e6, 1e6]] * 3))
-    assert serial_rig.choose_turn(there, np.array([170.0, 45.0, 5.0]), -170.0)[0] == -190.0
-
-
 def test_a_dry_run_moves_nothing_and_says_every_move(shoot, caplog):
     caplog.set_level("INFO")
     device, ended, store = shoot(dry_run=True)
@@ -213,28 +205,6 @@ def test_what_was_in_the_inbox_before_is_not_taken_for_a_photo(shoot, tmp_path):
     assert "old.png" not in {record["source"] for record in read_records(store)}
 
 
-def test_a_photo_written_over_another_is_new(tmp_path):
-    image_files.write_png(tmp_path / "capt.png", np.zeros((48, 64, 3)))
-    before = serial_rig.list_photos(tmp_path)
-    image_files.write_png(tmp_path / "capt.png", np.random.default_rng(0).random((48, 64, 3)))
-    assert serial_rig.wait_for_photo(tmp_path, before) == tmp_path / "capt.png"
-
-
-@pytest.mark.parametrize("place", [PLACES[1], (90.0, 200.0, 2.0), (12.0, 359.9999, 1.0)])
-def test_axes_and_cameras_are_each_others_inverse(place):
-    camera = posed(0, place)[1]
-    mount = serial_rig.Mount(np.array(CENTRE), 250.0)
-    axes = mount.axes_of(camera)
-    np.testing.assert_allclose(axes, [place[1], place[0], 250.0 * place[2]], atol=1e-3)
-    back = mount.camera_at(axes, camera)
-    np.testing.assert_allclose(back.rotation, camera.rotation, atol=2e-5)
-    np.testing.assert_allclose(back.translation, camera.translation, atol=1e-4)
-    np.testing.assert_array_equal(mount.find_place(camera, np.array([[-1e6, 1e6]] * 3), axes[0]), axes)
-    rotation, translation = look_at(camera.centre, [3.0, 1.5, 0.0])
-    turned = replace(camera, rotation=rotation, translation=translation)
-    assert "degrees away from how the rig looks" in mount.find_place(turned, serial_rig.UNLIMITED, 0.0)
-
-
 def test_what_is_missing_is_said_and_only_poses_where_the_rig_may_stand_are_candidates(shoot, tmp_path):
     assert "rig.inbox" in shoot(inbox=str(tmp_path / "none"))[1]
     assert "does not open" in shoot(port=str(tmp_path / "none"))[1]
@@ -244,10 +214,6 @@ def test_what_is_missing_is_said_and_only_poses_where_the_rig_may_stand_are_cand
     assert [pose.name for pose, _ in serial_rig.filter_reachable({"rig": rig}, FRAME, pool)] == ["pose_0000"]
     with pytest.raises(InputError, match="none of the candidate poses"):
         serial_rig.filter_reachable({"rig": rig | {"limits": RIG["limits"] | {"radius": [1, 2]}}}, FRAME, pool)
-
-
-def test_the_checksum_is_that_of_the_standard():
-    assert serial_protocol.frame_line("123456789") == b"123456789*29B1\n"
 
 
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=1, max_size=100), st.data())

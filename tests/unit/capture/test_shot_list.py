@@ -9,7 +9,7 @@ from dav_gswt.capture import drop_folder, handheld
 from dav_gswt.capture.store import PhotoStore, Site
 from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
-from dav_gswt.geometry import camera_layouts, cameras
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import image_files
@@ -18,7 +18,6 @@ from dav_gswt.raster import render
 MIDDLE = [1.6, 1.6, 0.0]
 FRAME = replace(made.FRAME, flying_height=1.6)
 NORTH = Georeference(47.1, 8.2, 430.0, north=90.0, metres_per_unit=2.0)
-UNKNOWN = replace(FRAME, unit="flying height")
 ORBITS = [(40, 0, 2.0), (35, 180, 2.4), (90, 0, 1.8), (30, 90, 2.5)]
 
 
@@ -92,35 +91,6 @@ def test_an_older_list_goes_and_photos_stay(site, requested, monkeypatch):
     assert text.count("<article") == 1 and "a&lt;b&gt;&amp;" in text and "<b>&" not in text
     monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, requested, agent: [])
     assert handheld.take_photos(site, requested) is None
-
-
-def test_words_say_where_to_stand_and_where_to_look():
-    camera = camera_layouts.orbit(40, 0, 2.0, MIDDLE, 64, 48, 60.0)  # to the right on the map, 1.53 away, 1.29 up
-    assert handheld.describe_pose(camera, handheld.Ruler(UNKNOWN)) == (
-        "Stand 1.0 flying height from the middle, towards the right of the map, camera 0.8 flying heights above the "
-        "ground; face the middle, which is to the left of the map; look down 40 degrees."
-    )
-    assert handheld.describe_pose(camera, handheld.Ruler(FRAME)).startswith(
-        "Stand 1.5 m from the middle, towards the right of the map, camera 1.3 m above the ground"
-    )
-    known = replace(FRAME, georeference=NORTH)  # +y is east: the right of the map is south
-    assert handheld.describe_pose(camera, handheld.Ruler(known)) == (
-        "Stand 3.1 m south of the middle, camera 2.6 m above the ground; face the middle, which is to the north; "
-        "look down 40 degrees."
-    )
-
-
-def test_words_for_cameras_that_do_not_look_at_the_middle():
-    by = handheld.Ruler(FRAME)
-    aside = cameras.pinhole([0.5, 3.0, 1.5], [3.0, 5.5, 1.5], 48, 64, 60.0)
-    assert "face the upper right of the map; look level." in handheld.describe_pose(aside, by)
-    down = camera_layouts.orbit(90, 270, 1.8, MIDDLE, 64, 48, 60.0)
-    assert handheld.describe_pose(down, by) == (
-        "Stand in the middle, camera 1.8 m above the ground; turn the top of the picture to the top of the map; "
-        "look straight down."
-    )
-    assert handheld.describe_walk(aside, down, by) == "go 1.8 m towards the lower right of the map"
-    assert handheld.describe_walk(down, down, by) == "stay where you are"
 
 
 def test_the_map_shows_the_exemplar_and_every_pose(site, requested):

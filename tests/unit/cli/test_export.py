@@ -3,15 +3,14 @@
 import shutil
 
 import pytest
-from fixtures import bundles
 from fixtures.land_covers import cover_content, write_cover_bundle
 
 from dav_gswt.bundle import store
 from dav_gswt.cli import main
-from dav_gswt.config.exports import Export
+from dav_gswt.config.settings import Export
 from dav_gswt.export import terrain_files
 from dav_gswt.terrain import endless
-from dav_gswt.terrain.heights import Hills, make_sphere
+from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page
 from dav_gswt.tiles.store import write_tiles
 
@@ -63,15 +62,6 @@ def test_what_makes_no_sense_is_one_line_and_writes_nothing(result, tmp_path, ca
     assert run(result, *arguments, "-o", tmp_path / "out") == 1
     told = capsys.readouterr().err
     assert said in told and told.count("\n") == 1
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_planet_is_refused_and_not_written_as_level_ground(root, tmp_path, capsys):
-    bundle = tmp_path / "bundle"
-    bundles.write_bundle(bundle, bundles.Ground())
-    write_page(bundle, root / "workflow/viewer", bundle / "terrain/page", make_sphere(10.0, bundles.Ground().side))
-    assert run(bundle, "--formats", "glb", "-o", tmp_path / "out") == 1
-    assert "choose another surface than `sphere`" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

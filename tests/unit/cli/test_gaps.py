@@ -85,15 +85,3 @@ def test_what_cannot_be_used_ends_with_1_and_a_wrong_call_with_2(tmp_path, capsy
     with pytest.raises(SystemExit) as stopped:
         main.main(["gaps"])
     assert stopped.value.code == 2
-
-
-@pytest.mark.slow  # minutes: structure from motion twice
-@pytest.mark.parametrize("hole", [False, True])
-def test_photos_on_disk_are_placed_and_a_missing_part_of_the_flight_is_found(hole, tmp_path, capsys):
-    at = [(0.3 * (i - 3), 0.22 * (j - 3)) for i in range(7) for j in range(7)]
-    cameras = [synth.camera((x, y, 1), (x, y + 1e-3, 0)) for x, y in at if not hole or max(abs(x), abs(y)) > 0.5]
-    large = [camera.resized(640, 480) for camera in cameras]
-    synth.shoot(tmp_path / "photos", large, synth.texture(np.random.default_rng(0), 3000), 1.6)
-    status = main.main(["gaps", str(tmp_path / "photos"), "-o", str(tmp_path / "out"), "--focal", "32.45"])
-    found = json.loads((tmp_path / "out/gaps.geojson").read_text())["features"]
-    assert (status, len(found)) == ((1, 1) if hole else (0, 0)), capsys.readouterr().out

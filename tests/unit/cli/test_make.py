@@ -3,7 +3,6 @@
 import argparse
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 import yaml
@@ -78,13 +77,6 @@ def test_folders_in_the_way_and_other_inputs_are_refused(folder):
         (folder / "my.yaml").write_text("scene: x")
         prepare("my.yaml")
     assert (folder / "full/letter.txt").read_text() == "dear"
-
-
-@pytest.mark.parametrize("option", [("--budget", "1"), ("--test", "-1"), ("--cores", "0"), ("--cores", "two")])
-def test_a_number_that_cannot_be_is_a_wrong_call(folder, option, capsys):
-    with pytest.raises(SystemExit) as stopped:
-        main.main(["make", "pit", *option])
-    assert stopped.value.code == 2 and f"{option[1]}" in capsys.readouterr().err
 
 
 def test_a_wrong_option_is_not_kept(folder):
@@ -206,12 +198,3 @@ def test_the_judgement_says_from_how_high_the_ground_looks_sharp():
     (said,) = judgement.describe_sharpness(splat, None, manifest)
     assert said == "The ground looks sharp from 13 units of the splat above it."
     assert not judgement.describe_sharpness(frame, windows, None)
-
-
-def test_help_says_where_the_pages_lie_that_messages_name(capsys):
-    with pytest.raises(SystemExit):
-        main.main(["--help"])
-    said = capsys.readouterr().out.strip()
-    assert "dav-gswt make PHOTOS" in said
-    place = said.rpartition(" lie in ")[2].removesuffix(".")
-    assert (Path(place) / "docs/reference/config.md").is_file() and (Path(place) / "docs/photos.md").is_file()

@@ -39,14 +39,6 @@ def test_the_plan_and_the_begin_and_the_end_of_each_job_are_a_line(handler):
     assert handler.describe(failed) == "fit_coarse is not finished; its log: results/logs/a.log"
 
 
-def test_a_log_is_named_from_where_the_run_was_called(handler, tmp_path, monkeypatch):
-    handler.start = tmp_path
-    (tmp_path / "pit-terrain").mkdir()
-    monkeypatch.chdir(tmp_path / "pit-terrain")
-    failed = record(LogEvent.JOB_ERROR, rule_name="fit_coarse", log=["results/logs/a.log"])
-    assert handler.describe(failed) == "fit_coarse is not finished; its log: pit-terrain/results/logs/a.log"
-
-
 def test_every_rule_that_makes_something_has_words(handler, root):
     text = "\n".join(path.read_text(encoding="utf-8") for path in (root / "rules").glob("*.smk"))
     rules = {
@@ -54,14 +46,6 @@ def test_every_rule_that_makes_something_has_words(handler, root):
     }
     words = sys.modules[type(handler).__module__].STAGES
     assert "fit_windows" in rules and not rules - set(words)
-
-
-def test_jobs_are_numbered_in_the_order_in_which_they_end(handler):
-    handler.describe(record(LogEvent.RUN_INFO, stats={"total": 3}))
-    for number in (1, 2):
-        handler.describe(record(LogEvent.JOB_INFO, rule_name=f"job{number}", jobid=number, log=["a.log"]))
-    ends = [handler.describe(record(LogEvent.JOB_FINISHED, job_id=number)) for number in (2, 1)]
-    assert ends == ["[1 of 2] job2: 0 s", "[2 of 2] job1: 0 s"]
 
 
 NO_SPACE = "[Errno 28] No space left on device"

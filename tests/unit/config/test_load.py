@@ -1,5 +1,6 @@
-"""The config is closed: what is misspelt or out of range is named before the first job."""
+"""The config is closed: what is wrong is named before the first job; rules are given the keys that they read."""
 
+import pickle
 import re
 import runpy
 import shutil
@@ -8,9 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from dav_gswt.config.base import LARGEST_SIDE
-from dav_gswt.config.load import add_scene_files, check_config, parse_command_line, read_config
+from dav_gswt.capture import serial_rig
+from dav_gswt.config.base import EntryKeys, select_keys
+from dav_gswt.config.load import add_scene_files, check_config, check_model, parse_command_line, read_config
+from dav_gswt.config.scenes import PhotoScene
+from dav_gswt.config.settings import Preset
 from dav_gswt.errors import InputError
+from dav_gswt.photos.synthetic import scene as synthetic
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 
 FILES = {
     "usual": [],
@@ -43,11 +49,6 @@ def test_the_configs_that_come_with_the_project_are_valid(root, name):
     checked = check_config(read(root, *FILES[name]))
     assert checked["scene"] in checked["scenes"]
     assert check_config(checked) == checked
-
-
-def test_native_photos_are_those_of_any_size(config):
-    checked = check_config(changed(config, ["scenes", "copr_dunes", "size"], "native"))
-    assert checked["scenes"]["copr_dunes"]["size"] == LARGEST_SIDE
 
 
 def test_a_folder_alone_is_a_scene(config):
@@ -165,13 +166,6 @@ def test_a_bad_file_stops_its_own_scene_only(root, tmp_path, text, reason, caplo
         check_config(add_scene_files(usual | {"k": 0}, tmp_path))
 
 
-def test_files_of_editors_and_file_systems_are_no_scenes(tmp_path):
-    (tmp_path / "sand.yml").write_text(str(FIELD))
-    (tmp_path / "._sand.yaml").write_bytes(b"\0\5\x16\7")
-    (tmp_path / ".#sand.yaml").symlink_to(tmp_path / "gone")
-    assert add_scene_files({}, tmp_path)["scenes"] == {"sand": FIELD}
-
-
 def test_two_scenes_of_one_name_are_named(tmp_path):
     (tmp_path / "sand.yaml").write_text(str(FIELD))
     with pytest.raises(InputError, match=r"sand\.yaml: the config has a scene sand of kind synthetic, too"):
@@ -210,3 +204,49 @@ def test_the_reference_and_the_schema_are_those_of_the_models(root):
     make_reference = runpy.run_path(str(root / "workflow/reference.py"))["make_reference"]
     stale = [name for name, text in make_reference().items() if (root / name).read_text() != text]
     assert not stale, "run `make reference`"
+
+
+SERIAL = {
+    "port": "p",
+    "inbox": "in",
+    "millimetres": 250.0,
+    "limits": dict.fromkeys(("pan", "tilt", "radius"), (0, 1000)),
+}
+SYNTHETIC = {"kind": "synthetic", "family": "desert", "seed": 0, "photo_count": 5, "test": 2, "size": 128}
+SYNTHETIC |= {"agent": "render", "preset": "draft", "tiling": "auto"}
+PHOTOS = {"kind": "photos", "folder": "x", "size": 512, "start": 8, "preset": "draft", "tiling": "auto"}
+
+
+def photo_scene(agent: str) -> dict:
+    given = PHOTOS | {"agent": agent} | ({"rig": SERIAL} if agent == "serial" else {})
+    return check_model(PhotoScene, given).model_dump(mode="json", exclude_none=True)
+
+
+@pytest.mark.parametrize("read", [lambda keys: keys["b"], lambda keys: keys.get("b", 0), lambda keys: "b" in keys])
+def test_a_key_that_a_rule_is_not_given_has_no_default(read):
+    keys = EntryKeys({"a": 1}, ["b"])
+    for each in (keys, pickle.loads(pickle.dumps(keys))):  # as a job receives it
+        assert each == {"a": 1} and each.get("missing", 5) == 5 and "missing" not in each
+        with pytest.raises(LookupError, match="not given the key 'b'"):
+            read(each)
+
+
+def test_keys_follow_from_the_rule_and_the_agent():
+    read = {agent: set(select_keys(PhotoScene, "score_coarse", photo_scene(agent))) for agent in ("replay", "plan")}
+    assert read == {"replay": {"agent"}, "plan": {"agent", "candidates", "poses", "drone"}}
+    assert select_keys(PhotoScene, "score_coarse", photo_scene("plan"))["drone"] == {"min_altitude": 2.0}
+    assert "clearance" in select_keys(PhotoScene, "request_views", photo_scene("plan"))["drone"]
+    assert set(select_keys(PhotoScene, "register_photos", photo_scene("replay"))) == {"folder", "size"}
+
+
+@pytest.mark.parametrize("rule", ["fit_coarse", "update_field", "fit_chosen_photos"])
+def test_a_fit_is_given_all_keys_of_its_settings(rule):
+    preset = {key: 1.0 if key == "spacing" else 2 for key in Preset.model_fields}
+    found = FitSettings.from_preset(select_keys(Preset, rule, preset))
+    assert found == FitSettings.from_preset(preset) and found.sh_degree == 2
+
+
+def test_scores_are_given_all_keys_of_a_rig_s_reach():
+    given = select_keys(PhotoScene, "score_coarse", photo_scene("serial"))["rig"]
+    assert not {"millimetres", "limits"} & given.withheld and "port" in given.withheld
+    assert serial_rig.filter_reachable({"rig": given}, synthetic.Scene("desert", 0).frame, []) == []

@@ -9,7 +9,7 @@ from fixtures.land_covers import write_cover_bundle
 from fixtures.random_field import random_field
 
 from dav_gswt.bundle import store
-from dav_gswt.config.exports import Export
+from dav_gswt.config.settings import Export
 from dav_gswt.export import spool, terrain_files
 from dav_gswt.export.spool import Spool
 from dav_gswt.terrain import endless

@@ -1,4 +1,4 @@
-"""The ground of a finite terrain: mesh, images, model and hulls lie where the splats do."""
+"""The ground of a finite terrain: mesh, images, model and hulls lie where the splats do; simplified heights."""
 
 import json
 from dataclasses import replace
@@ -6,25 +6,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures.finite_cells import collect_cells
-from fixtures.land_covers import LEAF, cover_content, gaussians
+from fixtures.land_covers import cover_content
 from fixtures.splat_files import read_glb
 from scipy.ndimage import map_coordinates
 from scipy.spatial import ConvexHull
 
 from dav_gswt.errors import InputError
-from dav_gswt.export import ground_files, ground_surface
+from dav_gswt.export import ground_files
 from dav_gswt.export.axes import Y_UP
 from dav_gswt.export.height_mesh import simplify_heights
 from dav_gswt.export.terrain_files import find_origin
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.images import image_files
 from dav_gswt.raster import render
 from dav_gswt.terrain import endless, finite
 from dav_gswt.terrain.finite import Area
 from dav_gswt.terrain.heights import make_sphere
 
-PLACE = Georeference(47.1, 11.3, 600.0, 20.0, metres_per_unit=1.0)
 AREA = Area(0, -1, 6, 5)
 
 
@@ -40,7 +38,7 @@ def sets():
 
 @pytest.fixture(scope="module")
 def surface(cover_terrain, sets):
-    return ground_surface.collect_surface(cover_terrain, ground_surface.measure_tiles(sets), AREA)
+    return ground_files.collect_surface(cover_terrain, ground_files.measure_tiles(sets), AREA)
 
 
 @pytest.fixture(scope="module")
@@ -85,27 +83,12 @@ def test_heights_are_those_that_a_camera_above_sees(cover_terrain, surface):
     assert (np.abs(sample_surface(surface, x, y) - shown) < surface.cell).mean() >= 0.99
 
 
-def test_the_ground_layer_alone_is_taken_and_blades_where_there_is_none(sets):
-    ground = ground_surface.measure_tiles(sets).heights
-    assert np.abs(ground).max() < 1e-3 and ground.shape == (32, 17, 17)
-    plain = [replace(sets[1], fields=[[replace(f, ground=np.zeros(len(f), bool)) for f in sets[1].fields[0]]])]
-    assert ground_surface.measure_tiles(plain).heights.max() > 0.05
-
-
-def test_at_a_border_the_neighbour_is_seen_too(sets):
-    """A ridge along the western border of every tile is there at the eastern one, which its neighbour's covers."""
-    ridge = [_lift(field, 0.3 * (field.means[:, 0] < 0.3)) for field in sets[0].fields[0]]
-    heights = ground_surface.measure_tiles([replace(sets[0], fields=[ridge])]).heights
-    assert heights[:, :, 0].min() > 0.1 and heights[:, :, 8].max() < 0.01
-    np.testing.assert_allclose(heights[:, 1:-1, -1], heights[:, 1:-1, 0], atol=0.02)
-
-
 def test_of_several_materials_the_one_that_lies_there_is_taken(cover_terrain, sets):
     raised = [sets[0], replace(sets[1], fields=[[_lift(f, 0.5) for f in level] for level in sets[1].fields])]
-    tiles = ground_surface.measure_tiles(raised)
+    tiles = ground_files.measure_tiles(raised)
     flat = replace(cover_terrain, heights=endless.FlatSurface())
     area = Area(-4, -4, 8, 8)
-    heights = ground_surface.collect_surface(flat, tiles, area).heights
+    heights = ground_files.collect_surface(flat, tiles, area).heights
     low, high = (heights < 0.05).mean(), (heights > 0.45).mean()
     assert low > 0.1 and high > 0.1 and low + high > 0.6  # a blur of one cell lies between
 
@@ -168,13 +151,6 @@ def test_every_object_has_a_closed_hull_that_holds_what_is_drawn(exported, facts
         assert outside.max() < 0.05 and hull.volume < 1
 
 
-def test_a_hull_reaches_one_deviation_of_what_is_solid():
-    ball = gaussians([[1.0, 2, 3], [9, 9, 9]], LEAF, [0.3, 0.2, 0.1])
-    points = ground_surface.find_outermost(replace(ball, opacity_logits=np.float32([4, -4])))
-    np.testing.assert_allclose(np.linalg.norm((points - [1, 2, 3]) / [0.3, 0.2, 0.1], axis=1), 1, rtol=1e-5)
-    np.testing.assert_allclose(np.ptp(points, axis=0), [0.6, 0.4, 0.2], atol=0.015)
-
-
 def test_mujoco_loads_the_model_and_its_rays_meet_the_heights(exported, facts, surface):
     mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed")
     rows, columns = np.fromfile(exported / "ground.hfield", "<i4", 2)
@@ -192,3 +168,45 @@ def test_mujoco_loads_the_model_and_its_rays_meet_the_heights(exported, facts, s
         name, here = model.geom(hit[0]).name, heights[::-1][row, column]
         assert name != "ground" or abs(20 - away - here) < 2e-3
         assert name == "ground" or 20 - away > here - 0.1  # an object stands there
+
+
+BLOCK = 16
+
+
+def rough():
+    y, x = np.mgrid[: 2 * BLOCK + 1, : 3 * BLOCK + 1]
+    wave = np.sin(x / 9) * np.cos(y / 7)
+    return (wave + 0.02 * np.random.default_rng(0).normal(size=x.shape)).astype(np.float32)
+
+
+def fill(heights, points, triangles):
+    """Heights of the triangles at all lattice points; fails where two triangles disagree on one."""
+    found, area = np.full(heights.shape, np.nan), 0.0
+    for corners in points[triangles]:
+        (r, c), z = corners.T, heights[tuple(corners.T)].astype(float)
+        twice = (c[1] - c[0]) * (r[2] - r[0]) - (c[2] - c[0]) * (r[1] - r[0])
+        assert twice > 0  # counter-clockwise from above
+        area += twice / 2
+        rows, columns = np.mgrid[r.min() : r.max() + 1, c.min() : c.max() + 1].reshape(2, -1)
+        weights = np.linalg.solve(np.array([c, r, np.ones(3)], float), [columns, rows, np.ones(len(rows))])
+        inside = (weights > -1e-9).all(0)
+        place, value = (rows[inside], columns[inside]), z @ weights[:, inside]
+        assert np.nanmax(np.abs(found[place] - value), initial=0) < 1e-5
+        found[place] = value
+    assert area == (heights.shape[0] - 1) * (heights.shape[1] - 1)
+    return found
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.05, 0.2, 0.6])
+def test_no_point_is_off_by_more_than_the_tolerance(tolerance):
+    heights = rough()
+    points, triangles = simplify_heights(heights, BLOCK, tolerance)
+    assert np.abs(fill(heights, points, triangles) - heights).max() <= tolerance + 1e-6
+
+
+def test_larger_tolerances_need_fewer_triangles_and_a_plane_two_a_block():
+    counts = [len(simplify_heights(rough(), BLOCK, tolerance)[1]) for tolerance in (0.0, 0.02, 0.1, 0.5, 5.0)]
+    assert counts == sorted(counts, reverse=True) and counts[0] == 2 * 32 * 48 and counts[-1] == 2 * 6
+    y, x = np.mgrid[: BLOCK + 1, : 2 * BLOCK + 1]
+    points, triangles = simplify_heights((0.5 * x - 0.25 * y).astype(np.float32), BLOCK, 1e-5)
+    assert len(triangles) == 4 and len(points) == 6

@@ -35,16 +35,6 @@ def baked(content):
     return bake(content, content.objects)
 
 
-def added(content, baked, tile, level=0):
-    return baked[level][tile][len(content.tiles[0].fields[level][tile]) :]
-
-
-def test_tiles_have_as_many_objects_as_the_density_says(content, baked):
-    count = sum(len(added(content, baked, tile)) for tile in range(TILES)) / len(content.objects[0].fields[0])
-    mean = 0.2 * SIDE**2 * TILES
-    assert abs(count - mean) < 3 * mean**0.5 and count == int(count)
-
-
 def test_tiles_keep_the_same_mean_height_and_their_borders(content, baked):
     """The public renderer shifts each tile by its own mean height."""
     heights = [float(field.means[:, 2].astype(float).mean()) for field in baked[0]]
@@ -115,8 +105,3 @@ def test_tiles_as_files_are_those_of_the_bundle(composed, tmp_path):
         read, wanted = read_field(tmp_path / f"tiles/lod{level}_tile_05.ply"), composed.chunk(5, level)
         np.testing.assert_array_equal(read.means, wanted.means)
         np.testing.assert_array_equal(read.ground, wanted.ground)
-
-
-def test_an_object_wider_than_a_tile_is_left_out(content):
-    fields = bake(content, [first(shrub(2.5, 0.2))])
-    assert [len(f) for f in fields[0]] == [len(f) for f in content.tiles[0].fields[0]]

@@ -76,23 +76,6 @@ def test_colmap_reads_all_photos_that_were_taken_and_no_other(written, taken):
         assert digest_files(written / "images" / photo.name) == digest_files(photo.source)
 
 
-def test_points_lie_where_the_photos_see_them(written, known):
-    stored = pycolmap.Reconstruction(str(written / "sparse/0"))
-    assert len(stored.points3D) > 100 and stored.compute_mean_reprojection_error() < 1e-6
-    for point in stored.points3D.values():
-        assert np.linalg.norm(known.points - point.xyz, axis=1).min() < 1e-6
-        assert point.track.length() >= 2
-    colours = np.array([p.color for p in stored.points3D.values()])
-    assert np.ptp(colours.mean(1)) > 30  # of the pictures, not the model's grey
-
-
-def test_photos_that_test_have_a_folder_of_their_own(written, known):
-    tests = read_colmap_model(written / "test/sparse/0")
-    assert tests.names == SPLIT.test and len(tests.point_of) == 0
-    assert_same(tests.cameras[0], known.camera("006.png"))
-    assert tests.points == pytest.approx(read_colmap_model(written / "sparse/0").points)
-
-
 def test_what_the_test_photos_see_leaves_no_trace(written, taken, folder, known, tmp_path):
     unseen = known.image_of == known.names.index("006.png")
     pixels = known.pixels + unseen[:, None] * 30.0

@@ -86,11 +86,3 @@ def test_a_wide_terrain_gives_bits_after_the_point_for_those_before_it(small, tm
     splat_files.write_spz(wide, tmp_path / "a.spz")
     assert gzip.decompress((tmp_path / "a.spz").read_bytes())[13] == 8
     np.testing.assert_allclose(read_spz(tmp_path / "a.spz").means[-1], [30_000, 0, 30_000], atol=2**-8)
-
-
-@pytest.mark.parametrize("version, count", [(4, 5), (3, 0), (3, FORMATS["spz"].gaussians + 1)])
-def test_what_an_spz_cannot_hold_is_not_written(spool, tmp_path, version, count):
-    spool.count = count
-    with pytest.raises(ValueError, match="is not written"):
-        splat_files.write_spz(spool, tmp_path / "a.spz", version)
-    assert not (tmp_path / "a.spz").exists()

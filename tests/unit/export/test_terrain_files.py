@@ -17,6 +17,7 @@ from dav_gswt.geometry import cameras
 from dav_gswt.images.metrics import psnr
 from dav_gswt.raster import render
 from dav_gswt.terrain import finite, stills
+from dav_gswt.terrain.finite import Area
 
 READERS = {"ply": read_field, "spz": read_spz, "glb": read_glb_splats}
 SIZE = 96
@@ -80,3 +81,15 @@ def test_the_converter_is_given_a_ply(cover_terrain, export, tmp_path, monkeypat
     with pytest.raises(InputError, match="splat-transform@2.7.1 failed: no such thing"):
         export("failed", formats=["sog"])
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["terrain.json", "terrain_3dtiles"]
+
+
+@pytest.mark.parametrize(
+    "centre, columns, expected",
+    [
+        ([0.0, 0.0], 3, Area(-1, -1, 3, 2)),
+        ([10.5, -4.0], 3, Area(9, -5, 3, 2)),
+        ([3.9, -0.5], 5, Area(1, -1, 5, 2)),
+    ],
+)
+def test_cells_lie_about_the_centre(centre, columns, expected):
+    assert terrain_files.choose_area({"columns": columns, "rows": 2, "centre": centre}) == expected

@@ -1,7 +1,6 @@
 """3D Tiles: the rules of the specification, every Gaussian of every level once, the place on the globe."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from fixtures.finite_cells import collect_cells
 from fixtures.splat_files import read_glb_spz
 from pyproj import Transformer
 
-from dav_gswt.export import tiles_3d
 from dav_gswt.export.axes import Y_UP, turn_field
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry.georeference import Georeference
@@ -89,11 +87,3 @@ def test_a_georeferenced_tileset_stands_where_pyproj_puts_it(write):
     for local in np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]]):
         wanted = project.transform(*PLACE.to_earth((origin + local)[None])[0])
         np.testing.assert_allclose(matrix @ [*local, 1.0], [*wanted, 1.0], atol=1e-6)
-
-
-def test_a_level_is_refined_where_its_gaussians_lie_more_than_a_pixel_apart_and_no_error_falls(cover_terrain):
-    counts = [len(tile) for (level, _), tile in cover_terrain.tiles.items() if level == 1]
-    expected = pytest.approx(16 * cover_terrain.side / np.sqrt(np.mean(counts)))
-    tiles = cover_terrain.tiles | {(2, 0): cover_terrain.tiles[0, 0]}  # with more Gaussians than the finer one
-    errors = tiles_3d.measure_errors(replace(cover_terrain, tiles=tiles, switches=[1.0, 2.0, np.inf]))
-    assert errors == [0.0, expected, expected]

@@ -15,7 +15,6 @@ from dav_gswt.field import (
     concatenate_fields,
     read_field,
     read_ply,
-    rgb_to_sh,
     write_field,
 )
 
@@ -33,18 +32,6 @@ def foreign(path, rows=3, drop=(), change=None, extra=(), text=False):
         table[name][row] = value
     PlyData([PlyElement.describe(table, "vertex")], text=text).write(str(path))
     return path
-
-
-def test_concatenating_and_indexing_keep_the_order():
-    one, two = random_field(3, seed=1), random_field(2, seed=2)
-    both = concatenate_fields([one, two])
-    assert np.array_equal(both[3:].means, two.means) and np.array_equal(both[np.array([0, 4])].sh[1], two.sh[1])
-
-
-def test_a_colour_of_half_has_no_coefficients_and_base_colours_invert_them():
-    colours = np.float32([[0, 0.5, 1]])
-    assert rgb_to_sh(colours)[0, 0] == pytest.approx([-1.7724539, 0, 1.7724539])  # sqrt(pi)
-    assert replace(random_field(1), sh=rgb_to_sh(colours)).base_colours == pytest.approx(colours, abs=1e-6)
 
 
 @pytest.mark.parametrize("count, degree", [(7, 0), (7, 1), (7, 3), (0, 0)])
@@ -164,14 +151,6 @@ def with_list(path, name):
 def test_a_property_that_is_a_list_is_refused_by_name(tmp_path, name):
     with pytest.raises(InputError, match=rf"a.ply: property {name} is a list; export it again"):
         read_field(with_list(tmp_path / "a.ply", name))
-
-
-def test_an_uncertainty_that_rounding_puts_beyond_1_is_clipped(tmp_path):
-    values = np.float32([1 + 2e-7, 1, -1e-7])
-    path = foreign(
-        tmp_path / "a.ply", extra=["uncertainty"], change={(i, "uncertainty"): v for i, v in enumerate(values)}
-    )
-    assert read_field(path).uncertainty.tolist() == [1, 1, 0]
 
 
 def test_what_was_imagined_comes_back_and_costs_a_field_without_it_no_byte(tmp_path):

@@ -1,37 +1,10 @@
-"""Arithmetic on images of few channels: the same bits as NumPy's broadcasting; PSNR and SSIM."""
+"""PSNR, colour correction, and HDR pictures that become usual ones."""
 
 import numpy as np
 import pytest
 
-from dav_gswt.images import channels, metrics
-
-
-@pytest.fixture
-def image():
-    return np.random.default_rng(0).normal(size=(5, 7, 3)).astype(np.float32)
-
-
-@pytest.fixture
-def alpha():
-    return np.random.default_rng(1).uniform(size=(5, 7)).astype(np.float32)
-
-
-@pytest.mark.parametrize("shape", [(3,), (5, 7, 3)])
-def test_sums_with_a_colour_or_another_image_are_those_of_broadcasting(image, alpha, shape):
-    other = np.random.default_rng(2).uniform(size=shape).astype(np.float32)
-    before, found = image.copy(), channels.composite(image, alpha, other)
-    assert found.dtype == np.float32 and np.array_equal(found, before + (1 - alpha)[..., None] * other)
-    assert channels.sum_products(image, other) == pytest.approx((before.astype(float) * other).sum(-1), abs=1e-6)
-
-
-def test_channels_are_scaled_and_filled_each_by_its_own_value(image):
-    gain, offset = np.float32([0.5, 1.5, 2.5]), np.float32([0.1, -0.2, 0.3])
-    assert np.array_equal(channels.scale_channels(image[::2, ::3], gain), image[::2, ::3] * gain)
-    assert np.array_equal(channels.scale_channels(image, gain, offset), image * gain + offset)
-    image[1, 2], image[3, 4, 1] = np.nan, np.nan
-    assert np.array_equal(channels.fill_unknown(image, gain), np.where(np.isnan(image), gain, image))
-    assert np.isnan(image[1, 2]).all()
-
+from dav_gswt.images import metrics
+from dav_gswt.images.srgb import convert_hdr
 
 ONE = np.ones((16, 16), np.float32)
 
@@ -53,3 +26,11 @@ def test_colour_correction_undoes_a_change_of_exposure():
     picture = rng.uniform(0.2, 0.6, (16, 16, 3)).astype(np.float32)
     photo = picture * [1.2, 1.0, 0.8] + [0.05, 0, -0.02]
     np.testing.assert_allclose(metrics.correct_colours(picture, photo, ONE), photo, atol=1e-6)
+
+
+@pytest.mark.parametrize(("curve", "signal"), [("hlg", 0.75), ("pq", 0.58)])
+def test_white_is_white_and_black_is_black(curve, signal):
+    """BT.2408: HLG shows a white sheet at 75 % of the signal, PQ (203 of 10,000 candela a square metre) at 58 %."""
+    values = np.array([[[0.0] * 3, [signal] * 3, [1.0] * 3]])
+    black, white, brightest = convert_hdr(np.rint(65535 * values).astype(np.uint16), curve)[0]
+    assert (black == 0).all() and (white >= 253).all() and (brightest == 255).all()

@@ -8,7 +8,6 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.images.figures import encode_jpeg
 
 GENERATOR = np.random.default_rng(0)
 PICTURE = GENERATOR.integers(0, 256, (6, 9, 3)).astype(np.uint8)
@@ -116,14 +115,6 @@ def test_a_large_jpeg_is_shrunk_as_it_is_decoded(turn, tmp_path):
     assert np.abs(small - image_files.shrink_to(image_files.read_photo(path), 120)).max() < 2.5 / 255
 
 
-@pytest.mark.parametrize("suffix", [".jpg", ".png"])
-def test_a_picture_that_is_not_reduced_is_shrunk_to_the_bit(suffix, tmp_path):
-    path = stored(tmp_path / f"a{suffix}", GENERATOR.integers(0, 256, (24, 30, 3)).astype(np.uint8))
-    for longest in (40, 20):
-        expected = image_files.shrink_to(image_files.read_photo(path), longest)
-        assert np.array_equal(image_files.read_shrunk_photo(path, longest), expected)
-
-
 def test_a_jpeg_that_was_cut_short_is_refused_by_name_at_any_size(tmp_path):
     path = stored(tmp_path / "a.jpg", GENERATOR.integers(0, 256, (160, 160, 3)).astype(np.uint8))
     path.write_bytes(path.read_bytes()[:3000])
@@ -171,25 +162,3 @@ def test_an_image_that_cannot_be_written_is_named_with_the_remedy(write, tmp_pat
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not list(tmp_path.iterdir())
-
-
-def test_colours_of_a_jpeg_stay_and_values_beyond_are_clipped(tmp_path):
-    image = np.full((16, 24, 3), [1.5, 0.5, -1.0])
-    (tmp_path / "a.jpg").write_bytes(encode_jpeg(image, 90))
-    assert abs(image_files.read_photo(tmp_path / "a.jpg") - [1, 0.5, 0]).max() < 0.02
-    assert encode_jpeg(image, 90) == encode_jpeg(image, 90)
-
-
-def test_a_map_has_colours_for_viewers_that_are_no_channels_of_ours(tmp_path):
-    """The lowest value is dark, the highest bright, no number grey."""
-    values = np.linspace(-3, 7, 60).reshape(6, 10).astype(np.float32)
-    values[2, 3] = np.nan
-    image_files.write_exr(tmp_path / "a.exr", {"Z": values, "seen": np.ones((6, 10), np.float32)}, {"n": "1"})
-    channels, texts = image_files.read_exr(tmp_path / "a.exr")
-    assert set(channels) == {"Z", "seen"} and texts == {"n": "1"}
-    np.testing.assert_array_equal(channels["Z"], values)
-    picture = image_files.read_photo(tmp_path / "a.exr")
-    assert picture.shape == (6, 10, 3) and picture[0, 0].sum() < 0.5 < 1 < picture[-1, -1].sum()
-    assert len(set(picture[2, 3].tolist())) == 1
-    image_files.write_exr(tmp_path / "a.exr", {"u": np.full((2, 2), np.nan, np.float32)})  # no number at all
-    assert set(image_files.read_exr(tmp_path / "a.exr")[0]) == {"u"}

@@ -57,23 +57,6 @@ def test_lpips_in_float32_equals_the_reference_in_float64(weights, shape):
     np.testing.assert_array_equal(lpips.distance(b, a, weights), found)
 
 
-def test_features_equal_the_references_layer_by_layer(weights):
-    picture = pictures(1, 40, 53)
-    found = lpips.layers(picture, weights)
-    assert [f.shape[1] for f in found] == [64, 192, 384, 256, 256]
-    for layer, truth in zip(found, reference_layers(picture[0], weights), strict=True):
-        np.testing.assert_allclose(layer[0].transpose(1, 2, 0), truth, rtol=1e-3, atol=1e-4 * np.abs(truth).max())
-    assert [len(f) for f in lpips.layers(picture[:0], weights)] == 5 * [0]
-
-
-@pytest.mark.parametrize("values", ["noise", 0.0])
-def test_a_picture_is_no_distance_from_itself(random_weights, values):
-    a = pictures(3, 40, 32) if values == "noise" else np.full((3, 40, 32, 3), values, np.float32)
-    weights = random_weights
-    np.testing.assert_array_equal(lpips.distance(a, a.copy(), weights), 0)
-    np.testing.assert_array_equal(lpips.pairwise_mean(np.repeat(a[:, None], 5, 1), weights), 0)
-
-
 @pytest.mark.parametrize("m", [2, 5])
 def test_the_mean_over_pairs_equals_the_pairs_one_by_one(random_weights, m):
     weights, sets = random_weights, pictures(3, m, 40, 44)
@@ -82,39 +65,6 @@ def test_the_mean_over_pairs_equals_the_pairs_one_by_one(random_weights, m):
     sets[2, -1] = pictures(40, 44, seed=9)
     pairs = [lpips.distance(sets[:, i], sets[:, j], weights) for i, j in combinations(range(m), 2)]
     np.testing.assert_allclose(lpips.pairwise_mean(sets, weights), np.mean(pairs, 0), rtol=FLOAT32)
-
-
-def test_chunks_change_nothing(random_weights, monkeypatch):
-    a, b, sets = pictures(5, 40, 40), pictures(5, 40, 40, seed=1), pictures(3, 3, 40, 40)
-
-    def everything():
-        return [
-            lpips.distance(a, b, random_weights),
-            lpips.pairwise_mean(sets, random_weights),
-            *lpips.layers(a, random_weights),
-        ]
-
-    together = everything()
-    monkeypatch.setattr(lpips, "CHUNK", 2 * 40 * 40)
-    for apart, whole in zip(everything(), together, strict=True):
-        np.testing.assert_allclose(apart, whole, rtol=1e-5, atol=1e-6)
-
-
-def test_pictures_that_cannot_be_compared_are_refused(random_weights):
-    small = pictures(1, 64, 30)
-    with pytest.raises(ValueError, match="at least 31 pixels a side, not 30 x 64"):
-        lpips.distance(small, small, random_weights)
-    good = pictures(3, 40, 40)
-    for value in (1.01, -2.0, np.nan):
-        bad = good.copy()
-        bad[2, 3, 4, 1] = value
-        for call in (
-            lambda bad=bad: lpips.distance(good, bad, random_weights),
-            lambda bad=bad: lpips.pairwise_mean(np.stack([good, bad], 1), random_weights),
-            lambda bad=bad: lpips.layers(bad, random_weights),
-        ):
-            with pytest.raises(ValueError, match=r"values outside \[-1, 1\]"):
-                call()
 
 
 def test_other_files_than_weights_of_this_network_are_refused(tmp_path):
@@ -134,12 +84,3 @@ def test_other_files_than_weights_of_this_network_are_refused(tmp_path):
     save_file(tensors | {"head2": np.full_like(tensors["head2"], np.nan)}, path)
     with pytest.raises(InputError, match="head2 holds numbers that are not finite"):
         lpips_weights.read(path)
-
-
-def test_the_weights_come_with_the_library_or_by_their_path(tmp_path):
-    own = tmp_path / "own.safetensors"
-    with pytest.raises(InputError, match="there is no .*own"):
-        lpips_weights.locate_weights(str(own))
-    own.write_bytes(b"x")
-    assert lpips_weights.locate_weights(str(own)) == str(own)
-    assert Path(lpips_weights.locate_weights("installed")).is_file()

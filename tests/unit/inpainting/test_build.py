@@ -10,10 +10,8 @@ from fixtures import ground as patch
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.inpainting import build
 from dav_gswt.reconstruction import discs
-from dav_gswt.views import pose_maps
-from dav_gswt.views.prior_sampling import PriorConfig
+from dav_gswt.views.scoring import PriorConfig
 
-MIDDLE = [1.6, 1.6, 0.0]
 FIRST = 20  # column of the first unseen cell
 SEEN = patch.look(*np.meshgrid(0.05 + 0.1 * np.arange(FIRST), 0.05 + 0.1 * np.arange(32))).mean((0, 1))
 BANDS = SEEN + np.float32([[0.2, -0.2, 0.1], [-0.2, 0.2, -0.1]])  # of which the mean is the colour of known ground
@@ -96,34 +94,11 @@ def test_unseen_ground_takes_the_colour_of_the_prior_and_all_else_keeps_its_byte
     assert np.array_equal(marked[rows].reshape(16, 16), np.tile(np.arange(16) >= FIRST // 2, (16, 1)))
 
 
-def test_far_from_known_pixels_a_picture_has_the_mean_colour_of_the_ground():
-    rng = np.random.default_rng(0)
-    picture, ground = rng.uniform(0.4, 0.6, (64, 64, 3)).astype(np.float32), np.array([0.3, 0.5, 0.4])
-    known = np.zeros((64, 64), bool)
-    known[:, :8] = True
-    found = build.match_colours(picture, picture + np.float32(0.2), known, ~known, ground)
-    np.testing.assert_allclose(found[:, 48:].mean((0, 1)), ground, atol=0.01)
-    np.testing.assert_allclose(found[:, :4], picture[:, :4] + 0.2, atol=0.03)
-    everywhere = build.match_colours(picture, picture + np.float32(0.2), known | True, known & False, ground)
-    np.testing.assert_allclose(everywhere, picture + 0.2, atol=1e-6)
-
-
 def test_where_photos_saw_everything_the_field_is_returned():
     field = patch.field()
     made = inpaint(field, patch.grid())
     assert made.field is field and made.inpainted.sum() == made.unseen.sum() == 0
     assert not made.describe(patch.grid())["changed"]
-
-
-def test_a_cell_is_unseen_where_neither_the_grid_nor_the_fit_knows_it():
-    field, grid = half_seen()
-    uncertainty = field.uncertainty.copy()
-    # fitted since, although something once stood before it
-    uncertainty[: grid.heights.size].reshape(grid.shape)[:10] = 0.2
-    found = build.find_unseen_cells(replace(field, uncertainty=uncertainty), grid)
-    assert not found[:10].any() and found[10:, FIRST:].all() and not found[:, :FIRST].any()
-    free = replace(field, ground=np.zeros(len(field), bool))
-    assert not build.find_unseen_cells(free, grid).any() and inpaint(free, grid).field is free
 
 
 def test_ground_under_a_known_object_is_not_inpainted():
@@ -156,17 +131,7 @@ def blob(place, sizes, colour):
     )
 
 
-def test_every_unseen_cell_is_well_inside_the_picture_of_its_block():
-    rng = np.random.default_rng(0)
-    grid = patch.grid(0.05)
-    there = rng.random(grid.shape) < 0.02
-    fresh = there.copy()
-    for target in build.find_targets(grid, there, patch.FRAME.flying_height):
-        ((_, camera),) = build.place_camera(target, patch.field(), grid, patch.FRAME, 64)
-        assert camera.forward[2] < -np.sin(np.radians(75))
-        at, depth = camera.project(grid.centres)
-        fresh &= ~((depth > 0) & (at > 2).all(1) & (at < 62).all(1)).reshape(grid.shape)
-    assert there.any() and not fresh.any()
+MIDDLE = [1.6, 1.6, 0.0]
 
 
 def test_no_camera_is_inside_an_object_or_under_the_ground():
@@ -176,10 +141,3 @@ def test_no_camera_is_inside_an_object_or_under_the_ground():
     ((_, camera),) = place(np.array(MIDDLE))
     assert place(np.array(MIDDLE), blob(list(camera.centre), [0.4, 0.4, 0.4], [0.5, 0.5, 0.5])) == []
     assert place(np.array([1.6, 1.6, -9.0])) == []
-
-
-def test_the_maps_of_a_prior_leave_inpainted_gaussians_at_uncertainty_1():
-    field = replace(patch.field()[:5], imagined=np.array([False, True, False, False, True]))
-    field = replace(field, uncertainty=np.float32([0.1, 1, 0.1, 0.1, 1]))
-    told = pose_maps.apply_uncertainty(field, np.float32([0.3, 0.3, 0.4, 0.5]))
-    assert told.uncertainty.tolist() == np.float32([0.3, 1, 0.4, 0.5, 1]).tolist()

@@ -1,4 +1,4 @@
-"""What readers make of artefacts: places, sizes and colours."""
+"""What readers make of artefacts: places and colours."""
 
 import shutil
 
@@ -13,9 +13,6 @@ from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry.poses import pose_offset
 from dav_gswt.images import image_files
 from dav_gswt.inspect import plot, readers
-from dav_gswt.inspect.plot import Scene
-from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.tiles import store
 
 POSES = result_tree.poses()
 MOST = 300_000
@@ -33,39 +30,6 @@ def one(sigma=(0.1, 0.1, 0.1), ground=False, turn=None, opacity=4.0, uncertainty
     )
 
 
-def draw(field):
-    scene = Scene("", [])
-    readers.add_solids(scene, field, np.uint8([[9, 8, 7]]))
-    ((mesh, _),) = scene.meshes
-    return mesh
-
-
-def test_a_round_gaussian_is_a_solid_of_its_ellipsoids_volume():
-    turn = Rotation.from_euler("xyz", [20, 50, 80], degrees=True)
-    mesh = draw(one([0.3, 0.1, 0.2], turn=turn))
-    assert mesh.volume == pytest.approx(4 / 3 * np.pi * 0.3 * 0.1 * 0.2, rel=1e-4)
-    arms = mesh.points - mesh.points.mean(0)
-    along = arms[np.linalg.norm(arms, axis=1).argmax()]
-    assert abs(along @ turn.as_matrix()[:, 0]) == pytest.approx(np.linalg.norm(along), rel=1e-5)
-    np.testing.assert_allclose(mesh.points.mean(0), [1, 2, 3], atol=1e-6)
-    np.testing.assert_array_equal(mesh.cell_data["rgb"], [[9, 8, 7]] * 8)
-
-
-def test_a_disc_is_a_hexagon_of_its_ellipses_area_across_its_least_axis():
-    turn = Rotation.from_euler("y", 30, degrees=True)
-    mesh = draw(one([0.2, 0.001, 0.1], ground=True, turn=turn))
-    np.testing.assert_allclose((mesh.points - [1, 2, 3]) @ turn.as_matrix()[:, 1], 0, atol=1e-6)
-    assert mesh.area == pytest.approx(np.pi * 0.2 * 0.1, rel=1e-4) and mesh.n_cells == 1
-
-
-def test_faint_gaussians_are_left_out_and_large_fields_are_thinned_evenly():
-    many = fields.concatenate_fields([one(opacity=-9.0)] + [one(uncertainty=i / 100) for i in range(100)])
-    assert len(readers.thin_field(many, 1000)) == 100
-    thin = readers.thin_field(many, 4)
-    np.testing.assert_allclose(thin.uncertainty, [0, 0.33, 0.66, 0.99], atol=1e-6)
-    np.testing.assert_allclose(np.exp(thin.log_scales), 0.1 * 5, rtol=1e-5)  # each for 25: five times as wide
-
-
 def test_a_field_is_coloured_by_what_is_asked_or_says_why_it_cannot_be(tmp_path):
     fields.write_field(one(uncertainty=1.0), tmp_path / "a.ply")
     for by, colour in (
@@ -79,36 +43,6 @@ def test_a_field_is_coloured_by_what_is_asked_or_says_why_it_cannot_be(tmp_path)
     fields.write_field(one(opacity=-9.0), tmp_path / "field.ply")
     with pytest.raises(InputError, match="there is nothing to draw"):
         readers.read_scene(tmp_path / "field.ply", MOST)
-
-
-def test_levels_stand_side_by_side_from_the_west(tree):
-    shown = readers.read_scene(tree.round / "levels", MOST)
-    points = [mesh.points for mesh, _ in shown.meshes[::3]]
-    for west, east in zip(points, points[1:], strict=False):
-        assert np.quantile(west[:, 0], 0.99) < np.quantile(east[:, 0], 0.01)
-    assert len(points) == 3
-    alone = readers.read_scene(tree.round / "levels", MOST, level=1)
-    assert (shown.notes[1], alone.notes[1]) == ("level 0, level 1, level 2 of 3 levels", "level 1 of 3 levels")
-
-
-def test_colours_run_from_one_end_of_a_bar_to_the_other_and_what_is_no_number_is_grey():
-    found = plot.map_colours(plot.make_bar(2.0, 4.0), np.array([2.0, -9.0, 4.0, 99.0, 3.0, np.nan, np.inf]))
-    cool, warm = found[[0, 2]].astype(int)
-    assert cool[2] > cool[0] + 100 and warm[0] > warm[2] + 100
-    np.testing.assert_array_equal(found[[1, 3]], found[[0, 2]])
-    assert np.ptp(found[4].astype(int)) < 10  # grey in the middle
-    np.testing.assert_array_equal(found[5:], [plot.UNKNOWN] * 2)
-    assert plot.fit_bar(np.full(3, 7.0)).scalar_range == (7.0, 8.0)
-    assert plot.fit_bar(np.array([np.nan])).scalar_range == (0.0, 1.0)
-
-
-def test_a_ground_is_a_surface_through_its_cells():
-    heights = np.array([[0.0, 0, 0], [1.0, 1, 1]])
-    grid = Ground(10.0, 20.0, 0.5, 0, 0, 2, heights, np.ones((2, 3), bool))
-    mesh = readers.make_surface(grid, 1)
-    assert mesh.n_points == 6 and mesh.n_cells == 2
-    np.testing.assert_allclose(mesh.points[5], [11.25, 20.75, 1])  # the north-eastern one
-    np.testing.assert_allclose(readers.make_surface(grid, 2).points, [[10.25, 20.25, 0], [11.25, 20.25, 0]])
 
 
 def test_the_part_above_lies_over_the_ground_with_its_first_row_in_the_north_and_all_are_pictures_upright(tree):
@@ -171,36 +105,3 @@ def test_poses_of_other_scores_or_outside_the_result_tree_are_refused(tree, tmp_
     mine.write_text(mine.read_text().replace("pose_0", "pose_9"))
     with pytest.raises(InputError, match="poses.json: .*is not among"):
         readers.read_scene(mine, MOST)
-
-
-def test_a_camera_is_a_pyramid_whose_base_fills_its_picture():
-    camera, scene = result_tree.camera(POSES[3]), Scene("", [])
-    readers.add_frustum(scene, camera, 0.5, (1, 2, 3))
-    ((mesh, _),) = scene.meshes
-    assert mesh.n_cells == 8
-    points = mesh.points.astype(float)
-    base = points[np.linalg.norm(points - camera.centre, axis=1) > 1e-4]
-    pixels, depth = camera.project(base)
-    assert {tuple(map(int, pixel)) for pixel in np.rint(pixels)} == {(0, 0), (24, 0), (24, 16), (0, 16)}
-    np.testing.assert_allclose(depth, 0.5, atol=1e-5)
-
-
-def test_photos_hang_in_their_pyramids_upright(tree):
-    shown = readers.read_scene(tree.start / "views.json", MOST)
-    hung = [(mesh, how["texture"].to_array()) for mesh, how in shown.meshes if "texture" in how]
-    assert [int(rows[0, 0, 0]) for _, rows in hung] == [204, 51, 128]  # test_00, view_00, view_01
-    assert set(shown.names) == {"start", "test", "exemplar", "seen by a photo"}
-
-
-@pytest.fixture(scope="module")
-def cut(tree):
-    return store.read_tiles(tree.tiles / "tiles", tree.tiles / "seams.json", tree.round / "levels")
-
-
-def test_gaussians_have_the_patch_of_their_cell(cut):
-    some = cut.fields[0][3]
-    found = readers.colour_patches(some, cut, 3)
-    inside = (some.means[:, :2] >= 0).all(1) & (some.means[:, :2] < cut.side).all(1)
-    for i in np.flatnonzero(inside)[::97]:
-        x, y = (some.means[i, :2] / cut.spacing).astype(int)
-        assert tuple(found[i]) == readers.PATCH_COLOURS[cut.labels[3][y, x]]

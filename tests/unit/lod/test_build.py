@@ -1,19 +1,21 @@
+"""Levels of detail: merged moments, coarser fits, and their files."""
+
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from fixtures import ground as made
+from fixtures.frames import scene_frame
 
 from dav_gswt import field as field_module
 from dav_gswt.errors import InputError
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.lod import build, merge, store
-from dav_gswt.lod.levels import AUTO, Levels
+from dav_gswt.lod.store import AUTO, Levels
 from dav_gswt.raster import render
-from dav_gswt.reconstruction.discs import find_underlay
-from dav_gswt.reconstruction.objects import make_blobs
-from dav_gswt.reconstruction.observation import mask_to_ground
+from dav_gswt.reconstruction import discs, ground
 
 
 @pytest.fixture(scope="module")
@@ -30,55 +32,6 @@ def test_a_coarser_level_has_a_quarter_of_the_discs_and_a_larger_mean_scale(leve
     assert np.exp(level.log_scales).mean() > 1.5 * np.exp(field.log_scales).mean()
 
 
-def test_discs_keep_the_mean_heights_of_what_they_cover():
-    field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
-    hills = 0.1 * np.sin(5 * grid.centres[:, 0])
-    n = grid.heights.size
-    means = field.means.copy()
-    means[:n, 2] += hills.astype(np.float32)
-    grid = replace(grid, heights=grid.heights + hills.reshape(grid.shape))
-    level, coarse = build.fit_coarser_level(replace(field, means=means), grid, 5, np.random.default_rng(0))
-    rows, columns = coarse.shape
-    four = grid.heights.reshape(rows, 2, columns, 2).mean((1, 3))
-    np.testing.assert_allclose(level.means[: four.size, 2].reshape(four.shape), four, atol=1e-6)
-
-
-def test_low_ground_has_no_dark_rim_in_what_coarser_levels_are_fitted_to():
-    """Below z = 0, rays that meet that plane inside the grid pass beside the field."""
-    field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
-    low = np.float32(0.06 * grid.cells * grid.spacing)
-    sunk = replace(field, means=field.means - np.float32([0, 0, low])), replace(grid, heights=grid.heights - low)
-    views = mask_to_ground(build.render_neighbour_views(*sunk), sunk[1])
-    counted = np.concatenate([view.image[view.weight > 0] for view in views])
-    # a splat's rim of opacity .9 is divided by it, so nothing that counts is darker than the ground itself
-    assert counted.mean(1).min() > 0.7 * field.base_colours.mean(1).min()
-    assert len(counted) > 0.5 * sum((view.weight >= 0).sum() for view in views) / len(views)
-
-
-def test_a_level_is_as_uncertain_as_what_it_was_merged_from():
-    """So are the objects, of which the fit drops one, and the underlay."""
-    field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
-    places, sizes = np.array([[1.0, 1.0, 0.1], [1.5, 1.5, -2.0], [2.0, 2.0, 0.1]]), np.full(3, 0.1)
-    things = replace(make_blobs(places, np.full((3, 3), 0.5), sizes), uncertainty=np.float32([0.25, 0.5, 0.75]))
-    discs = field.ground
-    east = np.where(discs, field.means[:, 0] / 3.2, 0).astype(np.float32)
-    field = field_module.concatenate_fields([replace(field, uncertainty=east), things])
-    level, coarse = build.fit_coarser_level(field, grid, 5, np.random.default_rng(0))
-    n = coarse.heights.size
-    np.testing.assert_allclose(level.uncertainty[:n], coarse.centres[:, 0] / 3.2, atol=1e-6)
-    assert level.uncertainty[-2:].tolist() == [0.25, 0.75]  # the one below the ground is gone
-    under = find_underlay(level, coarse)
-    np.testing.assert_allclose(level.uncertainty[under], level.means[under, 0] / 3.2, atol=0.07)  # a coarse cell's
-
-
-def test_coarser_levels_are_fitted_to_the_colours_that_are_shipped():
-    field, grid = made.field(), made.grid()
-    directed = np.random.default_rng(2).normal(0, 0.3, (len(field), 3, 3)).astype(np.float32)
-    glossy = replace(field, sh=np.concatenate([field.sh, directed], 1))
-    for one, two in zip(*(build.render_neighbour_views(f, grid) for f in (field, glossy)), strict=True):
-        np.testing.assert_array_equal(one.image, two.image)
-
-
 def test_levels_are_fitted_while_the_exemplar_has_room():
     field, grid = made.field(), made.grid()
     made_levels = build.build_levels(field, grid, AUTO, 3, seed=0)
@@ -89,14 +42,6 @@ def test_levels_are_fitted_while_the_exemplar_has_room():
     assert scales == sorted(scales) and "tiles make it" in made_levels.stopped
     two = build.build_levels(field, grid, 2, 3, seed=0)
     assert len(two.fields) == 2 and two.wanted == 2
-
-
-def test_a_level_that_saves_nothing_is_not_made(monkeypatch):
-    field, grid = made.field(), made.grid()
-    monkeypatch.setattr(build, "MAX_SHARE", 0.1)  # a quarter is left
-    alone = build.build_levels(field, grid, AUTO, 1, seed=0)
-    assert len(alone.fields) == 1 and alone.wanted == 1 and "saves too little" in alone.stopped
-    assert len(build.build_levels(field, grid, 2, 1, seed=0).fields) == 2  # but where it is asked for
 
 
 def test_levels_that_were_written_read_back(levels, tmp_path):
@@ -135,3 +80,66 @@ def test_a_finished_field_gets_a_ground_on_its_first_coarser_level():
     inner = np.arange(coarse.heights.size).reshape(coarse.shape)[2:-2, 2:-2].ravel()
     true = made.look(*half.means[inner, :2].T)
     assert np.abs(half.base_colours[inner] - true).mean() < 0.03
+
+
+FRAME = scene_frame(exemplar=(0.0, 0.0, 3.2), extent=(-1.0, -1.0, 4.2, 4.2))
+
+
+@pytest.fixture
+def scene():
+    grid = ground.fit_ground(FRAME, np.zeros((0, 3)), spacing=0.1, max_cells=10**6, block=8, margin=0.2)
+    x, y, _ = grid.centres.T
+    grid = replace(grid, heights=(0.1 * x).reshape(grid.shape), seen=np.ones(grid.shape, bool))
+    colours = np.stack([x / 10, y / 10, 0 * x + 0.5], 1)
+    return concatenate_fields([discs.make_ground_discs(grid, colours), things(3)]), grid
+
+
+def things(n, seed=0):
+    rng = np.random.default_rng(seed)
+    return GaussianField(
+        rng.uniform(0.5, 2.5, (n, 3)).astype(np.float32),
+        np.log(rng.uniform(0.02, 0.06, (n, 3))).astype(np.float32),
+        rng.normal(size=(n, 4)).astype(np.float32),
+        rng.normal(size=n).astype(np.float32),
+        rgb_to_sh(rng.uniform(0, 1, (n, 3))),
+        rng.uniform(0, 1, n).astype(np.float32),
+        np.zeros(n, bool),
+    )
+
+
+def test_four_discs_become_one_of_their_mean(scene):
+    field, grid = merge.crop_to_blocks(*scene, 8)
+    half, coarse = merge.halve_resolution(field, grid)
+    n = coarse.heights.size
+    assert 4 * n == grid.heights.size
+    assert coarse.spacing == pytest.approx(2 * grid.spacing)
+    assert coarse.exemplar == pytest.approx(grid.exemplar)
+    # both colour and height are linear in place, so the mean of four is the value in their middle
+    np.testing.assert_allclose(half.base_colours[:n, 0], half.means[:n, 0] / 10, atol=1e-5)
+    np.testing.assert_allclose(half.means[:n, 2], 0.1 * half.means[:n, 0], atol=1e-5)
+    assert np.exp(half.log_scales).mean() > np.exp(field.log_scales).mean()
+
+
+def test_merged_moments_are_those_of_the_mixture():
+    a = things(2)
+    upright = np.tile(np.array([1, 0, 0, 0], np.float32), (2, 1))
+    a = replace(a, means=np.array([[0.1, 0, 0], [0.3, 0, 0]], np.float32), quats=upright)
+    a = replace(a, log_scales=np.full((2, 3), np.log(0.05), np.float32), opacity_logits=np.zeros(2, np.float32))
+    back = merge.merge_by_voxel(a, voxel=1.0)
+    np.testing.assert_allclose(back.means, [[0.2, 0, 0]], atol=1e-6)
+    # variance along x: 0.05^2 + 0.1^2, across: 0.05^2
+    np.testing.assert_allclose(np.diag(merge.compute_covariances(back)[0]), [0.0125, 0.0025, 0.0025], rtol=1e-4)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("change", [{"opacity_logits": -800.0}, {"log_scales": -400.0}], ids=["clear", "tiny"])
+def test_gaussians_that_weigh_nothing_are_left_out(change):
+    """Alone in their voxel they would be divided by 0."""
+    faint = things(2, seed=1)
+    faint = replace(faint, **{name: np.full_like(getattr(faint, name), value) for name, value in change.items()})
+    faint = replace(faint, means=faint.means + np.float32(10))
+    found = merge.merge_by_voxel(concatenate_fields([things(3), faint]), 0.5)
+    alone = merge.merge_by_voxel(things(3), 0.5)
+    for name, values in vars(alone).items():
+        np.testing.assert_array_equal(getattr(found, name), values)
+    assert len(merge.merge_by_voxel(faint, 0.5)) == 0

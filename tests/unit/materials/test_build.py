@@ -5,12 +5,8 @@ import pytest
 from fixtures import mixed_ground as made
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import concatenate_fields
 from dav_gswt.materials import build, extraction, store
-from dav_gswt.materials.filling import CellSources
-from dav_gswt.materials.objects import Footprint
 from dav_gswt.reconstruction import discs, top_view
-from dav_gswt.reconstruction.objects import make_blobs
 
 
 @pytest.fixture(scope="module")
@@ -34,60 +30,6 @@ def test_an_exemplar_shows_its_material_alone_by_a_disc_a_cell_uncertain_if_fill
     assert found.materials[number].filled == pytest.approx(np.mean(uncertain > 0), abs=1e-6)
 
 
-def test_objects_stand_around_their_foot_as_dense_as_on_their_material(found):
-    for each in found.objects:
-        assert np.abs(each.field.means[:, :2].mean(0)).max() < 2 * made.SPACING
-        assert each.height == pytest.approx((made.HEIGHT - 2) * made.SPACING, abs=made.SPACING)
-        assert each.radius == pytest.approx(made.RADIUS * made.SPACING, abs=3 * made.SPACING)
-    area = found.classes.shares[0] * (~found.classes.excluded).sum() * made.SPACING**2
-    assert sum(each.density for each in found.objects) == pytest.approx(len(made.SHRUBS) / area)
-
-
-def test_an_object_of_a_material_that_is_left_out_counts_on_the_ground_that_it_is_placed_on(found):
-    """A shrub on a speck of ground that has no tiles would else stand as densely as on that speck."""
-    first, *others = found.classes.footprints
-    moved = replace(found.classes, footprints=[replace(first, material=1), *others])
-    plan = build.GroundPlan(found.maps, moved, [], 4.0)
-    dense = build._extract_objects(plan, made.field(), made.grid(), {0: 0}, None)
-    assert {each.material for each in dense} == {0} and dense[0].density == dense[1].density
-
-
-def test_an_object_on_a_slope_stands_on_level_ground():
-    field, grid = made.field(mixed=False, slope=0.3), made.grid(0.3)
-    maps = build.measure_ground(field, grid)
-    rows, columns = np.mgrid[: made.CELLS, : made.CELLS]
-    r, c = made.SHRUBS[0]
-    cells = (rows - r) ** 2 + (columns - c) ** 2 <= made.RADIUS**2
-    own = extraction.extract_object(field, grid, maps, extraction.bin_standing(field, grid, maps), Footprint(cells, 0))
-    ground = own.means[own.ground]
-    assert np.abs(ground[:, 2] - extraction.LIFT * made.SPACING).max() < 0.02 * made.SPACING
-
-
-def test_what_floats_far_above_a_material_is_left_out():
-    """Low growth everywhere, and a crown high above a few cells."""
-    field, grid = made.field(mixed=False, shrubs=False), made.grid()
-    rng = np.random.default_rng(0)
-    low = np.concatenate([rng.uniform(1, 11, (400, 2)), rng.uniform(0.1, 0.4, (400, 1))], 1)
-    crown = np.concatenate([rng.uniform(3, 4, (40, 2)), rng.uniform(3, 4, (40, 1))], 1)
-    blobs = make_blobs(np.concatenate([low, crown]), np.full((440, 3), 0.3), np.full(440, 0.05))
-    maps, sources = build.measure_ground(field, grid), CellSources(*np.mgrid[: made.CELLS, : made.CELLS])
-    whole = np.ones((made.CELLS, made.CELLS), bool)
-    kept, _ = extraction.extract_exemplar(concatenate_fields([field, blobs]), grid, maps, sources, whole)
-    assert (kept.means[:, 2] > 0.05).sum() == 400
-    assert kept.means[:, 2].max() < 1
-
-
-def test_copied_ground_follows_the_slope():
-    field, grid = made.field(mixed=False, shrubs=False, slope=0.3), made.grid(0.3)
-    maps = build.measure_ground(field, grid)
-    own, sources = np.ones((made.CELLS, made.CELLS), bool), CellSources(*np.mgrid[: made.CELLS, : made.CELLS])
-    own[40:60, 90:110] = False
-    sources = CellSources(sources.rows, np.where(own, sources.columns, sources.columns - 60))
-    made_field, made_grid = extraction.extract_exemplar(field, grid, maps, sources, own)
-    for heights in (made_field.means[: made.CELLS**2, 2].reshape(made.CELLS, made.CELLS), made_grid.heights):
-        assert np.abs(heights - maps.height)[45:55, 95:105].max() < 0.35 * made.SPACING
-
-
 @pytest.mark.parametrize("has_layer", [False, True])
 def test_a_field_without_a_ground_layer_or_of_which_nothing_is_left_is_tiled_as_one(
     found, monkeypatch, caplog, has_layer
@@ -100,20 +42,6 @@ def test_a_field_without_a_ground_layer_or_of_which_nothing_is_left_is_tiled_as_
     whole = build.find_materials(field, made.grid(), 0)
     assert [each.field is field for each in whole.materials] == [True] and not whole.objects
     assert "all of the ground is tiled as one" in caplog.text
-
-
-def test_a_material_of_which_next_to_nothing_is_left_is_left_out(found, monkeypatch, caplog):
-    classes = found.classes
-    grass = classes.materials == 1
-    few = grass & (np.cumsum(grass.ravel()).reshape(grass.shape) <= 0.02 * grass.size)
-    monkeypatch.setattr(
-        build, "classify_ground", lambda *given: replace(classes, excluded=classes.excluded | grass & ~few)
-    )
-    left, whole = build.find_materials(made.field(), made.grid(), 0), classes.source(0)
-    assert [each.info.name for each in left.materials] == [classes.names[0]]
-    assert left.materials[0].info.share == pytest.approx(1)
-    assert left.tile_side == build.choose_tile_side(made.maps(), [whole])  # no smaller tiles for what is left out
-    assert f"left of {classes.names[1]}" in caplog.text and "left out" in caplog.text
 
 
 def test_even_ground_is_given_back_as_it_is():
@@ -163,39 +91,3 @@ def test_the_verdict_on_a_set_is_that_of_the_material_that_covers_most_and_names
     assert build.judge_set(judged, {"sand": 0.4, "rock": 0.6}, 0.2).grade == "no"
     assert build.judge_set(judged, {"sand": 0.7, "rock": 0.3}, 0.6).grade == "marginal"
     assert build.judge_set({"sand": judged["sand"]}, {"sand": 1.0}, 0.2).reason.startswith("1 material, 20%")
-
-
-def test_tiles_made_for_two_areas_of_a_material_have_two():
-    maps, decided = made.maps(), 0
-    for rows in range(26, 60, 5):
-        own = np.zeros(maps.known.shape, bool)
-        own[:rows] = True
-        side = build.choose_tile_side(maps, [~own, own])
-        if np.isclose(side, np.sqrt(own.sum() / 2)):  # not smaller already, by texture
-            judged = build.judge_material("rock", float(own.sum()) / side**2, 0.0)
-            assert judged.grade == "marginal" and "on 2.0 tile areas" in judged.reason
-            decided += 1
-    assert decided > 1
-    own[:] = np.arange(len(own))[:, None] < 8  # too scarce for the smallest tiles: it makes no others small
-    assert build.choose_tile_side(maps, [~own, own]) == build.choose_tile_side(maps, [~own])
-
-
-def test_a_window_is_filled_by_its_material_where_it_can_be():
-    own = np.zeros((128, 128), bool)
-    own[32:120, 20:120] = True
-    row, column, side = build.choose_window(own, 30.0)
-    assert own[row : row + side, column : column + side].mean() >= build.OWN_SHARE
-    assert side % build.BLOCK == 0
-
-
-def test_what_an_outline_leaves_out_is_excluded(found, monkeypatch):
-    kept = np.arange(made.CELLS) % 2 == 0  # columns
-
-    def halve(maps, footprints):
-        return [replace(each, cells=each.cells & kept) for each in footprints]
-
-    monkeypatch.setattr(build.outlines, "refine_footprints", halve)
-    before = build.classify_ground(found.maps)
-    refined = build.find_materials(made.field(), made.grid(), 0).classes
-    assert (refined.occupied == before.occupied & kept).all() and refined.occupied.any()
-    assert (refined.excluded == before.excluded | (before.occupied & ~kept)).all()

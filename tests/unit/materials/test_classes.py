@@ -3,10 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures import mixed_ground as made
-from scipy.ndimage import gaussian_filter
 
 from dav_gswt.materials import classes
-from dav_gswt.materials.maps import NO_CLASS, GroundMaps, GroundMasks
+from dav_gswt.materials.maps import GroundMaps, GroundMasks
 from dav_gswt.tiles.layout import Exemplar
 
 
@@ -28,13 +27,6 @@ def test_materials_are_those_of_the_ground_and_every_shrub_is_an_object_on_sand(
     assert found.shares[0] == pytest.approx(np.mean(made.true_materials() == 0), abs=0.04)
 
 
-def test_materials_that_one_start_of_many_tells_apart_are_apart(monkeypatch):
-    one, apart = np.zeros(made.true_materials().shape, int), made.true_materials()
-    for order in ([one, apart], [apart, one]):
-        monkeypatch.setattr(classes.segmentation, "list_segmentations", lambda _, order=order: [(c, []) for c in order])
-        assert classes.classify_ground(made.maps()).number == 2
-
-
 def test_shade_of_a_material_is_no_material():
     maps = made.maps(mixed=False, shrubs=False)
     colour = maps.colour.copy()
@@ -42,17 +34,6 @@ def test_shade_of_a_material_is_no_material():
     found = classes.classify_ground(replace(maps, colour=colour))
     assert found.number == 1
     assert found.excluded[:, 80:].mean() > 0.9
-
-
-def test_a_class_of_which_a_strip_is_the_wide_part_is_no_material():
-    """A road and what looks like it beside it, in rests too narrow for patches."""
-    columns = np.broadcast_to(np.arange(128), (128, 128))
-    road, rests = np.abs(columns - 60) < 9, (columns % 16 == 0) & (columns > 90)
-    colour = np.where((road | rests)[..., None], (0.7, 0.6, 0.5), (0.3, 0.4, 0.2))
-    labels = (road | rests).astype(int)
-    assert classes.choose_materials(labels, colour, np.ones((128, 128))) == [0, 1]
-    apart = np.where(road, NO_CLASS, labels)
-    assert classes.choose_materials(apart, colour, np.ones((128, 128))) == [0]
 
 
 def test_darker_ground_of_coarser_grain_is_a_material():
@@ -113,13 +94,6 @@ def test_things_are_objects_at_any_resolution_and_keep_no_ground_around_them(gro
     assert (found.excluded | found.occupied).mean() < 2 * covered
 
 
-def test_wide_rows_are_texture_or_materials_but_not_left_out():
-    maps, _ = things_on((0.35, 0.27, 0.2), made.GRASS, number=0)
-    colour = maps.colour.copy()
-    colour[:, np.arange(128) % 44 < 22] = made.GRASS
-    assert classes.classify_ground(replace(maps, colour=colour)).excluded.mean() < 0.2
-
-
 def test_named_materials_are_taken_as_they_are_and_ground_without_a_name_or_a_photo_is_excluded():
     maps = made.maps(mixed=False, shrubs=False)
     left, top, known = (np.zeros(maps.known.shape, bool) for _ in range(3))
@@ -133,15 +107,3 @@ def test_named_materials_are_taken_as_they_are_and_ground_without_a_name_or_a_ph
     assert found.excluded[:, 40:].all() and not found.excluded[20:, :40].any()
     found = classes.classify_ground(made.maps(shrubs=False), GroundMasks({}, top))  # materials are found beside it
     assert found.excluded[100:].all() and found.number == 2
-
-
-def test_a_thing_in_dense_growth_stays_in_it():
-    """One material of grass that rises by cells: a tuft more is no landmark."""
-    maps, rng = made.maps(mixed=False, shrubs=False), np.random.default_rng(0)
-    blades = gaussian_filter(rng.normal(size=maps.known.shape), 1.5)
-    colour, surface = maps.colour.copy(), 8 * made.SPACING * blades
-    colour[60:68, 60:68] -= 0.3
-    for rough in (True, False):
-        up = surface if rough else 0 * surface
-        found = classes.classify_ground(replace(maps, colour=colour, surface=up))
-        assert (found.footprints == [] and not found.excluded.any()) == rough

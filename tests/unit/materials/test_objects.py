@@ -1,8 +1,14 @@
+"""What is an object and what is texture, and the outlines of objects."""
+
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from dav_gswt.materials import objects
-from dav_gswt.materials.maps import Surroundings
+from dav_gswt.materials import objects, outlines
+from dav_gswt.materials.maps import GroundMaps, Surroundings
+from dav_gswt.materials.objects import Footprint
+from dav_gswt.tiles.layout import Exemplar
 
 M = 120
 
@@ -70,25 +76,53 @@ def test_a_stone_in_a_field_of_stones_is_texture(rough, alike, found):
     assert len(footprints) == found and not excluded.any()
 
 
-def test_things_that_touch_are_split():
-    rows, columns = np.mgrid[:M, :M]
-    middles = [(60, 45), (60, 56), (60, 67), (71, 67), (82, 67)]
-    discs = [(rows - r) ** 2 + (columns - c) ** 2 <= 36 for r, c in middles]
-    things = objects.split_things(np.any(discs, 0))
-    assert len(things) == len(discs)
-    assert all(any((thing & disc).sum() > 0.8 * disc.sum() for disc in discs) for thing in things)
-
-
 def test_contact_shadow_belongs_to_what_casts_it():
     thing, shadow = box(50, 60, 50, 60), box(52, 58, 61, 64)
     footprints, excluded = find(thing | shadow, standing=[thing])
     assert len(footprints) == 1 and footprints[0].cells[55, 62] and not excluded.any()
 
 
-@pytest.mark.parametrize(
-    ("ratio", "shaded"), [((0.3, 0.35, 0.45), True), ((0.3, 0.3, 0.2), False), ((0.9, 0.9, 1.0), False)]
-)
-def test_shade_is_darker_and_bluer(ratio, shaded):
-    light = np.array([0.5, 0.4, 0.3])
-    assert objects.is_shade(light * ratio, light) == shaded
-    np.testing.assert_allclose(objects.linear_light(np.full((2, 3), 0.5)), 0.21404114, rtol=1e-6)
+SIDE = 64
+
+
+def disc(row, column, radius):
+    rows, columns = np.mgrid[:SIDE, :SIDE]
+    return np.hypot(rows - row, columns - column) < radius
+
+
+SHRUB, STONE = disc(20, 22, 8), disc(20, 36, 5)
+
+
+@pytest.fixture
+def maps():
+    """Sand with a green shrub and a grey stone that are a little higher, under noise."""
+    noise = np.random.default_rng(0).normal(0, 0.02, (SIDE, SIDE, 3))
+    colour = np.where(SHRUB[..., None], [0.2, 0.4, 0.15], [0.8, 0.7, 0.5])
+    colour = np.clip(np.where(STONE[..., None], [0.4, 0.4, 0.42], colour) + noise, 0, 1)
+    height = 0.3 * (SHRUB | STONE)
+    flat, place = np.zeros((SIDE, SIDE)), Exemplar(0.0, 0.0, 0.1, SIDE)
+    return GroundMaps(colour, flat, height, flat, np.ones((SIDE, SIDE), bool), place)
+
+
+def iou(one, two):
+    return (one & two).sum() / (one | two).sum()
+
+
+@pytest.mark.parametrize("before", [disc(20, 22, 5.5), disc(20, 22, 10), disc(22, 20, 8)])
+def test_a_cut_finds_the_outline(maps, before):
+    (found,) = outlines.refine_footprints(maps, [Footprint(before, 1)])
+    assert iou(found.cells, SHRUB) > 0.9 > iou(before, SHRUB) and found.material == 1
+
+
+def test_footprints_never_overlap_and_keep_their_order(maps):
+    first, second = Footprint(disc(20, 22, 7), 0), Footprint(disc(20, 36, 4), 1)
+    found = outlines.refine_footprints(maps, [first, second])
+    assert not (found[0].cells & found[1].cells).any() and [each.material for each in found] == [0, 1]
+    touching = [Footprint(disc(20, 22, 8), 0), Footprint(disc(20, 33, 4), 1)]
+    found = outlines.refine_footprints(replace(maps, colour=np.where(maps.colour < 0.6, 0.3, 0.8)), touching)
+    assert not (found[0].cells & found[1].cells).any()
+
+
+@pytest.mark.parametrize("other", [disc(50, 50, 6), disc(20, 22, 18), disc(20, 22, 3)])
+def test_an_outline_that_disagrees_is_not_accepted(maps, other):
+    assert outlines.accept_outline(disc(20, 22, 7), other, maps.known) is None

@@ -55,24 +55,6 @@ def cells_of(place, square):
     return tuple(slice(k, k + round(square.side / place.spacing)) for k in first)
 
 
-def test_cells_are_as_narrow_as_the_preset_asks_for_or_as_the_gaussians_allow(plan, views):
-    width = 8.0 / views[0].camera.fx
-    fine = windows.choose_windows(plan, views, replace(SETTINGS, max_gaussians=10**6))
-    assert fine.spacing == pytest.approx(SETTINGS.spacing * width, rel=0.02)
-    coarse = windows.choose_windows(plan, views, replace(SETTINGS, max_gaussians=2000))
-    area = sum(each.square.side**2 for each in coarse.windows)
-    assert area / coarse.spacing**2 <= 2000 and coarse.spacing > fine.spacing
-    assert sum(each.square.side**2 for each in fine.windows) >= area
-
-
-def test_a_window_lies_where_pixels_are_finest(views):
-    sand = build.plan_ground(made.maps(mixed=False, shrubs=False), True)
-    near = [photo(x, y, 3.0) for x in (9.0, 10.0) for y in (9.0, 10.0, 10.5)]
-    focus = windows.choose_windows(sand, [*views, *near], replace(SETTINGS, max_gaussians=5000))
-    (window,) = focus.windows
-    assert window.square.side < SIDE and window.square.west > 0 and window.square.south > 0
-
-
 def test_a_material_and_objects_are_cut_from_fitted_windows(plan, tmp_path):
     field, grid = made.field(), made.grid()
     whole = build.FocusedFields([(field, grid)], [True], plan.maps)
@@ -118,15 +100,6 @@ def test_sharper_maps_have_the_colours_of_the_photos():
 def maps_of_truth(cells):
     at = (np.arange(cells) * made.CELLS / cells).astype(int)
     return made.true_materials()[np.ix_(at, at)] == 1
-
-
-def test_windows_that_overlap_are_one_and_far_things_have_their_own():
-    box = windows._Box
-    joined, tiled = windows._join_boxes(
-        [box(0, 0, 40), box(4, 4, 40)], [box(10, 10, 5), box(80, 80, 6), box(84, 84, 6)]
-    )
-    assert tiled == 1 and [each.side for each in joined] == [44, 6, 6]
-    assert [each.side for each in windows._merge_boxes([box(80, 80, 6), box(81, 82, 6)])] == [8]
 
 
 def test_windows_take_the_uncertainty_of_the_draft_that_a_prior_scored(plan):

@@ -1,12 +1,16 @@
-"""Focal lengths, positions and times from EXIF, by hand, and names of pictures."""
+"""Focal lengths, positions and times from EXIF, the sun by them, names of pictures, photos held upright."""
 
 import struct
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from fixtures import photos as synth
 
-from dav_gswt.photos.photo_files import name_pictures, read_capture_time, read_focal_length, read_gps_position
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.photos.lenses import undistort_scene_photo
+from dav_gswt.photos.photo_files import find_sun, name_pictures, read_capture_time, read_focal_length, read_gps_position
 
 
 def photo(path, width, height, **tags):
@@ -51,16 +55,6 @@ def test_the_pixel_pitch_counts_before_the_equivalent(tmp_path, order, pitch):
     entries = {0x920A: (5, "II", (254, 100)), 0xA20E: pitch, 0xA210: (3, "H", (2,)), 0xA405: (3, "H", (99,))}
     # 2.54 mm at 10000 pixels an inch.
     assert read_focal_length(with_block(tmp_path / "a.jpg", entries, order)) == pytest.approx(1000)
-
-
-def test_the_tagged_width_of_an_upright_photo_may_be_its_shorter_side(tmp_path):
-    """Programs that turn photos write the new width and length into the tags; the pitch is that of the longer side."""
-    tags = {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (20000, 2)), 0xA210: (3, "H", (2,))}
-    whole = with_block(tmp_path / "a.jpg", tags | {0xA002: (4, "I", (400,)), 0xA003: (4, "I", (300,))})
-    turned = with_block(tmp_path / "b.jpg", tags | {0xA002: (4, "I", (300,)), 0xA003: (4, "I", (400,))})
-    assert read_focal_length(whole) == read_focal_length(turned) == pytest.approx(1000)
-    entries = {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1)), 0xA002: (4, "I", (800,))}
-    assert read_focal_length(with_block(tmp_path / "a.jpg", entries)) == pytest.approx(500)
 
 
 def test_a_focal_length_that_cannot_be_is_passed_over(tmp_path):
@@ -119,3 +113,82 @@ def test_a_time_is_read_where_there_is_one(tmp_path):
 )
 def test_every_photo_has_a_name_of_its_own_in_one_word(names, pictures):
     assert name_pictures(names) == pictures
+
+
+GOLDEN = Georeference(39.742476, -105.1786, 1830.0, 0.0, metres_per_unit=1.0)  # of test_sun, at 19:30:30 UTC
+SUN = pytest.approx((39.87, 194.34), abs=0.02)
+UNSET_GPS = {"GPSDateStamp": "1980:01:06", "GPSTimeStamp": (0.0, 0.0, 0.0)}
+NO_GPS = {"GPSDateStamp": "2003:10:17", "GPSTimeStamp": (99.0, 0.0, 0.0)}
+
+
+def shot(path, **tags):
+    """A JPEG with tags of EXIF, or of GPS where a name begins so."""
+    spec = oiio.ImageSpec(4, 3, 3, oiio.UINT8)
+    for key, value in tags.items():
+        name = key.replace("GPS", "GPS:") if key.startswith("GPS") else f"Exif:{key}"
+        kind = "string" if isinstance(value, str) else "float[3]"
+        spec.attribute(name, oiio.TypeDesc(kind), value)
+    file = oiio.ImageOutput.create(str(path))
+    assert file.open(str(path), spec) and file.write_image(np.zeros((3, 4, 3), np.uint8))
+    file.close()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("tags", "clock", "zone"),
+    [
+        ({"GPSDateStamp": "2003:10:17", "GPSTimeStamp": (19.0, 30.0, 30.0)}, "gps", 0),
+        ({"DateTimeOriginal": "2003:10:18 01:00:30", "OffsetTimeOriginal": "+05:30"}, "offset", 5.5),
+        ({"DateTimeOriginal": "2003:10:17 12:30:30"}, "assumed", -7),
+        ({"DateTimeOriginal": "2003:10:17 12:30:30", "OffsetTimeOriginal": "   :  "}, "assumed", -7),
+        ({"DateTimeOriginal": "2003:10:17 12:30:30"} | NO_GPS, "assumed", -7),
+        ({"DateTimeOriginal": "2003:10:17 12:30:30"} | UNSET_GPS, "assumed", -7),
+    ],
+    ids=["GPS", "with a zone", "without a zone", "a blank zone", "no hour of GPS", "GPS before its first fix"],
+)
+def test_the_time_is_by_gps_or_local_in_the_zone_that_exif_or_else_the_longitude_gives(tmp_path, tags, clock, zone):
+    wrong = {"DateTimeOriginal": "2003:10:17 03:00:00"}  # a camera's clock counts after GPS
+    sun = find_sun([shot(tmp_path / "a.jpg", **(wrong | tags))], GOLDEN)
+    assert sun is not None and (sun.elevation, sun.azimuth) == SUN
+    assert (sun.clock, sun.zone, sun.time, sun.hours) == (clock, zone, "2003-10-17T19:30:30Z", 0)
+    assert sun.describe().startswith("the sun stood 40 degrees high in the south, from the photos' ")
+    assert ("assumed zone UTC-7" in sun.describe()) == (clock == "assumed")
+
+
+def test_of_photos_hours_apart_the_middle_one_counts(tmp_path, caplog):
+    caplog.set_level("INFO")
+    hours = (9, 12, 15, 12)
+    paths = [shot(tmp_path / f"{k}.jpg", DateTimeOriginal=f"2003:10:17 {h:02}:30:30") for k, h in enumerate(hours)]
+    paths.append(shot(tmp_path / "gps.jpg", GPSDateStamp="2003:10:17", GPSTimeStamp=(1.0, 0.0, 0.0)))
+    sun = find_sun(paths, GOLDEN)
+    assert sun is not None and (sun.elevation, sun.azimuth, sun.hours) == (*SUN.expected, 6.0)
+    assert "taken over 6 hours the middle one counts" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("tags", "said"),
+    [
+        ({}, "no photo says when"),
+        ({"DateTimeOriginal": "1980:01:01 12:00:00"}, "no photo says when"),
+        ({"DateTimeOriginal": "0001:01:01 00:00:00"}, "no photo says when"),
+        ({"DateTimeOriginal": "9999:12:31 23:59:59"}, "no photo says when"),
+        ({"DateTimeOriginal": "9999:12:31 23:59:59", "OffsetTimeOriginal": "-05:00"}, "no photo says when"),
+        ({"GPSDateStamp": "9999:12:31", "GPSTimeStamp": (23.0, 59.0, 59.0)}, "no photo says when"),
+        (NO_GPS, "no photo says when"),
+        ({"DateTimeOriginal": "2003:10:17 23:00:00"}, "at 2003-10-18T06:00:00Z the sun stood -"),
+    ],
+)
+def test_a_time_that_cannot_be_tells_no_sun(tmp_path, caplog, tags, said):
+    caplog.set_level("INFO")
+    assert find_sun([shot(tmp_path / "a.jpg", **tags)], GOLDEN) is None
+    assert said in caplog.text and len(caplog.records) == 1
+
+
+def test_a_photo_held_upright_is_turned_to_the_shape_of_the_sensor(tmp_path):
+    camera = synth.camera((0, 0, 1))
+    photo = np.random.default_rng(0).random((synth.HEIGHT, synth.WIDTH, 3)).astype(np.float32)
+    upright = np.ascontiguousarray(np.rot90(photo, -1))  # as EXIF's orientation 6 shows it
+    assert np.array_equal(undistort_scene_photo(upright, tmp_path, camera), photo)
+    assert np.array_equal(undistort_scene_photo(photo, tmp_path, camera), photo)
+    with pytest.raises(InputError, match="uncropped$"):
+        undistort_scene_photo(upright[:200], tmp_path, camera)

@@ -1,19 +1,24 @@
-"""Sparse models: storing, moving, and points from a part of the images alone."""
+"""Sparse models: storing, moving, points from a part of the images alone; start views, pool and test views."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
 from fixtures import photos as synth
+from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
+from dav_gswt.photos import view_split
 from dav_gswt.photos.colmap_model import (
     colour_points,
-    group_images,
     read_colmap_model,
     triangulate_model,
     write_colmap_model,
+)
+from dav_gswt.photos.view_split import (
+    measure_visible_share,
+    split_views,
 )
 
 
@@ -28,12 +33,6 @@ def flown(rng):
     return synth.model(synth.flight(3, 3), synth.plain(300, 0.7, rng, relief=0.05))
 
 
-def test_exact_rays_give_the_points_back(flown):
-    part = triangulate_model(flown, flown.names)
-    twice = np.bincount(flown.point_of, minlength=len(flown.points)) >= 2
-    assert part.points == pytest.approx(flown.points[twice], abs=1e-9)  # conditioning: 1 / sin^2 of the least angle
-
-
 def test_points_do_not_change_when_other_images_change(flown, rng):
     """The leak test: whatever images outside the list saw, and what all images made of it, leaves no trace."""
     names = flown.names[:4]
@@ -45,44 +44,12 @@ def test_points_do_not_change_when_other_images_change(flown, rng):
     assert np.array_equal(one.points, two.points) and np.array_equal(one.colours, two.colours)
 
 
-def test_wrong_matches_are_left_out(flown):
-    twice = np.flatnonzero(np.bincount(flown.point_of, minlength=len(flown.points)) >= 3)
-    pixels = flown.pixels.copy()
-    pixels[np.flatnonzero(flown.point_of == twice[0])[0]] += [40, 0]
-    good = triangulate_model(flown, flown.names)
-    assert len(triangulate_model(replace(flown, pixels=pixels), flown.names).points) == len(good.points) - 1
-
-
-def test_rays_that_are_nearly_parallel_are_left_out():
-    near = [synth.camera((x, 0, 1), (0, 0, 0)) for x in (0.0, 0.02)]  # 1.1 degrees apart seen from the point
-    wide = [synth.camera((x, 0, 1), (0, 0, 0)) for x in (0.0, 0.03)]  # 1.7 degrees
-    for cameras, count in ((near, 0), (wide, 1)):
-        pair = synth.model(cameras, np.zeros((1, 3)))
-        assert len(triangulate_model(pair, pair.names).points) == count
-
-
 def test_colours_come_from_the_named_images_alone(flown, tmp_path):
     for i, name in enumerate(flown.names):
         image_files.write_png(tmp_path / name, np.full((synth.HEIGHT, synth.WIDTH, 3), 0.2 if i < 3 else 1.0))
     part = triangulate_model(flown, flown.names[:3])
     colours = colour_points(part, [tmp_path / name for name in part.names])
     assert colours == pytest.approx(np.full(colours.shape, 0.2), abs=1e-6)
-
-
-def test_images_are_grouped_by_the_points_that_three_of_them_see(flown):
-    """Images 0 to 2 and 3 to 5; four points tie the groups, forty others are seen by one image of each."""
-    seen = [(range(3), 20), (range(3, 6), 20), ((0, 1, 3), 3), ((2, 4, 5), 1), ((2, 3), 40)]
-    rows = [(images, i) for images, count in seen for i in range(count)]
-    image_of = np.array([i for images, _ in rows for i in images])
-    point_of = np.repeat(np.arange(len(rows)), [len(images) for images, _ in rows])
-    n, m = len(rows), len(image_of)
-    points = {"points": np.zeros((n, 3)), "colours": np.zeros((n, 3), np.float32), "pixels": np.zeros((m, 2))}
-    images = {"names": flown.names[:6], "cameras": flown.cameras[:6]}
-    model = replace(flown, **images, **points, point_of=point_of, image_of=image_of)
-    group, ties = group_images(model, 5)
-    assert group.tolist() == [0, 0, 0, 1, 1, 1] and ties[0, 1] == 4
-    assert group_images(model, 4)[0].tolist() == [0] * 6  # no two images of the groups share four
-    assert group_images(model, 50)[0].tolist() == [*range(6)]
 
 
 def test_a_model_comes_back_from_disk_as_it_was(flown, tmp_path):
@@ -105,3 +72,71 @@ def test_a_missing_or_damaged_model_is_refused_by_name(flown, tmp_path):
     (tmp_path / "images.bin").write_bytes((tmp_path / "images.bin").read_bytes()[:100])
     with pytest.raises(InputError, match=tmp_path.name):
         read_colmap_model(tmp_path)
+
+
+FRAME = scene_frame(exemplar=(-0.6, -0.6, 1.2))
+
+
+@pytest.fixture
+def thirty():
+    """Thirty photos in six flight lines of five."""
+    return synth.model(synth.flight(6, 5), synth.plain(1500, 1.2, np.random.default_rng(1)))
+
+
+def first(model, count):
+    """The model of the first photos of a model."""
+    keep = model.image_of < count
+    return synth.model(list(model.cameras[:count]), model.points) if keep.any() else model
+
+
+def split(model, seed=0, start=8, frame=FRAME, test=None):
+    return split_views(model, frame, np.random.default_rng(seed), start, test)
+
+
+@pytest.mark.parametrize(
+    "photos, start, pool, test",
+    [(3, 3, 0, 0), (6, 6, 0, 0), (11, 8, 3, 0), (12, 8, 3, 1), (20, 8, 10, 2), (30, 8, 19, 3)],
+)
+def test_every_photo_has_one_part_of_its_size(thirty, photos, start, pool, test):
+    model = first(thirty, photos)
+    parts = split(model)
+    assert (len(parts.start), len(parts.pool), len(parts.test)) == (start, pool, test)
+    assert sorted(parts.start + parts.pool + parts.test) == sorted(model.names)
+
+
+def test_all_photos_start_and_as_many_test_as_are_asked_for(thirty):
+    parts = split(first(thirty, 8), start=None, test=2)
+    assert (len(parts.start), len(parts.pool), len(parts.test)) == (6, 0, 2)
+    assert len(split(thirty, start=None, test=0).start) == 30
+    with pytest.raises(InputError, match="test: 7 of 8 photos.*2 must be left"):
+        split(first(thirty, 8), test=7)
+
+
+def test_test_views_are_the_same_for_every_seed_and_start_views_are_not(thirty):
+    parts = [split(thirty, seed) for seed in range(5)]
+    assert all(p.test == parts[0].test for p in parts)
+    assert len({tuple(p.start) for p in parts}) > 1
+    assert split(thirty, 3) == split(thirty, 3)
+
+
+def test_photos_of_other_ground_take_no_part_and_are_counted(thirty, caplog):
+    """An exemplar in one corner: photos of the opposite corner do not see it."""
+    frame = scene_frame(exemplar=(-0.9, -0.9, 0.6))
+    parts = split(thirty, start=4, frame=frame)
+    named = [name for part in astuple(parts) for name in part]
+    assert 6 <= len(named) < 30
+    assert caplog.messages == [
+        f"{30 - len(named)} of 30 photos show little of the ground that counts, and take no part"
+    ]
+    ground = (-0.9, -0.9, -0.3, -0.3)
+    assert all(measure_visible_share(thirty.camera(n), ground) >= view_split.MIN_VISIBLE_SHARE for n in named)
+
+
+def test_the_test_views_that_ground_json_names_are_taken_or_refused(thirty):
+    parts = split(thirty, frame=replace(FRAME, test=("003.png", "017.png")))
+    assert parts.test == ("003.png", "017.png")
+    assert not set(parts.test) & set(parts.start + parts.pool)
+    with pytest.raises(InputError, match="nowhere.png"):
+        split(thirty, frame=replace(FRAME, test=("nowhere.png",)))
+    with pytest.raises(InputError, match="every image is a test view"):
+        split(thirty, frame=replace(FRAME, test=thirty.names))

@@ -1,13 +1,12 @@
 """What somebody brings is recognised by its content."""
 
-import shutil
 import zipfile
 
 import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.images.file_kinds import detect_kind
-from dav_gswt.photos.recognition import name_scene, recognize_input
+from dav_gswt.photos.recognition import recognize_input
 
 JPEG, HEIC = b"\xff\xd8\xff\xe0" + b"0" * 40, b"\0\0\0\x18ftypheic" + b"0" * 40
 MP4, GAUSSIANS = b"\0\0\0\x18ftypisom" + b"0" * 40, b"ply\nformat binary_little_endian 1.0\nproperty float f_dc_0\n"
@@ -104,29 +103,6 @@ def test_a_point_cloud_beside_photos_is_no_splat(tmp_path):
     assert recognize_input([folder]).about == "3 photos"
     with pytest.raises(InputError, match="a mesh or point cloud"):
         recognize_input([folder / "cloud.ply"])
-
-
-def test_names_of_scenes(tmp_path):
-    for given, name in {"Sand pit.d": "Sand_pit_d", "2024": "scene_2024", "Düne": "D_ne", "---": "terrain"}.items():
-        shutil.rmtree(tmp_path / given, ignore_errors=True)
-        (tmp_path / given).mkdir()
-        assert name_scene(tmp_path / given) == name
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "kind"),
-    [
-        ("a.spz", b"\x1f\x8b\x08" + b"0" * 40, ".spz"),
-        ("a.compressed.ply", b"ply\nelement vertex 1\nproperty uint packed_position\n", ".ply"),
-        ("a.ply", b"ply\nelement vertex 1\nproperty double f_dc_0\n", ".ply"),
-    ],
-)
-def test_splats_of_every_kind_that_is_read(tmp_path, name, content, kind):
-    (tmp_path / name).write_bytes(content)
-    found = recognize_input([tmp_path / name])
-    assert (
-        found.entry == {"kind": "field", "field": str(tmp_path / name)} and found.about == f"a finished splat ({kind})"
-    )
 
 
 def test_splats_that_are_not_read_are_named_with_what_converts_them(tmp_path):

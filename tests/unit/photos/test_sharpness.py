@@ -6,7 +6,7 @@ from fixtures import photos as synth
 from scipy.ndimage import gaussian_filter, uniform_filter1d
 
 from dav_gswt.images import image_files
-from dav_gswt.photos.sharpness import find_blurred
+from dav_gswt.photos.photo_files import find_blurred
 
 
 def smear(image, axis):

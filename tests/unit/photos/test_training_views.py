@@ -10,7 +10,7 @@ from fixtures import ground as made
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos.training_views import ArrayFile, mask_outside_ground, read_training_view, release_pages
+from dav_gswt.photos.training_views import ArrayFile, read_training_view, release_pages
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.fitting.plan import FitSettings
 
@@ -39,17 +39,6 @@ def test_a_photo_is_shrunk_with_its_camera_and_mask_and_never_enlarged(tmp_path)
         read_training_view("a.png", replace(camera, width=5), tmp_path / "a.png", 99)
 
 
-def test_ground_outside_of_a_rectangle_does_not_count():
-    view = made.photos(1)[0]
-    origin, step = view.camera.rays()
-    at = origin - origin[..., 2:] / step[..., 2:] * step
-    x, y = at[..., 0], at[..., 1]
-    west, east, south, north = np.median(x), x.max() + 1, y.min() - 1, np.quantile(y, 0.8)
-    inside = (step[..., 2] < 0) & (x > west) & (y < north)
-    weight = mask_outside_ground(view, west, south, east, north).weight
-    assert 0.2 < weight.mean() < 0.6 and np.array_equal(weight, view.weight * inside)
-
-
 def test_a_fit_is_the_same_from_files_to_the_bit(filed):
     settings = FitSettings(fit_size=48, spacing=1.0, max_gaussians=2000, steps=6)
     none = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
@@ -64,26 +53,6 @@ def test_a_fit_is_the_same_from_files_to_the_bit(filed):
 @pytest.fixture
 def arrays(tmp_path):
     return ArrayFile(tmp_path / "made")
-
-
-@pytest.mark.parametrize(
-    "array",
-    [
-        np.random.default_rng(0).normal(size=(7, 5, 3)).astype(np.float32),
-        np.zeros((0, 3), np.float32),
-        np.arange(12).reshape(3, 4).T,
-        np.array([True, False]),
-    ],
-)
-def test_an_array_of_any_kind_comes_back_as_it_was(arrays, array):
-    stored = arrays.store(array)
-    assert stored.dtype == array.dtype and np.array_equal(stored, array)
-    assert not stored.size or not stored.flags.writeable
-
-
-def test_many_arrays_may_be_stored_at_once(arrays):
-    stored = [arrays.store(np.full(3, i)) for i in range(1500)]  # more than the usual limit of open files
-    assert all((array == i).all() for i, array in enumerate(stored))
 
 
 def test_released_pages_take_no_memory_and_read_as_before(arrays):

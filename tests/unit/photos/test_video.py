@@ -10,7 +10,7 @@ from PIL import Image
 
 from dav_gswt.errors import InputError
 from dav_gswt.photos import video as tested
-from dav_gswt.photos.video import MotionMeter, choose_frames, measure_detail, measure_frames, write_frames
+from dav_gswt.photos.video import write_frames
 
 
 @pytest.fixture(scope="module")
@@ -57,20 +57,6 @@ def test_a_way_too_long_for_the_number_of_frames_is_cut_into_equal_stretches(fil
     assert "the way is long: 6 frames overlap by" in caplog.text
 
 
-def test_shifts_add_up_to_the_way(ground):
-    """15 frames, each moved by 12 and 6 pixels: 14 steps of (12/160, 6/96) pictures."""
-    meter = MotionMeter()
-    frames = videos.film([(12 * i, 6 * i) for i in range(15)], size=(160, 96), ground=ground)
-    way = [meter.follow(frame.astype(np.float32)) for frame in frames]
-    assert way[0] == 0 and way[-1] == pytest.approx(14 * np.hypot(12 / 160, 6 / 96), rel=0.1)
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-def test_blur_along_any_axis_takes_the_detail(ground, axis):
-    smeared = np.mean([np.roll(ground, s, axis)[20:116, 20:180] for s in range(-4, 5)], axis=0)
-    assert measure_detail(smeared) < 0.25 * measure_detail(ground[:96, :160])
-
-
 def test_the_number_of_threads_changes_no_byte(filmed, tmp_path):
     video = filmed()
     one, two, three = (
@@ -84,11 +70,6 @@ def test_a_trembling_camera_on_one_spot_is_refused(filmed, tmp_path):
     with pytest.raises(InputError, match="walk.mp4: the camera stands still.*walk or fly along"):
         write_frames(filmed(places), tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-def test_slow_motion_counts(filmed, tmp_path):
-    """A pixel in two frames: less than the motion between neighbours can show."""
-    assert len(write_frames(filmed([(i // 2, 0) for i in range(400)]), tmp_path / "out")) >= 4
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -167,29 +148,6 @@ def test_hdr_is_shown_as_bright_as_it_was(filmed, tmp_path):
     assert b[middle].mean() == pytest.approx(0.598 * 255, abs=4)
 
 
-def test_frames_at_a_variable_rate_are_told_apart_by_the_way_not_by_time(filmed, tmp_path):
-    """Half of the frames are shown for a second each."""
-    times = np.cumsum([67] * 30 + [1000] * 30).tolist()
-    steady, varied = (
-        write_frames(filmed(), tmp_path / "a"),
-        write_frames(filmed(name="v.mp4", times=times), tmp_path / "b"),
-    )
-    assert len(steady) == len(varied)
-    assert np.abs(np.subtract(numbers(steady), numbers(varied))).max() <= 2  # the encoder spends other bits
-
-
 def test_blur_that_leaves_a_gap_is_said_with_its_time(filmed, tmp_path, caplog):
     write_frames(filmed(videos.walk(120), blurred=range(30, 90)), tmp_path / "out")
     assert "walk.mp4: is blurred from 2 s to 6 s" in caplog.text
-
-
-def test_fast_cameras_are_measured_15_times_a_second(filmed):
-    measures = measure_frames(filmed(times=[8 * i for i in range(60)]))  # 125 a second
-    assert len(measures.number) == pytest.approx(60 * 8 / 1000 * 15, abs=2)
-
-
-def test_of_each_stretch_the_sharpest_frame_is_taken():
-    moved = np.array([0.0, 0.05, 0.1, 0.2, 0.25, 0.4])
-    detail = np.array([1.0, 3.0, 2.0, 0.1, 0.2, 2.0])
-    measures = tested.FrameMeasures(np.arange(6), np.arange(6.0), detail, moved)
-    assert choose_frames(measures).tolist() == [1, 5]

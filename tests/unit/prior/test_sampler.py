@@ -72,16 +72,6 @@ def test_one_mask_holds_for_a_whole_trajectory(network, layers):
     assert layers[0].mask is None and layers[0].p == 0.0  # nothing is left for the next caller
 
 
-def test_noises_of_their_own_make_samples_differ_without_dropout_and_the_first_is_the_common_one(network, layers):
-    own, common = drawn(network, layers, p=0.0, common=False), drawn(network, layers, p=0.0)
-    assert own.shape == common.shape
-    np.testing.assert_allclose(own[:, 0], common[:, 0], atol=1e-5)
-    apart = np.abs(own[:, :, None] - own[:, None, :]).mean((3, 4, 5))
-    assert (apart[:, ~np.eye(4, dtype=bool)] > 0.1).all()
-    np.testing.assert_allclose(drawn(network, layers, m=2, p=0.0, common=False), own[:, :2], atol=1e-5)
-    assert not np.allclose(drawn(network, layers, p=0.2, common=False), own, atol=1e-3)
-
-
 @pytest.mark.parametrize("bad", [{"m": 0}, {"p": 1.0}, {"p": -0.1}, {"p": float("nan")}, {"steps": 0}])
 def test_what_makes_no_sense_is_refused_by_name(network, layers, bad):
     with pytest.raises(ValueError, match="m is 0|p_drop is|steps is 0"):

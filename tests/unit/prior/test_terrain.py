@@ -9,10 +9,11 @@ from fixtures.prior_weights import write_weights
 from safetensors.torch import load_file, save_file
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.cameras import pinhole
 from dav_gswt.prior import weights
-from dav_gswt.prior.interface import Condition, Prior
+from dav_gswt.prior.interface import Condition, Prior, crop_camera, crop_image
 from dav_gswt.prior.networks import LATENT, SIZE, Network
-from dav_gswt.prior.terrain import TerrainPrior, average_opacity, pack_photo, pack_render
+from dav_gswt.prior.terrain import TerrainPrior
 
 
 @pytest.fixture(scope="module")
@@ -44,15 +45,6 @@ def test_without_valid_pixels_the_render_has_no_influence(prior):
     found = [prior.sample(c, 1, 0.0, 2, 0, known=nothing) for c in (one, two)]
     np.testing.assert_allclose(*found, atol=1e-5)
     assert not np.allclose(prior.sample(one, 1, 0.0, 2, 0), prior.sample(two, 1, 0.0, 2, 0))
-
-
-def test_planes_are_colour_opacity_and_half_the_inverse_depth():
-    given = condition()
-    np.testing.assert_array_equal(pack_render(given)[:, :3], given.colour.transpose(0, 3, 1, 2))
-    np.testing.assert_array_equal(pack_render(given)[:, 3:], np.stack([given.alpha, 0.5 * given.inverse_depth], 1))
-    np.testing.assert_array_equal(pack_photo(given.photo)[:, 2:, 0, 0], [[v, 1, 0] for v in given.photo[:, 0, 0, 2]])
-    cells = given.alpha.reshape(3, 16, 4, 16, 4).mean((2, 4))
-    np.testing.assert_allclose(average_opacity(torch.from_numpy(given.alpha))[:, 0], cells, atol=1e-6)
 
 
 def test_a_condition_that_is_not_finite_is_refused_by_name(prior):
@@ -91,3 +83,19 @@ def test_files_that_are_no_weights_are_refused(file, tmp_path, monkeypatch):
     monkeypatch.setattr(weights, "MOST_BYTES", 1000)
     with pytest.raises(InputError, match="are not the weights of this prior"):
         TerrainPrior.open(path)
+
+
+@pytest.mark.parametrize("width, height", [(16, 10), (10, 17), (12, 12)])
+def test_the_square_of_a_picture_is_what_the_square_s_camera_sees(width, height):
+    camera = pinhole([0.0, -3.0, 4.0], [0.2, 0.1, 0.0], width, height, 60.0)
+    columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    image = np.stack([columns, rows, 0 * rows], -1).astype(np.float32)  # each pixel holds its own place
+    square, cropped = crop_image(image), crop_camera(camera)
+    side = min(width, height)
+    assert square.shape == (side, side, 3) and (cropped.width, cropped.height) == (side, side)
+    point = camera.centre + 2.0 * camera.forward
+    (before, after), _ = zip(*(c.project(point[None]) for c in (camera, cropped)), strict=True)
+    shift = square[0, 0, :2] - 0.5  # of the square in the picture
+    np.testing.assert_allclose(before[0] - after[0], shift, atol=1e-9)
+    lost = np.array([width, height]) - side - shift
+    assert (np.abs(lost - shift) <= 1).all(), "as much is cut off on both sides"

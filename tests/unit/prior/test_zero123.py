@@ -13,9 +13,9 @@ from diffusers import AutoencoderKL, UNet2DConditionModel
 from safetensors.torch import load_file, save_file
 
 from dav_gswt.errors import InputError
-from dav_gswt.prior import sampler, zero123
+from dav_gswt.prior import zero123
 from dav_gswt.prior.interface import Condition, Prior
-from dav_gswt.prior.zero123 import LATENT, SIZE, Zero123, remove_white
+from dav_gswt.prior.zero123 import LATENT, SIZE, Zero123
 
 transformers = pytest.importorskip("transformers", reason="needs transformers: pip install transformers==5.23.0")
 
@@ -140,26 +140,6 @@ def test_it_samples_as_the_authors_write_it_down(prior):
             x = then.sqrt() * (x - (1 - now).sqrt() * noise) / now.sqrt() + (1 - then).sqrt() * noise
     np.testing.assert_allclose(prior.sample(view, 1, 0.0, steps, 5)[:, 0], x, rtol=1e-4, atol=1e-4)
     assert np.abs(Zero123(prior.networks, 1.0).sample(view, 1, 0.0, steps, 5)[:, 0] - x.numpy()).max() > 1e-3
-
-
-def test_a_sample_has_one_mask_with_and_without_the_photo(prior):
-    """Without a condition, both passes are the same, so guidance must change nothing, whatever was dropped."""
-    noise = torch.randn((6, *LATENT), generator=torch.Generator().manual_seed(3))
-    nothing = torch.zeros_like(noise), torch.zeros(6, 1, WIDTH)
-    found = []
-    for guidance in (1.0, 3.0):
-        one = Zero123(prior.networks, guidance)
-        with torch.inference_mode(), sampler.hold_masks(one.networks.layers, 3, 0.4, 0):
-            found.append(one._predict_noise(noise, torch.tensor(500), *nothing))
-    torch.testing.assert_close(*found, atol=1e-5, rtol=0)
-
-
-def test_drawn_over_white_the_picture_is_what_was_painted():
-    painted = np.random.default_rng(0).uniform(0.8, 1, (2, 5, 5, 3)).astype(np.float32)
-    painted[0, 0, 0], painted[0, 0, 1], painted[0, 0, 2] = 1, (0.95, 1, 1), (0.9, 1, 1)
-    rgba = remove_white(painted)
-    np.testing.assert_allclose(rgba[0, 0, :3, 3], [0, 0.5, 1], atol=1e-6)
-    np.testing.assert_allclose(rgba[..., :3] + (1 - rgba[..., 3:]), painted, atol=1e-6)
 
 
 def test_nothing_is_ever_fetched(folder, monkeypatch):

@@ -1,4 +1,4 @@
-"""Which backend draws, what that costs who does not use it, and what is said where it cannot."""
+"""Which backend draws, what that costs who does not use it, what is said where it cannot; and what is drawn."""
 
 import os
 import subprocess
@@ -6,12 +6,13 @@ import sys
 
 import numpy as np
 import pytest
-from fixtures.raster_scenes import CAMERAS, gaussians, relative
+from fixtures.raster_scenes import CAMERAS, gaussians
 
 from dav_gswt import raster
 from dav_gswt.errors import InputError
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.provenance import record_provenance
-from dav_gswt.raster import backends
+from dav_gswt.raster import backends, harmonics, render
 
 
 def said(code: str, **env: str) -> str:
@@ -88,15 +89,33 @@ def test_a_backend_makes_openmp_wait_passively(name):
 # --- PyTorch's backend
 
 
-def test_how_torch_groups_its_squares_does_not_matter(monkeypatch):
-    torch = backends.load_backend("torch")
-    pictures, gradients = [], []
-    for together in (1, 1 << 14, 1 << 26):
-        monkeypatch.setattr(torch, "BATCH", together)
-        drawing = torch.Rasterizer()
-        seen = drawing.forward(**gaussians(120), camera=CAMERAS["pinhole"])
-        pictures.append(seen.colour)
-        gradients.append(drawing.backward(seen.colour).means)
-    for one in (1, 2):
-        np.testing.assert_allclose(pictures[one], pictures[0], atol=1e-6)  # sums of matrix products, in other orders
-        assert relative(gradients[one], gradients[0]) < 1e-5
+def field(n: int = 100, degree: int = 0) -> GaussianField:
+    arrays = gaussians(n)
+    sh = np.concatenate(
+        [
+            rgb_to_sh(arrays["colours"]),
+            0.2 * gaussians(n, channels=3 * ((degree + 1) ** 2 - 1))["colours"].reshape(n, -1, 3),
+        ],
+        axis=1,
+    )
+    names = ("means", "log_scales", "quats", "opacity_logits")
+    return GaussianField(*(arrays[k] for k in names), sh.astype(np.float32), np.zeros(n, np.float32), np.zeros(n, bool))
+
+
+def test_the_picture_is_linear_in_the_background():
+    camera = CAMERAS["pinhole"]
+    black, grey, red, both = (
+        render(field(), camera, background).colour for background in (0.0, 0.25, (1, 0, 0), (1.25, 0.25, 0.25))
+    )
+    np.testing.assert_allclose(grey + red - black, both, atol=1e-6)
+    alpha = render(field(), camera).alpha
+    np.testing.assert_allclose((red - black)[..., 0], 1 - alpha, atol=1e-6)
+
+
+# --- spherical harmonics
+
+
+def test_harmonics_have_the_signs_that_3dgs_gives_them():
+    # looking along +x, +y, +z: degree 1 is (-y, z, -x) sqrt(3 / 4 pi)
+    c = np.sqrt(3 / (4 * np.pi))
+    np.testing.assert_allclose(harmonics.basis(np.eye(3), 1)[:, 1:], [[0, 0, -c], [-c, 0, 0], [0, c, 0]], atol=1e-15)

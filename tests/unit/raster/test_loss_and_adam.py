@@ -92,14 +92,6 @@ def test_pixels_of_weight_zero_have_no_influence_at_all(backend):
     assert nothing == 0 and not still.any()
 
 
-def test_pictures_of_other_layouts_are_refused(backend):
-    x, y, w = pictures(20, 20, 3)
-    with pytest.raises(ValueError, match="target must be C-contiguous"):
-        backend.loss(x, np.asfortranarray(y))
-    with pytest.raises(ValueError, match="weight must be C-contiguous"):
-        backend.loss(x, y, np.asfortranarray(w))
-
-
 # --- Adam
 
 
@@ -128,25 +120,6 @@ def test_rows_left_out_stay_with_their_moments(backend):
     for all_moved, moved, before in zip(every, some, (start, first, second), strict=True):
         np.testing.assert_array_equal(moved[~rows], before[~rows])
         np.testing.assert_allclose(moved[rows], all_moved[rows], rtol=1e-6)
-
-
-@pytest.mark.parametrize("shape, some", [((3, 5), False), ((700, 4, 3), False), ((700, 4, 3), True)])
-def test_a_column_with_a_rate_of_its_own_goes_as_if_all_had_that_rate(backend, shape, some):
-    rng = np.random.default_rng(0)
-    columns = int(np.prod(shape[1:]))
-    rates = rng.uniform(0.01, 0.1, columns).astype(np.float32)
-    gradient, start = (rng.normal(size=shape).astype(np.float32) for _ in range(2))
-    rows = rng.uniform(size=shape[0]) < 0.5 if some else None
-
-    def moved(rate):
-        value, first, second = start.copy(), np.zeros(shape, np.float32), np.zeros(shape, np.float32)
-        backend.adam(value, gradient, first, second, rate=rate, step=2, rows=rows)
-        return value.reshape(shape[0], -1)
-
-    found = moved(rates)
-    for column, rate in enumerate(rates):
-        # the same products; a compiler may fuse them otherwise
-        np.testing.assert_allclose(found[:, column], moved(float(rate))[:, column], rtol=1e-6, atol=1e-7)
 
 
 def test_what_is_no_step_is_refused(backend):

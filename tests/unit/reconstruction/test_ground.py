@@ -1,18 +1,23 @@
-"""The ground of a scene: its place, its surface, its file, and what photos see of it through all that is between."""
+"""The ground of a scene: its place, its surface, its file; what a field has over it, and what is seen of that."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures import ground as made
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import GaussianField, rgb_to_sh
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.scene_frame import Extent
 from dav_gswt.images import image_files
-from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.reconstruction import coarse, discs, ground, photo_colours
+from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
+from dav_gswt.raster import render
+from dav_gswt.reconstruction import coarse, discs, ground, top_view
+from dav_gswt.reconstruction.coarse import estimate_uncertainty
+from dav_gswt.reconstruction.fitting import state
+from dav_gswt.reconstruction.ground_constraints import GroundConstraints
+from dav_gswt.reconstruction.objects import make_blobs
 
 FRAME = scene_frame(exemplar=(0.0, 0.0, 8.0), extent=(-2.0, -1.0, 10.0, 9.0))
 
@@ -35,19 +40,6 @@ def test_the_exemplar_is_whole_cells_inside_the_well_seen_square_and_the_margin_
     rows, columns = grid.shape
     assert grid.west >= -2 - 1e-9 and grid.west + columns * grid.spacing <= 10 + 1e-9
     assert grid.south >= -1 - 1e-9 and grid.south + rows * grid.spacing <= 9 + 1e-9
-
-
-def test_judged_is_the_exemplar_unless_far_more_is_modelled():
-    usual = place(margin=ground.MARGIN)
-    west, south, side = usual.exemplar
-    assert usual.judged == pytest.approx((west, south, west + side, south + side))
-    wide = replace(FRAME, extent=Extent(-20.0, 0.0, 10.0, 9.0))
-    whole = place(wide, margin=ground.WHOLE)
-    west, south, side = whole.exemplar
-    rows, columns = whole.shape
-    assert whole.judged[0] == pytest.approx(whole.west + ground.MARGIN * side)
-    assert whole.judged[1] == pytest.approx(south) and whole.judged[3] >= south + side
-    assert whole.judged[2] <= whole.west + columns * whole.spacing
 
 
 def test_the_cap_widens_the_spacing_and_an_exemplar_too_small_for_the_levels_is_refused():
@@ -106,56 +98,73 @@ def test_the_surface_under_a_finished_field_is_found_and_what_lies_beyond_is_cut
     assert grid.spacing == pytest.approx(0.05 / discs.WIDTH)
 
 
-def around(heights=None):
-    """4 x 4 units from (-2, -2)."""
-    flat = np.zeros((40, 40)) if heights is None else heights
-    return ground.Ground(-2.0, -2.0, 0.1, 0, 0, 40, flat, np.ones((40, 40), bool))
+def test_discs_lie_on_the_surface_unseen_ones_are_uncertain_and_unknown_ones_take_their_neighbours_colours():
+    grid = replace(made.grid(), seen=np.zeros(made.grid().shape, bool))
+    sloped = replace(grid, heights=0.2 * grid.centres[:, 0].reshape(grid.shape))
+    sloped.seen[:5] = True
+    field = discs.make_ground_discs(sloped, np.full((grid.heights.size, 3), 0.5))
+    np.testing.assert_allclose(field.means[:, 2], 0.2 * field.means[:, 0], atol=1e-6)
+    assert field.ground.all()
+    np.testing.assert_array_equal(field.uncertainty == 0, sloped.seen.ravel())
+    known = np.zeros((4, 6), bool)
+    known[:, :3] = True
+    colours = np.full((24, 3), np.nan, np.float32)
+    colours[known.ravel()] = 0.25
+    np.testing.assert_allclose(discs.fill_unknown(colours, known), 0.25, atol=1e-6)
 
 
-def photo(eye, at=(0.0, 0.0, 0.0), weight=1.0):
-    camera = cameras.pinhole(list(eye), list(at), 64, 64, 80.0)
-    blank = np.zeros((64, 64, 3), np.float32)
-    return TrainingView("photo", camera, blank, np.full((64, 64), weight, np.float32))
+def test_no_sky_shines_through_the_ground_between_shrunken_discs():
+    grid, field = made.grid(), made.field()
+    scales = field.log_scales.copy()
+    scales[: grid.heights.size, :2] = np.log(0.2 * grid.spacing)
+    grains = replace(field, log_scales=scales)
+    camera = cameras.pinhole([1.6, 0.0, 0.8], [1.6, 1.6, 0], 96, 96, 40.0)
+    blank = TrainingView("", camera, np.zeros((96, 96, 3), np.float32), np.ones((96, 96), np.float32))
+    counts = mask_outside_ground(blank, 0.4, 0.4, 2.8, 2.8).weight > 0
+    assert render(discs.remove_underlay(grains, grid), camera).alpha[counts].min() < 0.5  # there were holes
+    assert render(grains, camera).alpha[counts].min() > 0.95
 
 
-def eastings(grid):
-    return grid.centres[:, 0].reshape(grid.shape).astype(np.float32)
+def start(points):
+    grid, places = made.grid(), np.asarray(points, float).reshape(-1, 3)
+    things = make_blobs(places, np.full((len(points), 3), 0.5), np.full(len(points), 0.1))
+    now = state.from_field(concatenate_fields([made.field(), things]))
+    return grid, GroundConstraints(grid, np.full(grid.shape, 0.5)), now
 
 
-def one(places, *photos, heights=None, values=None, least=1):
-    grid = around(heights)
-    values = eastings(grid) if values is None else values
-    return photo_colours.median_behind(grid, values, np.asarray(places, np.float32), list(photos), least)
+def test_discs_keep_to_their_cells_and_turn_with_the_surface_and_no_thing_is_a_needle():
+    grid, constraints, now = start([[1.6, 1.6, 0.3], [1.6, 1.6, 0.3]])
+    now.values["log_scales"][constraints.fixed :] = np.log([[0.1, 0.001, 0.001], [0.1, 0.1, 0.011]])
+    rng = np.random.default_rng(0)
+    n = constraints.discs
+    now.values["means"][:n] += rng.normal(0, 0.2, (n, 3)).astype(np.float32)
+    constraints.project_parameters(now.values)
+    assert np.abs(now.values["means"][:n, :2] - grid.centres[:, :2]).max() <= 0.49 * grid.spacing + 1e-6
+    turned = discs.slopes_to_quaternions(*(s.ravel() for s in constraints.surface(now.values).slopes()))
+    assert np.abs(turned[:, 1:]).max() > 0.3
+    np.testing.assert_array_equal(now.values["quats"][:n], turned)
+    sizes = np.sort(np.exp(now.values["log_scales"][constraints.fixed :]), 1)
+    assert (sizes[:, 2] <= 3.001 * sizes[:, 1]).all()
+    np.testing.assert_allclose(sizes[1], [0.011, 0.1, 0.1], rtol=1e-4)  # flat ones are welcome
 
 
-def test_behind_a_place_is_where_the_ray_through_it_meets_the_ground():
-    # from (0, 0, 4) through (.5, 0, 2): 4 units down when twice as far from the eye
-    found = one([[0.5, 0.0, 2.0], [0.0, 0.7, 1.0]], photo((0, 0.01, 4)))
-    np.testing.assert_allclose(found, [1.0, 0.0], atol=0.06)  # half a cell and a little
-    assert one(np.zeros((0, 3)), photo((0, 0.01, 4))).shape == (0,)
-    # from (-1, 0, 3) along (1, 0, -1.5): meets a slope z = x / 4 where 3 - 1.5 (x + 1) = x / 4
-    found = one([[0.0, 0.0, 1.5]], photo((-1, 0.01, 3)), heights=0.25 * eastings(around()))
-    np.testing.assert_allclose(found, 1.5 / 1.75, atol=0.07)
+def test_a_map_from_above_has_the_south_in_its_first_row():
+    grid = made.grid()
+    found = top_view.render_top_view(made.field(grid), grid)
+    true = made.look(*grid.centres[:, :2].T).reshape(*grid.shape, 3)
+    inner = np.s_[3:-3, 3:-3]
+    # coplanar discs are blended by their index, which moves the picture by a part of a cell
+    assert np.abs(found.colour[inner] - true[inner]).mean() < 0.02
+    assert np.abs(found.colour[::-1][inner] - true[inner]).mean() > 0.05
+    np.testing.assert_allclose(found.height[inner], 0, atol=2e-3)
 
 
-def test_where_no_ground_is_seen_there_is_no_value():
-    """The ray rises, or leaves the ground; the place is behind the camera; the pixel does not count."""
-    found = [one([[0, 0, 3.5]], photo((0, 1.5, 3)))]
-    found += [one([place], photo((0, 0.01, 4))) for place in ((1.5, 0, 2), (0, 0, 5))]
-    found += [one([(0.5, 0, 2)], photo((0, 0.01, 4), weight=0.0))]
-    np.testing.assert_array_equal(found, np.full((4, 1), np.nan))
-
-
-def test_most_photos_decide_and_few_have_no_say():
-    grid = around()
-    values = np.where(eastings(grid) > 0.5, np.float32(1), np.float32(0.2))
-    values[eastings(grid) < -0.5] = np.nan
-    west, middle, east = photo((-2, 0.01, 3)), photo((0, 0.01, 3)), photo((2, 0.01, 3))  # they see 1, .2 and nothing
-    place = [[0.0, 0.0, 1.5]]
-
-    def tell(*photos, least=1):
-        return float(one(place, *photos, values=values, least=least)[0])
-
-    assert tell(west) == 1 and tell(middle) == pytest.approx(0.2) and np.isnan(tell(east))
-    assert tell(west, middle) == pytest.approx(0.6) and tell(west, middle, middle, east) == pytest.approx(0.2)
-    assert tell(west, middle, east, least=2) == pytest.approx(0.6) and np.isnan(tell(west, middle, east, least=3))
+def test_ground_that_no_photo_sees_is_uncertain_and_the_rest_is_not():
+    photos = [replace(photo, weight=photo.weight.copy()) for photo in made.photos(1)]
+    photos[0].weight[:, :24] = 0
+    field = estimate_uncertainty(made.field(), photos)
+    field = field[field.ground]
+    pixels, _ = photos[0].camera.project(field.means.astype(float))
+    inside = (pixels > 2).all(1) & (pixels < 46).all(1)
+    assert field.uncertainty[inside & (pixels[:, 0] > 27)].max() < 0.1
+    assert field.uncertainty[inside & (pixels[:, 0] < 21)].min() == 1

@@ -1,15 +1,13 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from fixtures import ground as made
 
 from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.reconstruction import objects, plane_sweep
+from dav_gswt.reconstruction import plane_sweep
 from dav_gswt.reconstruction.ground import Ground
 
-SIDE, TALL = 3.2, 0.5
+TALL = 0.5
 BOX = (1.2, 2.0)  # from, to, in x and y
 
 
@@ -64,67 +62,6 @@ def test_what_stands_is_found_where_it_stands_and_as_high_as_it_is_and_the_groun
     assert np.abs(found.above[around]).max() <= 2 * found.step
 
 
-def test_sand_that_looks_like_sand_is_no_tower_over_what_no_two_photos_show_alike():
-    """Nearly plain sand, and in the middle what looks otherwise in every photo, as thin leaves do."""
-    views, rng = [], np.random.default_rng(0)
-    for dx, dy in [(0, 0), (0.9, 0), (-0.9, 0), (0, 0.9), (0, -0.9), (0.6, 0.6), (-0.6, 0.6)]:
-        view = photo([1.6 + dx, 1.6 + dy, 4.0])
-        x, y = meet(view.camera, 0.0)
-        leaves, sand = (np.hypot(x - 1.6, y - 1.6) < 0.25)[..., None], 0.5 + 0.04 * (texture(x, y, 2) - 0.5)
-        views.append(view.with_pixels(image=np.where(leaves, rng.random(sand.shape), sand).astype(np.float32)))
-    found = plane_sweep.sweep_heights(made.grid(0.05), views, flying_height=4.0, pixel=0.04)
-    assert found.above.max() < 0.25  # of 1.2 that are tried
-
-
-def test_nothing_is_a_column():
-    above = np.zeros((20, 20))
-    above[2:10, 2:10] = 0.2  # a bush, 8 cells of .1 wide, ...
-    above[5, 5] = above[5, 6] = 1.5  # ... and over it what is not even .2 wide
-    above[12:18, 12:18] = 1.5  # a tree
-    found = plane_sweep.reject_columns(above > 0, above, 0.1)
-    assert found[12:18, 12:18].all() and found[2:10, 2:10].sum() == 62 and found.sum() == 98
-    assert not plane_sweep.reject_columns(np.zeros((4, 4), bool), np.zeros((4, 4)), 0.1).any()
-
-
 def test_on_ground_that_fewer_than_two_photos_see_nothing_stands(photos):
     alone = plane_sweep.sweep_heights(made.grid(0.1), photos[:1], flying_height=4.0, pixel=0.08)
     assert not alone.stands.any() and not alone.above.any()
-
-
-def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
-    shell = objects.make_shell(found, photos)
-    heights = shell.means[:, 2]
-    assert not shell.ground.any()
-    assert heights.max() == pytest.approx(TALL, abs=2 * found.step)
-    assert heights.min() < 0.2 * TALL  # walls reach down
-    grid = made.grid(0.05)
-    ceiling = objects.compute_ceiling(grid, found, shell)
-    assert ceiling[inner(grid, 0.3, 0.7)].max() < 0.3 * TALL  # free space over bare ground
-    assert ceiling[inner(grid, 1.4, 1.8)].min() > TALL
-
-
-def test_costs_add_up_over_paths_from_four_sides_by_a_plain_loop():
-    costs = np.random.default_rng(0).uniform(0, 1, (4, 3, 5)).astype(np.float32)
-    one, more, total = 0.1, 0.25, np.zeros((4, 3, 5))
-    for down, across in ((0, 1), (0, -1), (1, 0), (-1, 0)):
-        path = costs.astype(float)
-        for r in range(3)[:: down or 1]:
-            for c in range(5)[:: across or 1]:
-                if 0 <= r - down < 3 and 0 <= c - across < 5:
-                    last = path[:, r - down, c - across]
-                    steps = np.abs(np.subtract.outer(np.arange(4), np.arange(4)))
-                    best = (last + np.where(steps == 0, 0, np.where(steps == 1, one, more))).min(1)
-                    path[:, r, c] += best - last.min()
-        total += path
-    np.testing.assert_allclose(plane_sweep.aggregate_costs(costs, one, more), total, rtol=1e-5)
-
-
-def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_nothing():
-    grid = made.grid()
-    flat = plane_sweep.Relief(grid, np.zeros(grid.shape), np.zeros(grid.shape, bool), 0.1)
-    crowd = np.array([[1.0, 1.0, 0.5], [1.1, 1.0, 0.5], [1.0, 1.1, 0.5], [1.1, 1.1, 0.55]])
-    points = np.concatenate([crowd, [[2.5, 2.5, 0.5], [1.0, 1.05, 3.0], [1.0, 1.0, 0.05]]])
-    field = objects.make_isolated_points(grid, flat, points, np.full((7, 3), 0.5), band=1.0)
-    np.testing.assert_allclose(field.means, crowd, atol=1e-6)
-    taken = replace(flat, stands=inner(grid, 0.8, 1.3))
-    assert not len(objects.make_isolated_points(grid, taken, points, np.full((7, 3), 0.5), band=1.0))

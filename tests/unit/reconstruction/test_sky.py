@@ -1,19 +1,17 @@
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from fixtures import ground as made
-from fixtures.blas_threads import print_with_threads
 
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import sky
-from dav_gswt.reconstruction.fitting import trainer
-from dav_gswt.reconstruction.fitting.densification import to_opacity
-from dav_gswt.reconstruction.fitting.plan import FitPlan
-from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 from dav_gswt.reconstruction.objects import make_blobs
 from dav_gswt.reconstruction.observation import mask_to_ground
 
@@ -46,19 +44,6 @@ def low(count=4, size=48, thing=True):
     return found
 
 
-def test_the_sky_is_found_whatever_stands_before_it():
-    rng = np.random.default_rng(0)
-    directions = rng.normal(size=(4000, 3))
-    directions[:, 2] = np.abs(directions[:, 2])
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    colours = heavens(directions)
-    colours[::4] = 0.1  # a quarter is something else
-    coefficients, deviation = sky.fit_sky(directions, colours)
-    basis = sky.harmonics.basis(directions, sky.DEGREE)
-    np.testing.assert_allclose(basis @ coefficients, heavens(directions), atol=0.03)
-    assert deviation < 0.01
-
-
 @pytest.mark.slow
 def test_the_sky_has_the_same_bits_whatever_the_threads_of_blas(root):
     code = """if True:
@@ -70,7 +55,11 @@ def test_the_sky_has_the_same_bits_whatever_the_threads_of_blas(root):
         coefficients, deviation = sky.fit_sky(directions, rng.uniform(0, 1, (100_003, 3)).astype(np.float32))
         print(*(value.hex() for value in (*coefficients.ravel().tolist(), deviation)))
     """
-    found = print_with_threads(root, code)
+    found = []
+    for threads in ("1", "2", "4"):  # which BLAS reads when it is loaded
+        environment = os.environ | {"OPENBLAS_NUM_THREADS": threads, "PYTHONPATH": str(root / "workflow/lib")}
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        found.append(done.stdout)
     assert len(found[0].split()) == 49 and len(set(found)) == 1
 
 
@@ -94,15 +83,3 @@ def test_photos_from_above_and_broken_skies_have_none():
     broken = [replace(v, image=rng.uniform(0, 1, v.image.shape).astype(np.float32)) for v in low()]
     for photos in (made.photos(), broken):
         assert all(v.behind is None for v in sky.add_sky(photos, mask_to_ground(photos, made.grid())))
-
-
-def test_what_the_photos_show_to_be_sky_is_hardly_modelled():
-    """A dark thing in the air that no photo shows goes sooner where the sky counts."""
-    photos = low(thing=False)
-    left = []
-    for views in (sky.add_sky(photos, mask_to_ground(photos, made.grid())), mask_to_ground(photos, made.grid())):
-        constraints = GroundConstraints(made.grid(), np.full(made.grid().shape, 0.8))
-        fitted = trainer.fit_field(floating(1.0), views, FitPlan(60, 1), constraints, np.random.default_rng(0)).field
-        thing = fitted[len(made.field()) :]
-        left.append((to_opacity(thing.opacity_logits) * np.exp(thing.log_scales[:, :2].sum(1))).sum())
-    assert left[0] < 0.5 * left[1]

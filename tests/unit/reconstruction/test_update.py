@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
-from dav_gswt.images import image_files
-from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
-from dav_gswt.reconstruction import coarse, ground, update
+from dav_gswt.reconstruction import update
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.evaluation import evaluate_field
-from dav_gswt.reconstruction.fitting.plan import UPDATE_RATE, FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.reconstruction.update import UpdateInput
 
@@ -56,13 +54,6 @@ def test_rounds_and_chosen_photos_are_one_fit_to_all_photos_unless_the_preset_sa
     assert continued.report.steps == 40
 
 
-def test_steps_grow_with_the_photos_and_an_update_begins_with_lower_rates():
-    assert [SETTINGS.plan_coarse_fit(n).steps for n in (3, 8, 10)] == [12, 12, 52]
-    assert [SETTINGS.from_scratch(start, 12).steps for start in (3, 10)] == [12 + 9 * 20, 52 + 2 * 20]
-    plans = [SETTINGS.plan_update(n, 3) for n in (2, 0)]
-    assert [plan.steps for plan in plans] == [60, 60] and [plan.first_rate for plan in plans] == [UPDATE_RATE, 1.0]
-
-
 def grained(count):
     """Photos with grain, so that no field shows them to the bit."""
     rng = np.random.default_rng(4)
@@ -94,17 +85,3 @@ def test_an_update_colours_ground_that_only_the_new_photo_sees():
     fresh = np.flatnonzero((after.grid.seen & ~seen).ravel())
     true = made.look(*grid.centres[fresh, :2].T)
     assert np.abs(after.field.base_colours[fresh] - true).mean() < 0.05
-
-
-def test_photos_that_structure_from_motion_does_not_know_bring_no_points(tmp_path):
-    views, none = made.photos(3), np.zeros(0, int)
-    names, known = tuple(view.name for view in views[:2]), tuple(view.camera for view in views[:2])
-    model = ColmapModel(names, known, *NONE, none, none, np.zeros((0, 2)))
-    (tmp_path / "sparse").mkdir()
-    write_colmap_model(model, tmp_path / "sparse")
-    for view in views[:2]:
-        image_files.write_png(tmp_path / f"{view.name}.png", view.image)
-        (tmp_path / f"{view.name}.png").rename(tmp_path / view.name)
-    for whole, margin in ((True, ground.WHOLE), (False, ground.MARGIN)):
-        matched = coarse.read_start_views(FRAME, views, tmp_path / "sparse", tmp_path, whole)
-        assert matched.points.shape == (0, 3) and matched.margin == margin

@@ -7,15 +7,9 @@ import pytest
 from fixtures import ground as made
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry.scene_frame import Square
-from dav_gswt.raster import make_rasterizer, render
 from dav_gswt.reconstruction import windows
-from dav_gswt.reconstruction.fitting import state, trainer
-from dav_gswt.reconstruction.fitting.descent import TrainingState, TrainingTask
-from dav_gswt.reconstruction.fitting.exposure import ExposureTracker
-from dav_gswt.reconstruction.fitting.plan import FitPlan, FitSettings, Schedule
-from dav_gswt.reconstruction.ground_constraints import GroundConstraints
+from dav_gswt.reconstruction.fitting.plan import FitSettings
 from dav_gswt.reconstruction.windows import Draft, FitWindow
 
 SETTINGS = FitSettings(fit_size=96, spacing=1.0, max_gaussians=4000, steps=40)
@@ -71,45 +65,6 @@ def test_a_joined_field_is_the_window_inside_and_the_draft_outside(fitted):
     np.testing.assert_array_equal(joined.sh[~within], outside.sh)
 
 
-def test_frozen_gaussians_stay_to_the_bit_and_none_grow_beside_them():
-    grid, field = made.grid(), made.field()
-    around = replace(field[:50], means=field.means[:50] + np.array([0, 0, 0.3], np.float32))
-    start = concatenate_fields([field, around])
-    constraints = GroundConstraints(grid, np.full(grid.shape, 0.5), frozen=len(around))
-    assert constraints.frozen == slice(len(field), len(start)) and constraints.fixed == len(start)
-    plan = FitPlan(60, len(start) + 200)
-    fit = trainer.fit_field(start, made.photos(), plan, constraints, np.random.default_rng(0))
-    for name in ("means", "log_scales", "quats", "opacity_logits", "sh"):
-        np.testing.assert_array_equal(getattr(fit.field, name)[constraints.frozen], getattr(around, name))
-    run = TrainingState(state.from_field(start), np.random.default_rng(0), ExposureTracker(3), step=10)
-    run.errors = np.zeros(len(start), np.float32)
-    run.errors[constraints.frozen] = 1
-    trainer._grow(run, TrainingTask(made.photos(), plan, Schedule(plan, len(start)), constraints, make_rasterizer()))
-    assert len(run.state) == len(start)
-
-
-def test_a_cropped_view_shows_the_same_places_and_is_shrunk_where_it_is_finer_than_any_cell():
-    (view,) = made.photos(1, 96)
-    counts = np.zeros_like(view.weight)
-    counts[20:60, 30:90] = 1
-    view = replace(view, weight=counts)
-    cropped = windows.crop_view(view, np.array([1.6, 1.6, 0]), 1e-3)
-    assert cropped.image.shape == (40, 60, 3)
-    np.testing.assert_array_equal(cropped.image, view.image[20:60, 30:90])
-    seen = np.clip(render(made.field(), cropped.camera).colour, 0, 1)
-    np.testing.assert_allclose(seen, cropped.image, atol=1e-3)
-    small = windows.crop_view(view, np.array([1.6, 1.6, 0]), 2 * 4 / view.camera.fx)
-    assert small.image.shape[0] in (19, 20, 21) and small.weight.min() in (0, 1)
-    assert windows.crop_view(replace(view, weight=0 * counts), np.zeros(3), 1e-3) is None
-
-
-def test_pixels_are_as_wide_as_depth_over_focal_length():
-    views = made.photos(3)
-    width, count = windows.measure_pixel_widths(np.array([[1.6, 1.6, 0.0], [50.0, 0, 0]]), views)
-    depths = [view.camera.project(np.array([[1.6, 1.6, 0.0]]))[1][0] / view.camera.fx for view in views]
-    assert width[0] == pytest.approx(np.median(depths)) and count.tolist() == [3, 0] and np.isnan(width[1])
-
-
 def test_masks_count_where_a_view_looks_at_a_square():
     view = made.photos(1)[0]
     masked = windows.mask_to_squares([view], [(0.0, 0.0, 3.2), (10.0, 10.0, 1.0)])[0]
@@ -124,13 +79,3 @@ def test_an_objects_window_that_no_photo_shows_is_left_out_and_one_for_tiles_is_
     assert windows.fit_windows(draft, blind, [thing], 0.05, SETTINGS, np.random.default_rng(0)) == []
     with pytest.raises(InputError, match="no photo shows the ground"):
         windows.fit_windows(draft, blind, [WINDOW], 0.05, SETTINGS, np.random.default_rng(0))
-
-
-def test_photos_that_show_little_of_a_window_count_only_where_none_shows_more():
-    grid = windows.make_grid(COARSE, WINDOW, 0.05)
-    (whole,) = made.photos(1, 96)
-    part = np.zeros_like(whole.weight)
-    part[48:56, 48:56] = 1
-    little = whole.with_pixels(weight=part)
-    assert [view.image.shape[0] for view in windows.crop_views([little], grid)] == [8]
-    assert len(windows.crop_views([little, whole], grid)) == 1

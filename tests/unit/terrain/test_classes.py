@@ -1,14 +1,19 @@
-"""Classes: the numbers shared with the page, bounds of cells, what reaches over a border, and painted places."""
+"""Classes: the numbers shared with the page, painted places, rules from the config and painted files."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fixtures.land_covers import SIDE, gaussians, two_classes
+from fixtures.terrains import manifest_of
 
-from dav_gswt.bundle.land_cover import ClassesEntry, find_run_fault
+from dav_gswt.bundle.land_cover import ClassesEntry, ObjectEntry, RangeTerm, ScatterEntry, find_run_fault
+from dav_gswt.bundle.manifest import MaterialEntry
+from dav_gswt.errors import InputError
 from dav_gswt.files import parse_record
+from dav_gswt.terrain.class_rules import apply_rule, read_paint
 from dav_gswt.terrain.classes import LATTICE, Classes
 from dav_gswt.terrain.heights import FlatSurface, Hills
 
@@ -21,11 +26,6 @@ def classes_of(terrain) -> Classes:
     if surface["kind"] == "hills":
         heights = Hills(*(surface[key] for key in ("height", "wavelength", "octaves", "salt")))
     return Classes(entry, terrain["materials"], terrain["side"], heights)
-
-
-@pytest.fixture
-def sand_and_grass():
-    return Classes(two_classes(), 2, SIDE)
 
 
 def discs_at(places, z=0.0):
@@ -75,3 +75,87 @@ def test_every_place_keeps_the_disc_of_a_material(amplitude):
 )
 def test_runs_that_make_no_sense_are_named(run, fault):
     assert find_run_fault([[0, 0, 5, 1]], 2) is None and fault in find_run_fault([[0, 0, 5, 1], run], 2)
+
+
+NAMES = ["sand", "grass"]
+RANGE = {"material": "grass", "low": 1, "high": None, "soft": 0.5, "weight": 2}
+FILE = {"format": "davgswt-paint", "version": 1, "materials": ["grass", "sand"], "runs": [[0, 0, 3, 0], [1, 1, 1, 1]]}
+
+
+@pytest.fixture
+def manifest():
+    materials = [MaterialEntry("sand", 0.6, 0, [0.5] * 3), MaterialEntry("grass", 0.4, 16, [0.5] * 3)]
+    shrub = ObjectEntry("shrub", 0.4, [0.0, 1.0], 0.0, 1, 0.1, 0.3, [], [])
+    objects = [shrub, replace(shrub, name="stone", material=0), replace(shrub, name="tuft")]
+    cover = {"classes": two_classes(), "objects": objects, "scatter": ScatterEntry(4, 15.0, 0.15, 7)}
+    return replace(manifest_of(1.0, [0.5] * 3), materials=materials, **cover)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(**changes) -> dict:
+        (tmp_path / "painted.json").write_text(json.dumps(FILE | changes))
+        return {"kind": "painted", "file": str(tmp_path / "painted.json")}
+
+    return write
+
+
+def test_heights_are_given_in_tile_sides_and_slopes_as_they_are(manifest):
+    changed = apply_rule(manifest, [{"kind": "height"} | RANGE, {"kind": "slope"} | RANGE])
+    assert changed.classes.rule == [
+        RangeTerm("height", 2.0, 1, SIDE, None, 0.5 * SIDE),
+        RangeTerm("slope", 2.0, 1, 1.0, None, 0.5),
+    ]
+
+
+def test_a_bad_term_is_refused_by_name(manifest, write):
+    noiseless = replace(manifest, classes=replace(manifest.classes, rule=[]))
+    for given, rule, said in (
+        (manifest, [{"kind": "slope"} | RANGE | {"material": "mud"}], "no material 'mud'; the terrain has sand, grass"),
+        (noiseless, [{"kind": "noise"}], "no noise of its own"),
+        (manifest, [write()], "one file, beside other terms"),
+        (manifest, [{"kind": "noise"}, write(), write()], "one file, beside other terms"),
+    ):
+        with pytest.raises(InputError, match=said):
+            apply_rule(given, rule)
+
+
+def test_painted_materials_are_found_by_their_names(manifest, write):
+    made = apply_rule(manifest, [{"kind": "noise"}, write()])
+    assert made.classes.painted == [[0, 0, 3, 1], [1, 1, 1, 0]]
+    assert made.classes.rule == manifest.classes.rule and made.objects == manifest.objects
+
+
+def test_offsets_are_added_to_the_noise_and_densities_to_probabilities(manifest, write, caplog):
+    entry = write(densities={"shrub": 0.5, "stone": 2, "tower": 2}, offsets={"grass": 0.25})
+    made = apply_rule(manifest, [{"kind": "noise"}, entry])
+    assert made.classes.rule[0].biases == [0.05, 0.25]
+    assert [each.probability for each in made.objects] == pytest.approx([0.15, 0.6, 0.3])
+    assert "not there: tower" in caplog.text
+
+
+def test_no_more_objects_stand_than_there_is_room_for(manifest, write):
+    entry = write(densities={"shrub": 3, "tuft": 3})
+    made = apply_rule(manifest, [{"kind": "noise"}, entry])
+    assert [each.probability for each in made.objects] == pytest.approx([0.5, 0.3, 0.5]), "1 for a material's objects"
+    dense = replace(manifest, scatter=replace(manifest.scatter, cells=64))
+    made = apply_rule(dense, [{"kind": "noise"}, entry])
+    assert 64**2 * sum(each.probability for each in made.objects) == pytest.approx(512), "what the page draws on a tile"
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"version": 2}, "version"),
+        ({"runs": [[0, 0, 1, 5]]}, "a material that is not there"),
+        ({"materials": ["mud", "sand"]}, "no material 'mud'; the terrain has sand, grass"),
+        ({"densities": {"shrub": 4}}, "densities: beyond 0 to 3"),
+        ({"offsets": {"sand": -9}}, "offsets: beyond 8"),
+        ({"format": "x" * 2**24}, "more than 16777216 bytes"),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_a_bad_painted_file_is_refused_by_name(write, changes, message):
+    path = write(**changes)["file"]
+    with pytest.raises(InputError, match="painted.json.*" + message):
+        read_paint(path, NAMES)

@@ -1,4 +1,4 @@
-"""Pieces of finished terrains: a page folder as a terrain in Python, and a finite piece against what is drawn of it."""
+"""Pieces of finished terrains: a page folder as a terrain in Python, and its surface."""
 
 import hashlib
 
@@ -21,8 +21,8 @@ SURFACES = {
     "hills": Hills(2.0, 30.0),
     "image": HeightMap(np.random.default_rng(1).uniform(0, 3, (9, 7)).astype(np.float32), 60.0),
 }
-NOT_FINITE = np.full((9, 7), np.nan, np.float32).tobytes()
 HILLS = {"kind": "hills", "height": 0.4, "wavelength": 4}
+NOT_FINITE = np.full((9, 7), np.nan, np.float32).tobytes()
 RULE = [{"kind": "noise"}, {"kind": "height", "material": "grass", "low": 0.1, "soft": 0.2}]
 
 
@@ -69,7 +69,7 @@ def test_a_surface_that_is_damaged_is_named(tmp_path, changes, said):
 
 
 @pytest.fixture(scope="module")
-def bundle(tmp_path_factory, root):
+def bundle(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cover") / "b"
     write_cover_bundle(folder)
     return store.read_bundle(folder)

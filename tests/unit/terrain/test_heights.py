@@ -1,4 +1,4 @@
-"""Height fields: bounds, derivatives against differences, the numbers shared with the page."""
+"""Height fields: the numbers shared with the page, and height maps that are read or refused."""
 
 import json
 from pathlib import Path
@@ -13,22 +13,12 @@ from dav_gswt.terrain import heights
 from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "heights.json").read_text())["surfaces"]
-RNG = np.random.default_rng(0)
-RUGGED = HeightMap(RNG.normal(size=(7, 9)).astype(np.float32), 13.0)
-SURFACES = [
-    pytest.param(Hills(2.0, 7.0, 5, 3), id="hills"),
-    pytest.param(RUGGED, id="mirrored image"),
-]
 
 
 def surface_of(entry) -> HeightField:
     if entry["kind"] == "hills":
         return Hills(*(entry[key] for key in ("height", "wavelength", "octaves", "salt")))
     return HeightMap(np.array(entry["pixels"], np.float32), entry["width"])
-
-
-def places(n, reach=60.0):
-    return RNG.uniform(-reach, reach, (2, n))
 
 
 @pytest.mark.parametrize("entry", GOLDEN, ids=lambda e: e["kind"])
@@ -40,25 +30,6 @@ def test_numbers_are_those_shared_with_the_page(entry):
     np.testing.assert_allclose(height, [p["height"] for p in points], rtol=0, atol=1e-9)
     np.testing.assert_allclose(slope, [p["slope"] for p in points], rtol=0, atol=1e-9)
     np.testing.assert_allclose(surface.bounds, [entry[key] for key in ("low", "high", "steepest")], rtol=1e-12)
-
-
-@pytest.mark.parametrize("surface", SURFACES)
-def test_slopes_are_those_of_differences(surface):
-    x, y = places(400)
-    eps = 1e-5
-    _, slope = surface.at(x, y)
-    east = (surface.at(x + eps, y)[0] - surface.at(x - eps, y)[0]) / (2 * eps)
-    north = (surface.at(x, y + eps)[0] - surface.at(x, y - eps)[0]) / (2 * eps)
-    # error eps times the second derivative, at most about 30, where a spline's pieces meet; and 1e-16 / eps of rounding
-    np.testing.assert_allclose(slope, np.stack([east, north], 1), rtol=0, atol=30 * eps)
-
-
-@pytest.mark.parametrize("surface", SURFACES)
-def test_bounds_hold(surface):
-    height, slope = surface.at(*places(5000))
-    low, high, steepest = surface.bounds
-    assert low <= height.min() and height.max() <= high
-    assert np.hypot(*slope.T).max() <= steepest
 
 
 def test_surfaces_are_those_of_the_config(tmp_path):

@@ -12,10 +12,9 @@ from dav_gswt.geometry import cameras
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import TakenPhoto
-from dav_gswt.terrain import page, page_story
+from dav_gswt.terrain import page
 from dav_gswt.terrain.heights import make_sphere
-from dav_gswt.terrain.page import Front, fill_front, front_of_scene, write_page
-from dav_gswt.terrain.page_story import Story, tell_story
+from dav_gswt.terrain.page import Front, Story, fill_front, front_of_scene, tell_story, write_page
 
 SOURCE = (
     '<meta content="An endless terrain made from a few photos"><title>Endless terrain</title><!-- modules -->'
@@ -118,7 +117,7 @@ def made(tmp_path, monkeypatch):
         TakenPhoto(name, images / name, cameras.pinhole(np.array(eye), np.zeros(3), 40, 30, 60.0), int(name == "c.png"))
         for name, eye in eyes.items()
     ]
-    monkeypatch.setattr(page_story, "list_photos", lambda given: taken)
+    monkeypatch.setattr(page, "list_photos", lambda given: taken)
     write_scene_frame(
         tmp_path / "ground.json",
         SceneFrame("synthetic", "metre", 3.0, Square(-2.0, -2.0, 4.0), Extent(-5.0, -5.0, 5.0, 5.0), images=3),

@@ -1,4 +1,4 @@
-"""Scatter: the instances shared with the page, no overlap, and independence of the window."""
+"""Scatter: the instances shared with the page, no overlap, independence of the window; and a picture of it."""
 
 import json
 from dataclasses import replace
@@ -6,11 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fixtures.land_covers import SIDE, two_classes
+from fixtures.land_covers import GRASS, SAND, SIDE, cover_content, two_classes
+from fixtures.terrains import SKY
 from scipy.spatial import cKDTree
 
+from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.bundle.land_cover import ClassesEntry, ObjectEntry, ScatterEntry
 from dav_gswt.files import parse_record
+from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.classes import Classes
 from dav_gswt.terrain.scatter import Scatter
 
@@ -77,3 +80,36 @@ def test_a_cell_has_the_same_things_in_every_window(request, scatter, west):
         alone = replace(scatter).instances_in(np.array([i]), np.array([-3]))
         mine = whole[(whole.i == i) & (whole.j == -3)]
         assert sorted(alone.u.tolist()) == sorted(mine.u.tolist())
+
+
+MAGENTA = [1.0, 0.0, 1.0]
+
+
+@pytest.fixture(scope="module")
+def cover(tmp_path_factory):
+    content = cover_content()
+    info = write_bundle(content, tmp_path_factory.mktemp("cover") / "b", BundleOptions(tau=0.5, salt=7), {})
+    fields = [content.tile_fields(level) for level in range(content.levels)]
+    objects = [each.fields for each in content.objects]
+    return replace(endless.terrain_from_fields(fields, info, {"kind": "flat"}, objects), reach=10)
+
+
+@pytest.fixture(scope="module")
+def bare(cover):
+    """The same terrain without objects."""
+    return replace(cover, scatter=None)
+
+
+def test_a_picture_shows_both_materials_without_a_gap_and_the_objects(cover, bare):
+    camera = stills.shot_camera(stills.Shot("down", (0.3, 0.2), 14.0, 90.0, 90.0), cover, 1.0, 64, 64)
+    terrains = replace(bare, classes=None), bare, cover  # the first: its first material's tiles
+    alone, image, full = (stills.render_view(terrain, camera, SKY, MAGENTA) for terrain in terrains)
+    # magenta would raise blue above green
+    assert (image[..., 2] - image[..., 1]).max() <= (alone[..., 2] - alone[..., 1]).max() + 0.02
+    redder = image[..., 0] > image[..., 1]
+    assert 0.2 < redder.mean() < 0.8
+    assert image[redder].mean(0) == pytest.approx(SAND, abs=0.08)
+    assert image[~redder].mean(0) == pytest.approx(GRASS, abs=0.08)
+    changed = np.abs(image - full).max(-1) > 0.05
+    assert 0.001 < changed.mean() < 0.3
+    assert full[changed].mean(0) == pytest.approx([0.2, 0.35, 0.15], abs=0.1)

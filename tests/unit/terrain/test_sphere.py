@@ -10,9 +10,9 @@ from fixtures.terrains import MAGENTA, two_level_terrain
 
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.errors import InputError
-from dav_gswt.terrain import finite, planet, sphere, stills
+from dav_gswt.terrain import finite, planet, stills
 from dav_gswt.terrain.heights import QUARTER, FlatSurface, Sphere, make_sphere, require_plain_cover
-from dav_gswt.terrain.sphere import FACES, FaceCells, bend, directions, frame_at, is_covered
+from dav_gswt.terrain.planet import FACES, FaceCells, bend, frame_at, is_covered
 from dav_gswt.terrain.stills import camera_on
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "sphere.json").read_text())
@@ -29,11 +29,11 @@ def test_a_straight_walk_crosses_edges_and_corners_without_a_jump():
     begin = frame_at(10.0, 12.0)
     for way in ([0.0, 1.0], [0.8, 0.6], [-0.3, 0.95], [1.0, 1.0]):
         way = np.array(way) / np.hypot(*way)
-        frames = [sphere.walk_from(begin, way * step, 10.0) for step in range(63)]
+        frames = [planet.walk_from(begin, way * step, 10.0) for step in range(63)]
         for frame, after in zip(frames, frames[1:], strict=False):
             np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
             assert np.abs(after - frame).max() < 0.101  # a tenth of a radian
-        np.testing.assert_allclose(sphere.walk_from(begin, way * 2 * np.pi * 10.0, 10.0), begin, atol=1e-12)
+        np.testing.assert_allclose(planet.walk_from(begin, way * 2 * np.pi * 10.0, 10.0), begin, atol=1e-12)
 
 
 @pytest.mark.parametrize("entry", GOLDEN["spheres"], ids=lambda e: str(e["cells"]))
@@ -66,34 +66,6 @@ def test_cells_stand_in_the_order_shared_with_the_page(view):
     assert close[order].tolist() == view["close"]
 
 
-@pytest.mark.parametrize("height, point", [(0.3, (1, 1, 1)), (3.0, (-1, -1, 0)), (60.0, (0.3, -0.9, 1))])
-def test_no_cell_of_which_something_shows_is_lost(tiles, point, height):
-    terrain = replace(tiles, heights=make_sphere(8.0, 4.0))
-    ball, up = terrain.heights, np.array(point) / np.linalg.norm(point)
-    longitude, latitude = np.degrees([np.arctan2(up[1], up[0]), np.arcsin(up[2])])
-    axes = frame_at(longitude, latitude)
-    for yaw, pitch in ((20.0, -5.0), (200.0, -40.0), (0.0, -89.0)):
-        camera = camera_on((ball.radius + height) * axes[2], axes, yaw, pitch, 64, 36)
-        cells = planet.visible_on_sphere(terrain, ball, camera)
-        face, column = np.divmod(cells.i, ball.cells + 2)
-        found = set(zip(*(v.tolist() for v in (face, column - 1, cells.j)), strict=True))
-        assert len(found) == len(cells)
-        each = all_cells(ball)
-        face, i, j = each.face, each.i, each.j
-        steps = np.linspace(0, 1, 5)
-        a, b = (v.ravel() for v in np.meshgrid(steps, steps))
-        for z in (0.0, terrain.z[1]):
-            for k in range(len(a)):
-                points = (ball.radius + z) * directions(face, ball.tangents(i + a[k], j + b[k]))
-                pixels, depth = camera.project(points)
-                inside = ((pixels >= 0) & (pixels < [64, 36])).all(1) & (depth > terrain.near)
-                square = ((points - camera.centre) ** 2).sum(1)
-                ahead = square < height * (2 * ball.radius + height)  # before the horizon
-                for row in np.flatnonzero(inside & ahead).tolist():
-                    assert (int(face[row]), int(i[row]), int(j[row])) in found
-        assert (cells.nearest <= cells.farthest).all()
-
-
 def count_owners(ball: Sphere, points, salt: int):
     """How many faces' tilings show each place on the ground, over and beyond their edges."""
     owners = np.zeros(len(points), int)
@@ -102,9 +74,9 @@ def count_owners(ball: Sphere, points, salt: int):
         tangents = points[ahead] @ np.stack([east, north], 1) / (points[ahead] @ out)[:, None]
         at = (np.arctan(tangents) / QUARTER + 0.5) * ball.cells
         cells = FaceCells(np.full(len(at), face), *np.floor(at).astype(np.int64).T)
-        covered, frayed = is_covered(ball, cells), sphere.is_frayed(ball, cells)
+        covered, frayed = is_covered(ball, cells), planet.is_frayed(ball, cells)
         places = np.concatenate([at, np.zeros((len(at), 1))], 1)
-        stays = sphere.find_kept(ball, face, places, salt)
+        stays = planet.find_kept(ball, face, places, salt)
         owners[ahead] += covered & (~frayed | stays)
     return owners
 
@@ -127,10 +99,10 @@ def test_tiles_and_what_stays_are_those_shared_with_the_page(entry):
     ball = make_sphere(entry["radius"] / entry["side"], entry["side"])
     for one in entry["tiles"]:
         cell = FaceCells(*(np.array([one[name]]) for name in ("face", "i", "j")))
-        assert sphere.tiles_on(ball, cell, entry["salt"], entry["variants"]).tolist() == [one["tile"]]
+        assert planet.tiles_on(ball, cell, entry["salt"], entry["variants"]).tolist() == [one["tile"]]
     for one in entry["kept"]:
         places = np.array([one["place"]])
-        assert sphere.find_kept(ball, one["face"], places, entry["salt"])[0] == one["stays"]
+        assert planet.find_kept(ball, one["face"], places, entry["salt"])[0] == one["stays"]
 
 
 def camera_over(terrain, point, height, pitch, yaw=20.0):

@@ -1,4 +1,4 @@
-"""Stills: ground without cracks under sky, draw order close to exact sorting, shots."""
+"""Stills: ground without cracks under sky, far ground in haze, draw order close to exact sorting, shots."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,8 @@ from fixtures.terrains import MAGENTA, SKY, walking
 
 from dav_gswt.bundle.manifest import Sky
 from dav_gswt.terrain import stills
+from dav_gswt.terrain.backdrop import SPACING, FarColours, FarGround
+from dav_gswt.terrain.heights import Hills
 
 
 @pytest.mark.parametrize("shot", stills.SHOTS, ids=lambda shot: shot.name)
@@ -43,3 +45,43 @@ def test_tile_by_tile_is_nearly_the_exactly_sorted_picture(stony):
     assert 0 < error < 10**-3  # above 30 dB where four tiles show, each with a hundred stones
     above = walking(stony, 89.99, 2.0, at=(1.5, 1.5))
     np.testing.assert_array_equal(*(stills.render_view(stony, above, SKY, MAGENTA, exact) for exact in (False, True)))
+
+
+GROUND, HORIZON = np.float32([0.2, 0.5, 0.3]), np.float32([0.9, 0.8, 0.7])
+COLOURS = FarColours(GROUND, HORIZON, 40.0, None)
+HILLS = Hills(6.0, 60.0, 3, 2)
+
+
+def rays(azimuths, falls):
+    """Directions by tangents of the angle below the level."""
+    azimuth, fall = np.meshgrid(azimuths, falls)
+    return np.stack([np.cos(azimuth), np.sin(azimuth), -fall], -1)
+
+
+def test_rays_meet_the_hills_that_they_march_into():
+    eye = np.array([11.0, 4.0, 0.0])
+    eye[2] = HILLS.at(eye[:1], eye[1:2])[0][0] + 1.5
+    to = rays(np.linspace(0, 6, 40), np.linspace(-0.05, 0.02, 60)).reshape(-1, 3)
+    behind = np.full(to.shape, 7, np.float32)
+    seen = FarGround.around(eye, HILLS, COLOURS).paint(to, behind)
+    distance = 40 * np.geomspace(0.5, 12.5, 4000)
+    x, y, z = (eye[k] + np.multiply.outer(to[:, k], distance) for k in range(3))
+    height, _ = HILLS.smooth_at(x.ravel(), y.ravel(), np.tile(SPACING * distance, len(to)))
+    below = height.reshape(z.shape) > z
+    meets = below.any(1) & ~below[:, 0]  # from the first ring on
+    assert 0.2 < meets.mean() < 0.8
+    assert ((seen[:, 0] < 7) == meets)[~below[:, 0]].mean() > 0.98, "all but rays that graze a crest"
+    hit = meets & (seen[:, 0] < 7)
+    expected = COLOURS.at(distance[below[hit].argmax(1)], np.zeros((hit.sum(), 2)))
+    # where one does not graze: neighbouring rings differ by at most 0.0525 / e of 0.7
+    assert np.quantile(np.abs(seen[hit] - expected), 0.9) < 0.0135
+
+
+@pytest.mark.parametrize("height", [1.0, 6.0, 30.0])
+def test_ground_has_the_colour_of_the_horizon_there(hilly, height):
+    backdrop = stills.Backdrop.for_eye(hilly, walking(hilly, 0.0, height).centre, SKY, GROUND)
+    azimuths = np.linspace(0, 6, 90)
+    above, below = (backdrop.colours_along(rays(azimuths, np.array([fall]))) for fall in (-1e-6, 1e-6))
+    np.testing.assert_allclose(below, above, atol=0.01)  # exp(-5) of the ground is left at the last ring
+    down = backdrop.colours_along(np.array([[0.0, 0.0, -1.0]]))
+    assert np.abs(down - GROUND).max() < np.abs(down - above[0, 0]).max(), "it is ground that is seen from above"

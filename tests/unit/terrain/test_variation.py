@@ -14,7 +14,7 @@ from dav_gswt.bundle.build import BundleOptions, write_bundle
 from dav_gswt.bundle.land_cover import WaveEntry
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.errors import InputError
-from dav_gswt.terrain import endless, fit_variation, placement
+from dav_gswt.terrain import endless, placement, variation
 from dav_gswt.terrain.finite import Area, list_cells, place_block
 from dav_gswt.terrain.variation import Variation
 
@@ -63,16 +63,6 @@ def test_ground_has_the_colours_of_its_place_and_an_object_those_of_its_foot(pla
     assert np.abs(at_feet).max() > 0.05
 
 
-def test_stills_show_what_exports_hold_at_every_level(varied):
-    eye = np.array([18.0, 22.0, 3.0])
-    cell = replace(list_cells(varied, Area(4, 5, 1, 1)), nearest=np.array([0.1]), farthest=np.array([9.0]))
-    for level in (0, 1):
-        terrain = replace(varied, switches=[(np.inf, 0.0)[level], np.inf], bands=[0.0, 0.0])
-        seen, _ = placement.place_cell(terrain, cell, eye)
-        held = placement.collect_tiles(varied, cell, [level])[level]
-        assert sorted(seen.sh[:, 0].tolist()) == sorted(held.sh[:, 0].tolist())
-
-
 def cut_ground(wide, blob=0.0):
     """Tiles of an exemplar of grain and wide light and dark (standard deviation `wide`), and perhaps a bright blob."""
     sample, rng = tile_sets.exemplar(), np.random.default_rng(1)
@@ -95,35 +85,27 @@ def measure_spread(waves):
 
 
 def test_large_scale_light_comes_back_along_its_own_axis():
-    waves = fit_variation.fit_variation([cut_ground(0.04)], 1.0, 0)
+    waves = variation.fit_variation([cut_ground(0.04)], 1.0, 0)
     for wave in waves:
         assert np.array(wave.colours[0]) @ AXIS == pytest.approx(np.linalg.norm(wave.colours[0]), rel=1e-2)
     # all but the part of the light that is as narrow as texture was taken out with the trend
     assert 0.02 < measure_spread(waves) < 0.05
-    doubled = fit_variation.fit_variation([cut_ground(0.04)], 2.0, 0)
+    doubled = variation.fit_variation([cut_ground(0.04)], 2.0, 0)
     assert measure_spread(doubled) == pytest.approx(2 * measure_spread(waves), rel=1e-3)
 
 
 def test_even_ground_and_a_single_blob_are_no_variation():
-    even, blob = (measure_spread(fit_variation.fit_variation([cut_ground(0.0, b)], 1.0, 0)) for b in (0.0, 0.5))
+    even, blob = (measure_spread(variation.fit_variation([cut_ground(0.0, b)], 1.0, 0)) for b in (0.0, 0.5))
     assert even < 0.006
     assert blob < 0.02  # a disc so bright alone has a deviation of .08
 
 
 def test_nothing_is_added_where_it_is_turned_off_or_tiles_are_known_by_their_gaussians_alone(plain):
-    assert fit_variation.fit_variation([cut_ground(0.04)], 0.0, 0) is None
-    assert fit_variation.fit_variation(cover_content().tiles, 1.0, 0) is None
+    assert variation.fit_variation([cut_ground(0.04)], 0.0, 0) is None
+    assert variation.fit_variation(cover_content().tiles, 1.0, 0) is None
     cells = list_cells(plain, Area(0, 0, 1, 1))
     tile = placement.collect_tiles(replace(plain, classes=None), cells, [0])[0]
     assert tile is plain.tiles[0, int(cells.tile[0])]
-
-
-def test_power_of_an_octave_is_the_variance_of_its_waves():
-    y, x = np.mgrid[:96, :96]
-    for period, octave in ((32, 1), (15, 2)):  # windows of 48 cells; octaves 24 to 48 and 12 to 24
-        power = fit_variation.measure_octaves(np.sin(2 * np.pi * x / period), 96, 24)
-        # a plane is subtracted without the window's weights, so that parts do not add up exactly
-        assert power[octave] == pytest.approx(0.5, rel=0.3) and power.argmax() == octave and len(power) == 3
 
 
 @pytest.mark.parametrize("waves", [[], [WaveEntry(0.63, [[0.1] * 3])]])

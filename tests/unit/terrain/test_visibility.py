@@ -1,4 +1,4 @@
-"""Visible cells: conservative culling, draw order, levels by distance and their weights, budget."""
+"""Visible cells: conservative culling, draw order, weights of levels, budget."""
 
 import json
 from pathlib import Path
@@ -8,8 +8,7 @@ import pytest
 from fixtures.terrains import SIDE, walking
 
 from dav_gswt.bundle import orders
-from dav_gswt.reconstruction import discs
-from dav_gswt.terrain import draw_order, placement, visibility
+from dav_gswt.terrain import draw_order, visibility
 from dav_gswt.terrain.draw_order import crossfade_opacity, level_weights
 
 FOLDER = Path(__file__).parents[2] / "golden"
@@ -53,32 +52,6 @@ def test_levels_come_nearer_until_a_picture_fits_its_budget(terrain):
     count, factor = visibility.count_gaussians(coarser, cells).sum(), coarser.switches[0] / terrain.switches[0]
     assert 0.8 * whole < count <= 0.9 * whole and 0 < factor < 1
     np.testing.assert_allclose(coarser.bands, np.multiply(terrain.bands, factor))
-
-
-@pytest.mark.parametrize("shown, height, step", [("hilly", 3.0, 37), ("stony", 0.7, 5)])
-def test_distances_bound_those_of_the_gaussians(request, shown, height, step):
-    """On hills, and of stones that stand on level ground."""
-    terrain = request.getfixturevalue(shown)
-    camera = walking(terrain, height=height)
-    cells = visibility.visible_cells(terrain, camera)
-    for k in range(len(cells) - 1, -1, -step):  # from the nearest
-        field, _ = placement.place_cell(terrain, cells[k : k + 1], camera.centre)
-        distance = np.linalg.norm(field.means.astype(float), axis=1)
-        assert cells.nearest[k] <= distance.min() + 1e-4 and distance.max() <= cells.farthest[k] + 1e-4
-
-
-def test_each_gaussian_fades_by_its_own_distance(terrain):
-    camera = walking(terrain)
-    cells = visibility.visible_cells(terrain, camera)
-    k = int(np.flatnonzero(visibility.active_levels(terrain, cells).all(0))[0])
-    field, _ = placement.place_cell(terrain, cells[k : k + 1], camera.centre)
-    fine = field.log_scales[:, 0] < np.log(0.13)
-    distance = np.linalg.norm(field.means.astype(float), axis=1)
-    opacity = 1 / (1 + np.exp(-field.opacity_logits.astype(float)))
-    share = np.clip(0.5 - (distance - 20) / 4, 0, 1)
-    whole = 1 / (1 + np.exp(-discs.OPAQUE))
-    np.testing.assert_allclose(opacity, 1 - (1 - whole) ** np.where(fine, share, 1 - share), atol=1e-5)
-    assert fine.any() and not fine.all() and (opacity > 0).all()
 
 
 def window(west, south, columns, rows):

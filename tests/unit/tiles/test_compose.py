@@ -1,4 +1,4 @@
-"""Tiles as Gaussians: no holes, no doubles, no seam at a border, equal heights; levels merged from their cells."""
+"""Tiles as Gaussians: no holes, no doubles, no seam at a border; levels go on from their cells."""
 
 import io
 import json
@@ -7,14 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures import tile_sets
-from fixtures.tile_sets import splats
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import concatenate_fields
 from dav_gswt.lod import store as levels
-from dav_gswt.reconstruction import discs
-from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.tiles import compose, store
+from dav_gswt.tiles import store
 
 
 def test_every_tile_holds_exactly_one_disc_a_cell_at_every_level(tiles):
@@ -43,45 +39,6 @@ def test_tiles_with_the_same_colour_on_a_side_hold_the_same_gaussians_along_it(t
                 # sin^2(pi 4 / 48) = 0.067 of it one block inside
                 np.testing.assert_array_equal(other.means[:, :2], strips[0].means[:, :2])
                 np.testing.assert_array_equal(other.sh, strips[0].sh)
-
-
-def test_mean_heights_of_the_finest_tiles_are_equal(tiles):
-    heights = [field.means[:, 2].astype(float).mean() for field in tiles.fields[0]]
-    # float32 rounding of single heights around 0.1 to 1, in the mean
-    assert np.ptp(heights) < 1e-6
-
-
-def test_levelling_vanishes_at_the_border_in_value_and_slope():
-    side, step = 3.0, 1e-5
-    edge = np.array([[0, 1.0], [side, 1.0], [1.0, 0], [1.0, side]])
-    inward = edge + step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
-    np.testing.assert_allclose(compose.bump(edge, side), 0, atol=1e-15)
-    # quadratic: (pi step / side)^2
-    assert compose.bump(inward, side).max() / step < 2 * step * (np.pi / side) ** 2
-    assert compose.bump(np.array([[1.5, 1.5]]), side) == pytest.approx(1)
-
-
-def test_a_coarse_cell_takes_the_label_of_most_of_its_cells():
-    labels = np.array([[1, 1, 0, 2], [1, 3, 2, 0]], np.uint8)
-    np.testing.assert_array_equal(compose.coarsen_labels(np.concatenate([labels, labels]), 2), [[1, 0], [1, 0]])
-
-
-def test_things_follow_the_cell_under_their_centre(sample_ground):
-    level = compose.bin_gaussians(sample_ground.levels[0], sample_ground.exemplar, 1)
-    n, shift = 8, np.zeros((9, 2), int)
-    shift[1] = [16, 4]
-    labels = np.zeros((n, n), np.uint8)
-    labels[:, 4:] = 1
-    tile = compose.compose_tile(level, labels, shift, np.zeros((n, n, 4)))
-    found = tile[~tile.ground].means[:, :2].astype(float)
-    field, e = sample_ground.levels[0], sample_ground.exemplar
-    at = field[~field.ground].means[:, :2].astype(float) - [e.west, e.south]
-    here = (at < [0.5, 1]).all(1)
-    moved = at - [2, 0.5]
-    there = (moved >= [0.5, 0]).all(1) & (moved < 1).all(1)
-    expected = np.concatenate([at[here], moved[there]])
-    order = lambda v: v[np.lexsort(v.T)]  # noqa: E731
-    np.testing.assert_allclose(order(found), order(expected), atol=1e-6)  # float32 positions near 10
 
 
 def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, sample_ground, tmp_path):
@@ -153,50 +110,6 @@ def without_a_correction(data: bytes) -> bytes:
 def test_tiles_that_are_not_as_they_were_made_are_refused(read_again, changes, message):
     with pytest.raises(InputError, match=message):
         read_again(**changes)
-
-
-CELLS, SPACING = 16, 0.25
-
-
-@pytest.fixture
-def tile():
-    """A slope with random colours, an underlay and things, in no order."""
-    rng = np.random.default_rng(3)
-    x, y = np.meshgrid((np.arange(CELLS) + 0.5) * SPACING, (np.arange(CELLS) + 0.5) * SPACING)
-    grid = Ground(0.0, 0.0, SPACING, 0, 0, CELLS, 0.2 * x - 0.1 * y, np.ones((CELLS, CELLS), bool))
-    layer = discs.make_ground_discs(grid, rng.uniform(0.2, 0.8, (CELLS**2, 3)))
-    layer = replace(layer, uncertainty=rng.random(CELLS**2).astype(np.float32))
-    things = splats(rng.random((200, 3)) * CELLS * SPACING, rng.random((200, 3)), [0.02, 0.02, 0.05], False)
-    whole = concatenate_fields([layer, discs.make_underlay(grid, layer), things])
-    return whole[rng.permutation(len(whole))]
-
-
-def test_four_discs_become_one_of_their_means(tile):
-    half = compose.merge_cells(tile, CELLS, SPACING)
-    flat, fine = half[half.ground], tile[tile.ground]
-    assert len(flat) == CELLS**2 // 4
-    for disc in (0, 9, 37):
-        x, y = flat.means[disc, :2]
-        under = (np.abs(fine.means[:, :2] - [x, y]) < SPACING).all(1)
-        assert under.sum() == 4
-        for values in (lambda f: f.base_colours, lambda f: f.means, lambda f: f.uncertainty):
-            np.testing.assert_allclose(values(flat)[disc], values(fine)[under].mean(0), atol=1e-5)
-        sizes = fine.log_scales[under, :2].mean()
-        np.testing.assert_allclose(flat.log_scales[disc, :2], sizes + np.log(2), atol=1e-5)
-
-
-def test_the_underlay_is_renewed_and_nothing_else_is_taken_for_it(tile):
-    assert compose.find_underlay(tile, SPACING).sum() == CELLS**2 // 4
-    half = compose.merge_cells(tile, CELLS, SPACING)
-    assert compose.find_underlay(half, 2 * SPACING).sum() == CELLS**2 // 16
-    bare = compose.merge_cells(tile[~compose.find_underlay(tile, SPACING)], CELLS, SPACING)
-    assert not compose.find_underlay(bare, 2 * SPACING).any() and bare.ground.sum() == half.ground.sum()
-
-
-def test_a_cell_without_a_disc_stays_empty(tile):
-    inside = (tile.means[:, :2] < 2 * SPACING).all(1) & tile.ground
-    half = compose.merge_cells(tile[~inside], CELLS, SPACING)
-    assert half.ground.sum() == CELLS**2 // 4 - 1 and np.isfinite(half.means).all()
 
 
 def test_tiles_go_on_where_the_exemplar_ends(cut, tiles):

@@ -1,19 +1,10 @@
-"""Geometry of tiles, by hand."""
+"""Geometry of tiles, and landmarks, which are kept out of what all tiles share."""
 
 import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.tiles import layout
-from dav_gswt.tiles.layout import NE, NW, SE, SW, E, Layout, N, PatchPlaces, S, W
-
-PLAN = Layout(exemplar=40, levels=1, side=10, strip=2, corner=3)
-PLACES = PatchPlaces(
-    np.array([30, 20]),
-    np.array([[0, 1], [5, 2]]),
-    np.array([[3, 30], [4, 25]]),
-    np.tile([11, 12], (16, 1)),
-)
+from dav_gswt.tiles import energy, layout, patches, search
 
 
 @pytest.mark.parametrize("levels", [1, 3, 6, 8, layout.AUTO])
@@ -30,13 +21,6 @@ def test_a_tile_is_whole_in_the_cells_of_every_level(exemplar, levels, strip):
     assert plan.composed_levels > 1 or plan.levels == 1 or plan.side < 2 * layout.MIN_BLOCKS
 
 
-def test_coarse_levels_do_not_make_tiles_large():
-    # 224 / 2 = 112 cells: three and a half of 32; the nearest whole number is four
-    assert layout.plan_layout(224, 6, 0.5, 0.125).side == 128
-    assert layout.plan_layout(224, 3, 0.5, 0.125).side == 112
-    assert layout.plan_layout(224, 6, 0.5, 0.125).block == layout.plan_layout(224, 3, 0.5, 0.125).block == 4
-
-
 def test_auto_makes_the_levels_that_are_ever_drawn():
     # at least 3.5 cells of the coarsest level, rounded to four: 112 / 32 = 3.5, 96 / 32 = 3
     for side, levels in ((128, 6), (112, 6), (96, 5), (60, 5), (32, 4), (20, 3)):
@@ -49,32 +33,40 @@ def test_an_exemplar_smaller_than_any_tile_is_refused():
         layout.plan_layout(9, 3, 0.5, 0.16)
 
 
-def test_a_vertical_strip_goes_on_from_a_tile_into_its_right_neighbour():
-    left, right = layout.label_shifts(PLAN, PLACES, 2), layout.label_shifts(PLAN, PLACES, 8)
-    y, n = 4, PLAN.side
-    for step in (1, 2):  # cells from the border: strip columns 1, 0 on the left and 2, 3 on the right
-        np.testing.assert_array_equal(left[E] + [n - step, y], PLACES.vertical[1] + [2 - step, y])
-        np.testing.assert_array_equal(right[W] + [step - 1, y], PLACES.vertical[1] + [1 + step, y])
+def own(picture):
+    """A patch's own square, which is not charged."""
+    return (picture**2).sum(-1).mean()
 
 
-def test_the_corner_patch_is_whole_where_four_tiles_meet():
-    shift = layout.label_shifts(PLAN, PLACES, 0)
-    n, middle = PLAN.side, PLACES.corner + PLAN.corner
-    np.testing.assert_array_equal(shift[SW] + [0, 0], middle)
-    np.testing.assert_array_equal(shift[SE] + [n - 1, 0], middle + [-1, 0])
-    np.testing.assert_array_equal(shift[NW] + [0, n - 1], middle + [0, -1])
-    np.testing.assert_array_equal(shift[NE] + [n - 1, n - 1], middle - 1)
+def test_a_landmark_is_what_stands_out_of_its_surroundings_not_a_shade_or_grain():
+    y, x = np.mgrid[:120, :120]
+    maps = np.random.default_rng(0).normal(0, 0.02, (120, 120, 2)) + 0.05 * np.sin(x / 40)[..., None]
+    maps[(x - 30) ** 2 + (y - 80) ** 2 < 20, 1] += 0.5
+    found = patches.find_landmarks(maps, 60)
+    spot = (x - 30) ** 2 + (y - 80) ** 2 < 300
+    assert found[80, 30] > 0 and (found[~spot] > 0).mean() < 0.01
+    assert found.mean() == pytest.approx(1)
+    assert not patches.find_landmarks(np.ones((120, 120, 2)), 60).any()
 
 
-def test_a_frame_holds_strips_at_its_sides_and_the_corner_patch_in_its_corners():
-    n, b = PLAN.side, PLAN.strip
-    mask = np.zeros((2, n, 2 * b), bool)
-    mask[:, :b] = mask[:, n - b :] = True
-    mask[1, b, b] = True  # colour 1: the corner patch reaches one cell further, right of the edge
-    labels = layout.frame_labels(PLAN, mask, mask.swapaxes(1, 2), 8)
-    assert (labels[:b, :b] == SW).all() and (labels[:b, n - b :] == SE).all()
-    assert (labels[n - b :, :b] == NW).all() and (labels[n - b :, n - b :] == NE).all()
-    assert (labels[:b, b : n - b] == S).all() and (labels[n - b :, b : n - b] == N).all()
-    assert labels[b, 0] == SW and labels[b, 1] == W and (labels[b + 1 : n - b, :b] == W).all()
-    assert (labels[b : n - b, n - b :] == E).all()
-    assert (labels[b : n - b, b : n - b] == layout.CENTRE).all()
+@pytest.mark.parametrize("seed", range(3))
+def test_hardly_a_landmark_lies_in_what_all_tiles_share(seed):
+    rng, m = np.random.default_rng(seed), 160
+    colour = 0.5 + 0.05 * rng.normal(size=(m, m, 1)).repeat(3, 2)
+    spots = [(24 + 28 * (k % 5), 24 + 28 * (k // 5)) for k in range(25)]
+    y, x = np.mgrid[:m, :m]
+    for place in spots:
+        colour[(x - place[0]) ** 2 + (y - place[1]) ** 2 < 7] += 0.4
+    plan = layout.Layout(m, 1, 60, 6, 9)
+    flat = np.zeros((m, m))
+    guide = patches.make_guidance(colour, flat, flat, plan)
+    energy_of = energy.SeamEnergy("colour", 2.0, energy.make_colour_layer(colour), None)
+    problem = search.SearchProblem(plan, guide, energy_of, 300, 2)
+    found = search.search_patches(problem, 1, np.random.default_rng(seed))
+    labels, shifts = found.labels, [layout.label_shifts(plan, found.places, tile) for tile in range(16)]
+    shown = [guide.landmarks[layout.source_cells(*pair)] > 0 for pair in zip(labels, shifts, strict=True)]
+    frame, centre = (
+        np.mean([marks[pick(own)].mean() for marks, own in zip(shown, labels, strict=True)])
+        for pick in (lambda own: own > 0, lambda own: own == 0)
+    )
+    assert frame < 0.2 * centre

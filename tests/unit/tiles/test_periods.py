@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures import ground as made
-from fixtures.tile_sets import splats
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.cli import judgement
 from dav_gswt.field import concatenate_fields
 from dav_gswt.lod import store as level_store
-from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import Levels
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import discs
@@ -103,30 +102,6 @@ def test_grounds_without_a_pattern_that_lasts_have_no_waves(ploughed):
     kinds = [coloured(0.5 + 0.1 * noise(slope, 256)) for slope in (0, 0.5, 1, 1.5, 2, 3)]
     kinds += [coloured(0.5 + 0.1 * ripples / ripples.std() + 0.02 * noise(0.5, 256)), half, np.full((64, 64, 3), 0.5)]
     assert [len(periods.find_waves(kind)) for kind in kinds] == [0] * len(kinds)
-
-
-def test_a_turned_level_shows_each_place_of_the_exemplar_where_the_turn_puts_it():
-    y, x = np.mgrid[:CELLS, :CELLS] + 0.5 - CELLS / 2
-    look = lambda x, y: 0.5 + 0.2 * np.sin(x / 5) * np.cos(y / 7)  # noqa: E731
-    at = np.array([[3.0, 1.0, 0.4]])
-    middle = np.array([2.0, -1.0]) + CELLS * SPACING / 2
-    things = splats(at + [*middle, 0], np.full((1, 3), 0.2), [0.2, 0.1, 0.1], False)
-    turn = 1.04 * np.array([[np.cos(0.1), -np.sin(0.1)], [np.sin(0.1), np.cos(0.1)]])
-    levels = levels_of(coloured(look(x, y)), things)
-    turned = periods.turn_levels(levels, turn, 136)
-    for number, (field, grid) in enumerate(zip(turned.fields, turned.grids, strict=True)):
-        assert grid.cells == 136 >> number and grid.exemplar[2] == pytest.approx(136 * SPACING)
-        layer = field[: grid.cells**2]
-        x, y = (turn @ ((layer.means[:, :2] - middle) / SPACING).T.astype(float)).astype(float)
-        # a wave of 31 cells and wider: cubic splines err by less than 1e-4 on the finest level
-        np.testing.assert_allclose(layer.base_colours, coloured(look(x, y)), atol=(2e-4, 4e-3, 2e-2)[number])
-        thing = field[-1:]
-        np.testing.assert_allclose(thing.means[0, :2], np.linalg.solve(turn, at[0, :2]) + middle, atol=1e-5)
-        np.testing.assert_allclose(np.exp(thing.log_scales[0]), np.array([0.2, 0.1, 0.1]) / 1.04, rtol=1e-5)
-        long_axis = 2 * np.arctan2(thing.quats[0, 3], thing.quats[0, 0])
-        assert long_axis == pytest.approx(-0.1, abs=1e-6)
-    same = periods.turn_levels(levels, np.eye(2), CELLS)
-    np.testing.assert_allclose(same.fields[0].sh, levels.fields[0].sh, atol=1e-6)
 
 
 def test_tiles_are_whole_numbers_of_rows_and_their_patches_are_in_phase(cut):

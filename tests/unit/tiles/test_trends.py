@@ -6,32 +6,7 @@ from scipy.ndimage import gaussian_filter
 
 from dav_gswt.lod.merge import compute_covariances
 from dav_gswt.tiles import poisson_blending, texture
-from dav_gswt.tiles.layout import Exemplar, Layout
-
-EXEMPLAR = Exemplar(0.0, 0.0, 0.5, 64)
-KNOWN = np.ones((64, 64), bool)
-
-
-def test_a_plane_is_its_own_trend():
-    y, x = np.mgrid[:64, :64]
-    plane = 0.3 * x - 0.2 * y + 5
-    # least squares in double precision over values around 20
-    np.testing.assert_allclose(texture.fit_low_pass(plane, KNOWN, 8.0), plane, atol=1e-10)
-
-
-def test_grain_and_single_bushes_are_no_trend():
-    values = np.where(np.indices((64, 64)).sum(0) % 2, 1.0, -1.0)
-    assert np.abs(texture.fit_low_pass(values, KNOWN, 6.0)).max() < 0.1  # a checkerboard's one-sided mean at the border
-    bush = np.zeros((64, 64))
-    bush[30:34, 30:34] = 1
-    # a plain average would take 16 / (2 pi 6^2) = 0.07 of it
-    assert texture.fit_low_pass(bush, KNOWN, 6.0).max() < 0.01
-
-
-def test_unknown_cells_take_no_part():
-    values, known = np.full((64, 64), 2.0), KNOWN.copy()
-    values[:20], known[:20] = 99, False
-    np.testing.assert_allclose(texture.fit_low_pass(values, known, 6.0), 2, atol=1e-9)
+from dav_gswt.tiles.layout import Layout
 
 
 def test_detrending_flattens_a_slope_and_keeps_mean_and_cover(sample_ground):
@@ -78,32 +53,6 @@ def test_a_bright_patch_in_a_dark_frame_is_darkened_by_the_step():
     np.testing.assert_allclose(found, np.where(labels[..., None], -0.1, 0) * np.ones(4), atol=1e-7)
 
 
-def test_a_tile_takes_the_correction_of_its_border():
-    ring = np.full((24, 24, 4), 0.25)
-    found = poisson_blending.solve_tile(
-        np.zeros((24, 24), np.uint8), np.zeros((9, 2), int), ring, PLAN, flat_ground(0.1)
-    )
-    np.testing.assert_allclose(found, 0.25, atol=1e-12)  # Laplace's equation with a constant border
-
-
-@pytest.mark.parametrize("upright", [True, False])
-def test_a_strip_is_fitted_to_the_corner_patch_at_its_ends(upright):
-    labels = np.ones((24, 12), np.uint8)
-    labels[8:16] = 0
-    labels = labels if upright else np.ascontiguousarray(labels.T)
-    found = poisson_blending.solve_strip(labels, np.array([[38, 0], [0, 0]]), PLAN, flat_ground(0.1))
-    np.testing.assert_allclose(found, np.where(labels[..., None] == 0, -0.1, 0) * np.ones(4), atol=1e-7)
-
-
-def test_a_step_beyond_the_limit_counts_less():
-    labels, shift = patched()
-    ground = flat_ground(1.0)
-    weak = poisson_blending.SoftMaps(ground.values, 0.1)
-    found = poisson_blending.solve_tile(labels, shift, np.zeros((24, 24, 4)), PLAN, weak)
-    # J = 1 / (1 + (1 / 0.1)^2) for colour; a step of height left in the ground would be a gap
-    np.testing.assert_allclose(found[12, 12], [-1 / 101] * 3 + [-1], rtol=1e-9)
-
-
 def noise(width, cells=256, seed=0):
     values = np.random.default_rng(seed).normal(size=(cells, cells, 3))
     soft = np.stack([gaussian_filter(values[..., c], width, mode="wrap") for c in range(3)], -1)
@@ -114,19 +63,6 @@ def noise(width, cells=256, seed=0):
 def test_blurred_noise_has_the_scale_that_its_correlation_says(width):
     # r = exp(-d^2 / 4 s^2) to where it is .1: 2 int r d = 4 s^2 (1 - .1)
     assert texture.measure_texture_scale(noise(width)) == pytest.approx(2 * width * np.sqrt(0.9), rel=0.12)
-
-
-def test_neither_brightness_nor_contrast_nor_a_trend_changes_the_scale():
-    ground = noise(3)
-    y, x = np.mgrid[-1:1:256j, -1:1:256j]
-    scale = texture.measure_texture_scale(ground)
-    assert texture.measure_texture_scale(0.2 + 0.1 * ground) == pytest.approx(scale)
-    assert texture.measure_texture_scale(ground + 0.3 * (x + y)[..., None]) == pytest.approx(scale, rel=0.1)
-
-
-@pytest.mark.parametrize("ground", [np.zeros((40, 40, 3)), np.full((40, 40, 3), 0.1), np.full((10, 10, 3), 1 / 3)])
-def test_even_ground_has_no_scale(ground):
-    assert texture.measure_texture_scale(ground) == 0
 
 
 def test_tiles_get_smaller_and_strips_wider_with_the_scale():

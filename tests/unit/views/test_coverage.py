@@ -18,8 +18,7 @@ from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import coverage, selection
-from dav_gswt.views.pose_maps import PoseMaps, write_pose_maps
-from dav_gswt.views.scores import Scores
+from dav_gswt.views.scores import PoseMaps, Scores, write_pose_maps
 from dav_gswt.views.scoring import scoring_camera
 from dav_gswt.views.uncertainty import Scales
 
@@ -35,16 +34,6 @@ def look(x, y, z, at=(1.6, 1.6, 0.0), size=64):
 
 def gain(cells, taken, one, importance=None):
     return coverage.DirectionalCoverage(cells, cells.view(taken), cells.view([one]), importance).gain(0)
-
-
-def test_pixels_are_shared_among_the_cells_that_a_picture_shows_whose_middles_are_where_their_gaussians_are(cells):
-    inside = cells.view([look(1.6, 1.7, 3.0)]).pixels[0]
-    assert inside.sum() == pytest.approx(64 * 64, rel=0.03)
-    corner = cells.view([look(0.4, 0.5, 1.0, (0.4, 0.4, 0.0))]).pixels[0].reshape(coverage.CELLS, -1)
-    assert corner[:14, :14].sum() > 0.99 * corner.sum()
-    side = 3.2 / coverage.CELLS
-    x, y = cells.middle.reshape(coverage.CELLS, -1, 3)[3, 20, :2]
-    assert abs(x - 20.5 * side) < side and abs(y - 3.5 * side) < side
 
 
 def test_gains_are_what_the_formula_says(cells):
@@ -77,24 +66,6 @@ def test_importance_has_any_scale_and_none_at_all_is_an_equal_one_and_what_shows
     for bad in (-1.0, np.nan):
         with pytest.raises(ValueError, match="importance"):
             gain(cells, [], one, np.full(coverage.CELLS**2, bad))
-
-
-def test_the_error_of_a_cell_is_that_of_the_pixels_that_count_and_show_it_or_the_worst_where_none_does(cells):
-    """Photos of the field itself, but for a corner that is brighter by .2."""
-    wrong = []
-    for view in patch.photos(size=96):
-        x, y = (view.camera.rays()[0] + view.camera.rays()[1] * 4.0)[..., :2].transpose(2, 0, 1)
-        brighter = 0.2 * ((x < 1.2) & (y < 1.2) & (view.image.max(-1) < 0.8))
-        wrong.append(replace(view, image=view.image + brighter[..., None].astype(np.float32)))
-    error = coverage.measure_cell_errors(cells, wrong)
-    corner = (cells.middle[:, :2] < 1.0).all(1)
-    rest = (cells.middle[:, :2] > 1.4).any(1) & (error < error.max())
-    assert np.median(error[corner]) == pytest.approx(0.04, rel=0.2) and np.median(error[rest]) < 1e-4
-    near = replace(wrong[0], camera=look(0.5, 0.6, 1.0, (0.5, 0.5, 0.0), 96), image=wrong[0].image * 0)
-    error = coverage.measure_cell_errors(cells, [near])
-    assert error[-1] == error.max() > 0
-    assert (coverage.measure_cell_errors(cells, [replace(near, weight=0 * near.weight)]) == 0).all()
-    assert (coverage.measure_cell_errors(cells, []) == 0).all()
 
 
 SPLIT = ViewSplit(("p0.png", "p2.png"), (), ())

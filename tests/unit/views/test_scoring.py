@@ -1,19 +1,22 @@
-"""Scores of poses over a small ground, with a prior whose samples disagree by a known amount."""
+"""Scores of poses over a small ground, by priors whose samples are known."""
 
 from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
+import torch
 from fixtures import ground as patch
+from fixtures import lpips_arrays
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.poses import Pose, pose_of_camera
-from dav_gswt.prior import conditions
-from dav_gswt.views import coverage, pose_maps, scores, scoring
-from dav_gswt.views.prior_sampling import PriorConfig
+from dav_gswt.geometry.poses import pose_of_camera
+from dav_gswt.prior.interface import Condition
+from dav_gswt.prior.networks import SIZE, Network
+from dav_gswt.prior.terrain import TerrainPrior
+from dav_gswt.views import scores, scoring
 from dav_gswt.views.scores import FrozenScales
-from dav_gswt.views.scoring import backproject_maps
+from dav_gswt.views.scoring import BATCH, PriorConfig, backproject_maps
 from dav_gswt.views.terms import TERMS
 from dav_gswt.views.uncertainty import Quantiles, Scales
 
@@ -84,46 +87,6 @@ def test_a_gaussian_gets_the_uncertainty_of_the_pixels_that_it_covers():
     assert (found.gaussians[far] == np.float32(0.3)).all() and (found.gaussians[~far] != np.float32(0.3)).any()
 
 
-def test_without_a_prior_only_geometric_terms_are_computed_of_which_coverage_is_the_gain_over_the_photos_so_far():
-    found, cells = scored(), coverage.GroundCells(patch.field(), patch.grid())
-    assert set(found.scores.terms) == {"opacity", "coverage"} and found.maps.w2_sq is None
-    assert np.array_equal(found.gaussians, patch.field().uncertainty)
-    assert (found.scores.terms["coverage"] > 0).all() and found.frozen.pixels is None
-    masks = [scoring.ground_mask(patch.grid(), scoring.scoring_camera(camera)) for _, camera in pool()]
-    means = [(seen * mask).sum() / mask.sum() for seen, mask in zip(found.maps.opacity, masks, strict=True)]
-    np.testing.assert_allclose(found.scores.terms["opacity"], means, rtol=1e-6)
-    assert all(0 < mask.mean() < 1 for mask in masks)
-    taken, wanted = (
-        cells.view([scoring.scoring_camera(camera) for camera in seen])
-        for seen in ([view.camera for view in patch.photos()], [camera for _, camera in pool()])
-    )
-    assert np.array_equal(found.maps.cells, wanted.pixels) and wanted.pixels.any(1).all()
-    assert np.array_equal(found.scores.terms["coverage"], coverage.DirectionalCoverage(cells, taken, wanted).gains())
-    unseen = scoring.score_poses(patch.field(), patch.grid(), pool(), [], patch.FRAME)
-    assert (unseen.scores.terms["coverage"] > found.scores.terms["coverage"]).all()
-
-
-def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
-    wide = pool([1.6, 1.6, 5.0], width=60)[0][1]
-    cut = conditions.crop_camera(wide)
-    assert (cut.width, cut.height) == (40, 40) and cut.cx == wide.cx - 10
-    np.testing.assert_allclose(cut.rays()[1], wide.rays()[1][:, 10:50])
-    picture = np.random.default_rng(0).random((40, 60, 3), np.float32)
-    assert np.array_equal(conditions.crop_image(picture), picture[:, 10:50])
-    photos = patch.photos()
-    large = conditions.prepare_photos(photos, patch.FRAME, 64).photos
-    assert large.shape == (3, 64, 64, 3)  # smaller photos are enlarged
-    known = conditions.prepare_photos(photos, patch.FRAME, 24)
-    near = photos[1].camera.centre + [0, 0, 0.1]
-    condition = conditions.build_condition(patch.field(), pool(near), known, 6.0, 24)
-    assert np.array_equal(condition.photo[0], known.photos[1])
-    assert condition.relative[0] == pytest.approx([0, 0, 1, 0], abs=0.05) and condition.colour.shape == (1, 24, 24, 3)
-    turned = conditions.relative_pose(Pose("", 10.0, 20.0, 3.0), Pose("", 40.0, 110.0, 6.0), 6.0)
-    assert turned == pytest.approx([np.pi / 6, 1, 0, 0.5], abs=1e-6)
-    up = conditions.render_view(patch.field(), pool([1.6, 1.61, 3.0])[0][1], 6.0)
-    assert up.inverse_depth[20, 20] == pytest.approx(6 / 3, rel=0.02) and up.alpha[20, 20] > 0.95
-
-
 def test_a_prior_is_not_shown_what_no_photo_shows():
     """The south half was guessed: the prior sees a hole there; the geometric terms see the whole field."""
     whole = patch.field()
@@ -143,11 +106,11 @@ def test_a_prior_is_not_shown_what_no_photo_shows():
 
 def test_maps_are_read_as_written(tmp_path):
     found = scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2))
-    pose_maps.write_pose_maps(tmp_path / "maps.npz", found.maps, found.gaussians)
-    back, gaussians = pose_maps.read_pose_maps(tmp_path / "maps.npz")
+    scores.write_pose_maps(tmp_path / "maps.npz", found.maps, found.gaussians)
+    back, gaussians = scores.read_pose_maps(tmp_path / "maps.npz")
     (tmp_path / "broken.npz").write_bytes(b"PK nothing of the kind")
     with pytest.raises(InputError, match="broken.npz: not readable as maps"):
-        pose_maps.read_pose_maps(tmp_path / "broken.npz")
+        scores.read_pose_maps(tmp_path / "broken.npz")
     assert back.names == ["p0", "p1", "p2"] and np.array_equal(gaussians, found.gaussians)
     assert np.array_equal(back.w2_sq, found.maps.w2_sq)
     np.testing.assert_allclose(back.opacity, found.maps.opacity, atol=1e-3)
@@ -162,3 +125,54 @@ def test_frozen_scales_are_read_as_written_and_other_files_are_refused(tmp_path)
         (tmp_path / "scores.json").write_text(bad)
         with pytest.raises(InputError, match="scores.json: does not hold the scales"):
             scores.read_frozen_scales(tmp_path / "scores.json")
+
+
+N = 8
+NAMES = [f"p{i}" for i in range(N)]
+ALL = np.ones((N, 32, 32), np.float32)  # every pixel counts
+
+
+class Grey:
+    """Samples that differ in sign."""
+
+    name, size, small = "grey", 32, False
+
+    def sample(self, condition, m, p_drop, steps, seed, common=True):
+        signs = np.where(np.arange(m) % 2, -1.0, 1.0)[None, :, None, None, None]
+        return (signs * np.ones((len(condition), m, 4, 32, 32))).astype(np.float32)
+
+    def decode(self, latents):
+        return np.full((*latents.shape[:2], 32, 32, 4), 0.5, np.float32)
+
+
+def condition(n):
+    blank = np.zeros((n, 32, 32, 3), np.float32)
+    return Condition(blank, blank[..., 0], blank[..., 0], blank, np.zeros((n, 4), np.float32))
+
+
+def sampled(config, n=N, masks=ALL):
+    return scoring.sample_terms(config, condition(n), NAMES[:n], masks[:n])
+
+
+def test_without_dropout_the_one_sample_is_compared_with_the_render():
+    alone = PriorConfig(Grey(), 2, 2, 0.0, weights=lpips_arrays.random())
+    assert (sampled(alone, 3)["single"] > 0).all()  # grey is not the black that the render shows
+    assert not sampled(alone, 3, 0 * ALL)["single"].any()
+    assert "single" not in sampled(replace(alone, p_drop=0.1), 3)
+
+
+def test_terms_do_not_depend_on_the_number_of_threads_which_pytorch_keeps(monkeypatch):
+    torch.manual_seed(3)
+    prior, rng, count = TerrainPrior(Network()), np.random.default_rng(1), BATCH + 1  # one whole batch and a rest
+    planes = [rng.uniform(0, 1, (count, SIZE, SIZE)).astype(np.float32) for _ in range(2)]
+    colour, photo = (rng.uniform(0, 1, (count, SIZE, SIZE, 3)).astype(np.float32) for _ in range(2))
+    seen = Condition(colour, *planes, photo, rng.uniform(-1, 1, (count, 4)).astype(np.float32))
+    config = PriorConfig(prior, 2, 2, 0.2, weights=lpips_arrays.random())
+    before, found = torch.get_num_threads(), []
+    for threads in ("1", "2"):
+        monkeypatch.setenv("DAV_GSWT_THREADS", threads)
+        masks = np.ones((count, SIZE, SIZE), np.float32)
+        found.append(scoring.sample_terms(config, seen, NAMES[:count], masks))
+        assert torch.get_num_threads() == before
+    for name in ("w2_sq", "lpips", "gradient", "maps"):
+        np.testing.assert_array_equal(*(each[name] for each in found), err_msg=name)

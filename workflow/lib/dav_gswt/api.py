@@ -17,7 +17,7 @@ from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.field import GaussianField, read_field, write_field
 from dav_gswt.geometry.cameras import Camera, pinhole
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import Levels
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.coarse import Reconstruction
 from dav_gswt.terrain.endless import EndlessTerrain
@@ -121,11 +121,11 @@ def score_poses(fitted: Reconstruction, photos: Photos, count: int = 250) -> Sco
     Returns: `scores.poses`, and by `scores.term("opacity")` and `scores.term("coverage")` one value for each pose:
         mean uncertainty in the view, and new ground and directions that a photo would add.
     """
-    from dav_gswt.views import candidates, feasibility, scoring
+    from dav_gswt.views import candidates, scoring
 
     scene = {"agent": "handheld", "candidates": count, "poses": "orbit"}
     listed = candidates.list_poses(scene, photos.frame, photos.views[0].camera)
-    free = feasibility.filter_feasible(listed, fitted.field, fitted.grid, photos.frame.flying_height)
+    free = candidates.filter_feasible(listed, fitted.field, fitted.grid, photos.frame.flying_height)
     return scoring.score_poses(fitted.field, fitted.grid, free, photos.views, photos.frame)
 
 

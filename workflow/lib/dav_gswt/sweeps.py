@@ -13,7 +13,7 @@ from dav_gswt.files import read_json
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k", "rounds", "tiling", "tau")
 QUALITY = ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")  # of the test views
 TILES = ("uncertainty", "deep", "levels", "splats", "bundle_mb")
-ORDERS = ("orders", "order_mb", "order_db", "compose_s", "sort_s")  # of `bundle.order_costs`
+ORDERS = ("orders", "order_mb", "order_db", "compose_s", "sort_s")  # of `bundle.orders`
 ROUND_JOBS = ("score", "select", "update")  # jobs of each round: their seconds are means over the rounds
 JOBS = ("levels", "cut", "bundle", "stills")
 TIMES = ("coarse_s", *(f"{job}_s" for job in ROUND_JOBS), "recon_s", *(f"{job}_s" for job in JOBS), "peak_mb")
@@ -27,7 +27,7 @@ def tabulate_cell(cell: dict) -> dict:
 
     Columns: `psnr_is`, colour-corrected for photos, whose exposure changes, and else raw; `uncertainty`, the mean over
     the tiles; `deep`, the share of tiles that are drawn in all orders; `bundle_mb` of the parts; those of ORDERS are
-    `bundle.order_costs.measure_orders`'s. Seconds are those of whole jobs; `recon_s` sums all jobs that lead to the
+    `bundle.orders.measure_orders`'s. Seconds are those of whole jobs; `recon_s` sums all jobs that lead to the
     field, except taking photos.
     cell: the keys of CELL, `corrected`, `files` (metrics, manifest, orders) and `times` (benchmark files by job).
     """

@@ -8,8 +8,7 @@ import { createRenderer } from "../draw/renderer.js";
 import { backdropOptions } from "../scene/open_terrain.js";
 import { hitGround } from "../terrain/camera.js";
 import { REACH, tileUnder } from "../terrain/cells.js";
-import { createDepthSorter } from "../terrain/draw_order.js";
-import { run } from "../terrain/steps.js";
+import { createDepthSorter, run } from "../terrain/draw_order.js";
 import { createVariation } from "../terrain/variation.js";
 
 /**

@@ -4,8 +4,7 @@
 import { isCoordinate, PageError, REMAKE } from "./checks.js";
 import { gswtSource, isGswt } from "./gswt.js";
 import { findFault, KINDS, NAME, pickKnown } from "./manifest.js";
-import { fileSource, readStream, webSource } from "./source.js";
-import { openZip } from "./zip.js";
+import { fileSource, openZip, readStream, webSource } from "./source.js";
 
 /**
  * @typedef {import("./manifest.js").Manifest} Manifest

@@ -1,5 +1,5 @@
 // Layout of what the worker hands to the GPU: record rows, pages of orders, blocks of instances, places of objects. A
-// chunk has one 16-byte record a Gaussian (a texel of four 32-bit words). compose.js makes it, and quantize.js for sets
+// chunk has one 16-byte record a Gaussian (a texel of four 32-bit words). compose.js makes it, and gswt.js for sets
 // that the page converts; draw/shaders.js decodes it. An object of the terrain is numbered like a tile, after all.
 
 /**

@@ -2,11 +2,10 @@
 
 import { MAX_MATERIALS } from "../terrain/classes.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
-import { MAX_OCTAVES as MAX_JITTER } from "../terrain/jitter.js";
+import { LOWEST } from "../terrain/light.js";
 import { findRunFault } from "../terrain/painted.js";
 import { MAX_RADIUS } from "../terrain/scatter.js";
-import { LOWEST } from "../terrain/sun.js";
-import { MAX_WAVES as MAX_VARIATION } from "../terrain/variation.js";
+import { MAX_OCTAVES as MAX_JITTER, MAX_WAVES as MAX_VARIATION } from "../terrain/variation.js";
 import {
   brief, isColour, isCoordinate, isDigest, isDirection, isFilled, isInside, isLength, isList, isName, isNatural,
   isRange, isSalt, isShare, isSize, isVector, isWhole, REMAKE,
@@ -16,7 +15,7 @@ import {
   CACHE_BYTES, chunkBytes, deviationOf, isEncoding, MAX_COUNT, MAX_LEVELS, MAX_ORDERS, MAX_STEPS, RECORD, VERSION,
   viewRoom,
 } from "./layout.js";
-import { MAX_RATIO } from "./zip.js";
+import { MAX_RATIO } from "./source.js";
 
 /**
  * A file of the bundle, and what it unpacks to; a chunk: of records from `first` on in a part, or composed; and how the

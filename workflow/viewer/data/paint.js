@@ -1,6 +1,6 @@
 // What a person paints and sets on the page, as plain values, as a JSON file and in a link (numbers of variable length,
 // deflated, in base64url). Each is checked before it is used.
-// Read by dav_gswt/terrain/paint_file.py too.
+// Read by dav_gswt/terrain/class_rules.py too.
 
 import { LATTICE, MAX_MATERIALS } from "../terrain/classes.js";
 import { createPainted, findRunFault } from "../terrain/painted.js";

@@ -1,5 +1,5 @@
 // Far ground of planes that are not flat: rings of points about the eye on the surface, up to the horizon, drawn after
-// the sky and before the splats. The same picture as dav_gswt/terrain/far_ground.py.
+// the sky and before the splats. The same picture as dav_gswt/terrain/backdrop.py.
 
 import { REACH } from "../terrain/cells.js";
 import { createProgram, setAxes } from "./gl.js";

@@ -1,7 +1,6 @@
 // Light in the shaders: code for the light of ground and sky, their uniforms, and the texture of shadows.
 
-import { GAMMA, MOST } from "../terrain/light.js";
-import { SIZE } from "../terrain/shadows.js";
+import { GAMMA, MOST, SIZE } from "../terrain/light.js";
 import { createTexture } from "./gl.js";
 
 /**
@@ -23,7 +22,7 @@ vec3 shineOn(vec2 slope, float share) {
 }`);
 
 const SHADOW_CODE = `
-uniform highp sampler2D shadows; // margins of terrain/shadows.js
+uniform highp sampler2D shadows; // margins of terrain/light.js
 uniform vec2 shadowUnder;        // the eye in that texture
 uniform float shadowScale, soft; // of places seen from the eye; margin at which the sun is whole
 float sunShare(vec2 at) {
@@ -76,7 +75,7 @@ export function createShadowTexture(gl) {
     /**
      * Set what a picture needs; the texture is bound.
      *
-     * @param {Uniforms} uniforms @param {import("../terrain/shadows.js").Shadows | null} shadows @param {number[]} eye
+     * @param {Uniforms} uniforms @param {import("../terrain/light.js").Shadows | null} shadows @param {number[]} eye
      */
     set(uniforms, shadows, eye) {
       if (shadows && shadows.margins !== shown) {

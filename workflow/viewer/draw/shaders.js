@@ -11,7 +11,7 @@ import { OBJECTS, OVERLAYS } from "./overlays.js";
 import { WIND } from "./wind.js";
 
 const AIR = 0.12; // height at which the sky of a planet is 1/e as bright, in radii
-/** Distance that leaves 1/e of the far ground's colour, over the distance of the last tiles; see terrain/far_ground.py. */
+/** Distance that leaves 1/e of the far ground's colour, over the distance of the last tiles; see terrain/backdrop.py. */
 export const FAR_HAZE = 2.5;
 const FAR_SPACING = 0.0525; // of its points, over their distance
 const UNCERTAINTY = OVERLAYS.indexOf("uncertainty");
@@ -145,7 +145,7 @@ vec3 surface(vec2 at) { // a quadratic B-spline of the pixels; rows go south
   return sum;
 }`;
 
-/** Weights of levels by distance, as dav_gswt/terrain/weights.py; tests/golden/weights.json holds both to it. */
+/** Weights of levels by distance, as dav_gswt/terrain/draw_order.py; tests/golden/weights.json holds both to it. */
 export const LEVEL_WEIGHTS = `
 uniform float switches[${MAX_LEVELS}], bands[${MAX_LEVELS}];
 uniform int levels;
@@ -222,7 +222,7 @@ const BEND = `  float bent = bend(texelFetch(stems, ivec2(0, int(row / ${ROW}u))
 const SWAY = `
   if (bent > 0.0) seen.xy += bent * sway(place > 0u ? cell * side + corner.xy : seen.xy); // an object as a whole`;
 
-/** Sky that thins out with height, and far ground, as dav_gswt/terrain/sphere_backdrop.py has them. */
+/** Sky that thins out with height, and far ground, as dav_gswt/terrain/backdrop.py has them. */
 export const SPHERE_BACKDROP = `
 uniform vec3 zenith, horizon, ground;
 uniform vec3 upward;       // from the planet's middle to the eye, of length 1

@@ -1,7 +1,13 @@
 // Draw order of cells and tiles: back to front, with little or no sorting; and a sort of Gaussians by depth.
 // The same as dav_gswt/terrain/draw_order.py; tests/golden/draw_order.json holds both to it.
 
-import { run } from "./steps.js";
+/** All steps at once. @template T @param {Generator<void, T>} steps @returns {T} */
+export function run(steps) {
+  for (;;) {
+    const { done, value } = steps.next();
+    if (done) return value;
+  }
+}
 
 const BITS = 11, DIGITS = 1 << BITS; // of the radix sort
 const STEP = 32768; // Gaussians

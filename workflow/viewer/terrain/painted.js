@@ -1,5 +1,5 @@
 // Painted places: points of the lattice of scores that a person gave a material. See classes.js for what they change.
-// The same as dav_gswt/terrain/painted.py, where the idea is; tests/golden/classes.json holds both to it.
+// The same as dav_gswt/terrain/classes.py, where the idea is; tests/golden/classes.json holds both to it.
 
 /**
  * Runs of painted points: [I, J, length, material], from (I, J) to the east, sorted by J, then by I.

@@ -1,5 +1,5 @@
 // The sphere: a planet of tiles, six faces of n x n cells each, and how the plane of a tile bends onto it.
-// The same numbers as dav_gswt/terrain/sphere.py, which explains them; tests/golden/sphere.json holds both to it.
+// The same numbers as dav_gswt/terrain/planet.py, which explains them; tests/golden/sphere.json holds both to it.
 
 export const FACES = [ // east, north and out of each face
   [[0, 1, 0], [0, 0, 1], [1, 0, 0]],

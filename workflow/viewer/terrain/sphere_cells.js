@@ -1,4 +1,4 @@
-// Cells of a sphere that an eye may see, and their draw order. Port of dav_gswt/terrain/sphere_cells.py.
+// Cells of a sphere that an eye may see, and their draw order. Port of dav_gswt/terrain/planet.py.
 
 import { createRecentCache, RING } from "./caches.js";
 import { REACH } from "./cells.js";
@@ -34,7 +34,7 @@ export function findReach({ side }, { radius }, eye) {
 
 /**
  * Where the last tiles are blended into the backdrop (end), and the sine of the angle there below the horizon (low);
- * see dav_gswt/terrain/sphere_backdrop.py.
+ * see dav_gswt/terrain/backdrop.py.
  *
  * @param {Sphere} sphere @param {number[]} eye @param {number} reach
  */

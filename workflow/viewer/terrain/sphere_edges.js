@@ -1,5 +1,5 @@
 // Tiles on the faces of a sphere, and the frayed edges where two faces meet turned.
-// The same as dav_gswt/terrain/sphere_edges.py, which explains it; tests/golden/sphere.json holds both to it.
+// The same as dav_gswt/terrain/planet.py, which explains it; tests/golden/sphere.json holds both to it.
 
 import { tileAt } from "./choice.js";
 import { createNoise, SHIFT } from "./heights.js";
@@ -90,5 +90,5 @@ export function createFraying({ cells }, side, salt) {
   };
 }
 
-/** The columns of all faces beside each other, as dav_gswt/terrain/sphere.py. @param {{ cells: number }} sphere @param {number} face @param {number} i */
+/** The columns of all faces beside each other, as dav_gswt/terrain/planet.py. @param {{ cells: number }} sphere @param {number} face @param {number} i */
 export const columnOf = ({ cells }, face, i) => face * (cells + 2) + i + 1;

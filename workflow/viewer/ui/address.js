@@ -93,7 +93,7 @@ export function replaceAddress(hash) {
  * Keep the address at the walker's place, and follow an address that a person enters.
  *
  * @param {import("./viewer.js").Viewer} viewer
- * @param {Pick<import("./paint_keep.js").PaintKeep, "link" | "follow">} paint
+ * @param {Pick<import("./painting.js").PaintKeep, "link" | "follow">} paint
  */
 export function syncAddress(viewer, paint) {
   ours = location.hash;

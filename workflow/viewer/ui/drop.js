@@ -5,7 +5,7 @@ import { filesOf, openSource as openFiles, sourceOf } from "../data/bundle.js";
 import { PageError } from "../data/checks.js";
 import { NAME } from "../data/manifest.js";
 import { MAX_FILES } from "../data/source.js";
-import { readPaintFile } from "./paint_keep.js";
+import { readPaintFile } from "./painting.js";
 
 /**
  * @typedef {import("../data/source.js").Source} Source

@@ -4,7 +4,7 @@ import { DENSITY_STEPS, MAX_DENSITY } from "../data/paint.js";
 import { MAX_PAINTED } from "../terrain/painted.js";
 import { createPanel, cssColour, element, isField, swatch } from "./dom.js";
 import { createBrush, ERASER, SIZES } from "./paint_brush.js";
-import { createPaintKeep, readPaintFile } from "./paint_keep.js";
+import { createPaintKeep, readPaintFile } from "./painting.js";
 
 /**
  * @typedef {import("./viewer.js").Viewer} Viewer

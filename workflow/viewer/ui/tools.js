@@ -8,7 +8,7 @@ import { MODES, moveTo } from "./walker.js";
 
 /**
  * @typedef {import("./viewer.js").Viewer} Viewer
- * @typedef {import("./paint_keep.js").PaintKeep} PaintKeep
+ * @typedef {import("./painting.js").PaintKeep} PaintKeep
  */
 
 const EVERY = 200; // milliseconds between updates of the progress of saving

@@ -10,13 +10,12 @@ import { backdropOptions, listDrawnCells, openTerrain, readTerrain } from "../sc
 import { cameraAt } from "../terrain/camera.js";
 import { tileUnder } from "../terrain/cells.js";
 import { formatAddress, parseOverlay, parsePlace, parseSun, parseWind } from "./address.js";
-import { showDaylight } from "./daylight.js";
 import { element } from "./dom.js";
 import { createResting } from "./frame_loop.js";
 import { createPainting } from "./painting.js";
 import { createTour } from "./tour.js";
 import { createWalker, moveTo } from "./walker.js";
-import { createWind, showWindButton } from "./wind.js";
+import { createWind, showDaylight, showWindButton } from "./weather.js";
 
 /**
  * @typedef {import("../data/source.js").Source} Source

@@ -1,17 +1,97 @@
-// From a view to what the GPU draws. Independent of the page and of messages, so worker, tests and benchmarks share it.
+// From a view to what the GPU draws: lists of blocks of instances and of places of objects, see data/layout.js.
+// Independent of the page and of messages, so worker, tests and benchmarks share it.
 
-import { chunkKey, MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
-import { selectCells } from "../terrain/budget.js";
+import {
+  BLOCK, chunkKey, MAX_NEAR_PLACES, NO_ORDER, orderPages, PAGE, PLACE, PLACES, recordRows,
+} from "../data/layout.js";
+import { placeObjects, selectCells } from "../terrain/budget.js";
 import { lookUpCell, REACH } from "../terrain/cells.js";
 import { nearestOrder } from "../terrain/draw_order.js";
-import { placeObjects } from "../terrain/object_placement.js";
 import { bend, dot, FACES, rateOf } from "../terrain/sphere.js";
-import { createChunkStore, WISHED } from "./chunk_store.js";
-import { createDrawLists } from "./draw_lists.js";
+import { createChunkStore, createSupply, WISHED } from "./chunk_store.js";
 import { createNearSorter } from "./near_sort.js";
 import { createBorders, createSortedBatches } from "./sorted_batches.js";
-import { createSupply } from "./supply.js";
 import { adjustCover, createTerrainTables, paintPoints } from "./terrain_tables.js";
+
+/** Words of 32 bits, in items of equal size; grows. @param {number} size words of an item */
+function createWordList(size) {
+  let words = new Uint32Array(1024 * size), floats = new Float32Array(words.buffer), n = 0;
+  return {
+    clear() {
+      n = 0;
+    },
+    /** Room for more items: all words and the index of the first new one. @param {number} more */
+    extend(more) {
+      if (size * (n + more) > words.length) {
+        const wider = new Uint32Array(2 * size * (n + more));
+        wider.set(words);
+        words = wider;
+        floats = new Float32Array(words.buffer);
+      }
+      n += more;
+      return { words, floats, at: size * (n - more) };
+    },
+    copy: () => words.slice(0, size * n),
+  };
+}
+
+/** @param {import("./terrain_tables.js").TerrainTables} terrain */
+export function createDrawLists({ objects, tiles }) {
+  const blocks = createWordList(BLOCK), places = createWordList(PLACE);
+  return {
+    clear() {
+      blocks.clear();
+      places.clear();
+    },
+    copy: () => ({ blocks: blocks.copy(), places: places.copy() }),
+    /**
+     * What the GPU knows of a cell or an object: tile, direction, uncertainty, whether one level stands in for all.
+     *
+     * @param {{ tile: number, direction: number, whole: boolean }} cell
+     */
+    mark: ({ tile, direction, whole }) =>
+      (tile & 255) | (direction << 8) | (tiles[tile].uncertainty << 16) | ((whole ? 1 : 0) << 24),
+    /**
+     * Add the blocks of a batch. place: number of an object's place, counted from 1; 0: a tile.
+     *
+     * @param {{ di: number, dj: number }} cell @param {number} mark
+     * @param {import("./sorted_batches.js").Batch} batch @param {number} [place]
+     */
+    addBatch({ di, dj }, mark, { pages, count }, place = 0) {
+      const which = (di + 128) | ((dj + 128) << 8), { words, at } = blocks.extend(pages.length);
+      for (let k = 0, w = at, left = count; k < pages.length; k++, left -= PAGE, w += BLOCK) {
+        words[w] = pages[k];
+        words[w + 1] = which | ((Math.min(left, PAGE) - 1) << 16);
+        words[w + 2] = mark;
+        words[w + 3] = place;
+      }
+    },
+    /**
+     * Add an object; returns the number of its place. level: for places in the near block.
+     *
+     * @param {import("../terrain/scatter.js").Thing} thing @param {number} mark @param {number} level
+     */
+    addThing({ x, y, cos, sin, size, number }, mark, level) {
+      const { words, floats, at } = places.extend(1);
+      floats.set([x, y, cos * size, sin * size, objects[number].ground, size], at);
+      words[at + 6] = mark;
+      words[at + 7] = level;
+      return at / PLACE;
+    },
+    /**
+     * Add a cell of a sphere; returns the number of its place.
+     *
+     * @param {import("../terrain/sphere_cells.js").Spot} spot @param {number} mark
+     */
+    addSpot({ face, s, t, centre }, mark) {
+      const { words, floats, at } = places.extend(1);
+      floats.set([...centre, s, t], at);
+      words[at + 5] = face;
+      words[at + 6] = mark;
+      return at / PLACE;
+    },
+  };
+}
 
 /**
  * @typedef {import("../terrain/frustum.js").Cell} Cell
@@ -48,7 +128,7 @@ const BORDER_LIMIT = 0.2; // milliseconds of making those of single cells, which
 
 /**
  * @param {import("../data/manifest.js").Manifest} manifest
- * @param {import("../terrain/heights.js").HeightField} heights @param {import("./supply.js").Handlers} [handlers]
+ * @param {import("../terrain/heights.js").HeightField} heights @param {import("./chunk_store.js").Handlers} [handlers]
  */
 export function createFrameBuilder(manifest, heights, handlers = {}) {
   const terrain = createTerrainTables(manifest, heights);

@@ -4,9 +4,8 @@
 
 import { chunkKey, MAX_LEVELS, MAX_ORDERS, PAGE } from "../data/layout.js";
 import { createPagePool, createRecentCache } from "../terrain/caches.js";
-import { createDepthSorter } from "../terrain/draw_order.js";
+import { createDepthSorter, run } from "../terrain/draw_order.js";
 import { materialAt } from "../terrain/scatter.js";
-import { run } from "../terrain/steps.js";
 
 /**
  * @typedef {import("../terrain/cells.js").Border} Border

@@ -14,8 +14,7 @@ from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import Extent
 from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.prior.conditions import RenderedView, find_nearest, relative_pose, render_view
-from dav_gswt.prior.interface import Condition
+from dav_gswt.prior.interface import Condition, RenderedView, find_nearest, relative_pose, render_view
 from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.fitting.plan import FitSettings

@@ -21,18 +21,15 @@ from fixtures.imported_models import (
     write_json,
 )
 
-from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.images import image_files
 from dav_gswt.photos import importers
-from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
+from dav_gswt.photos.colmap_model import reprojection_errors
 from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model
 from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.photo_matching import PhotoFolder, match_photos_to_images
-from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.recognition import recognize_input
-from dav_gswt.photos.sfm.registration import undistort_pixels
 
 OPTIONS = replace(made.OPTIONS, features=500)
 
@@ -98,20 +95,6 @@ def test_observations_of_a_colmap_model_are_its_own(photos, tmp_path, binary):
     assert len(found.model.pixels) > 0.7 * 60 * 8
 
 
-def test_photos_may_be_smaller_than_the_models_and_pictures_smaller_still(tmp_path):
-    shoot(tmp_path / "half", 0.5)
-    write_colmap(tmp_path / "m", sees=True)
-    found = import_model(tmp_path / "m", tmp_path / "half", replace(OPTIONS, side=100))
-    assert max(found.lenses[0].width, found.lenses[0].height) == 100
-    assert max(found.model.cameras[0].width, found.model.cameras[0].height) <= 100
-    assert reprojection_errors(found.model).max() < 1e-4
-    assert undistort_pixels(found, 0, image_files.read_photo(found.sources[0])).shape == (
-        found.model.cameras[0].height,
-        found.model.cameras[0].width,
-        3,
-    )
-
-
 def test_names_are_found_by_path_then_by_stem(tmp_path):
     files = ["a/1.jpg", "b/1.jpg", "b/2.png", "c/3.v2.jpg", "c/.hidden/4.jpg"]
     for name in files:
@@ -124,15 +107,6 @@ def test_names_are_found_by_path_then_by_stem(tmp_path):
     image_files.write_png(tmp_path / unicodedata.normalize("NFD", "düne.png"), np.zeros((4, 4, 3)))
     assert PhotoFolder(tmp_path).find("düne.png") == "düne.png"  # composed in the model, not on the disk
     assert found.find("1.jpg") is None and found.find("4") is None  # of two photos, of none
-
-
-def test_of_photos_of_one_name_the_one_in_the_same_last_folders_is_found(tmp_path):
-    for name in ("day1/a.jpg", "day2/a.jpg", "day2/a.png"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        image_files.write_png(tmp_path / name, np.zeros((4, 4, 3)))
-    found = PhotoFolder(tmp_path)
-    assert found.find("home/me/day1/a.jpg") == "day1/a.jpg" and found.find("me/day2/a.png") == "day2/a.png"
-    assert found.find("day3/a.jpg") is None and found.find("day2/a.tif") is None
 
 
 @pytest.mark.parametrize(
@@ -188,16 +162,6 @@ def test_a_project_is_recognised_and_its_photos_have_cameras(tmp_path, program):
     assert [place.path for place in placed] == [tmp_path / "images" / name for name in SCENE.names]
 
 
-def test_one_photo_of_two_images_and_fewer_than_three_photos_are_refused(tmp_path, photos):
-    values = transforms()
-    values["frames"][1]["file_path"] = "elsewhere/000.jpg"
-    with pytest.raises(InputError, match=r"are one photo: 000.png"):
-        import_model(write_json(tmp_path / "t.json", values), photos, OPTIONS)
-    values["frames"] = transforms()["frames"][:2]
-    with pytest.raises(InputError, match="2 of its 2 images have a photo"):
-        import_model(write_json(tmp_path / "t.json", values), photos, OPTIONS)
-
-
 def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path):
     """Programs that make models read the stored picture; we read the upright one. What is seen where stays."""
     shoot(tmp_path / "plain")
@@ -214,16 +178,6 @@ def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path):
     upright = image_files.read_size(tmp_path / "tagged" / "000.tif")
     assert (found.lenses[0].width, found.lenses[0].height) == upright
     assert reprojection_errors(found.model).max() < 1e-4
-
-
-def test_the_stage_goes_on_from_a_given_model(photos, found_once, tmp_path, monkeypatch):
-    monkeypatch.setattr(importers, "_find_points", found_once)
-    path = write_json(tmp_path / "r.json", reconstruction())
-    facts = prepare_photos(photos, tmp_path / "out", OPTIONS, path)
-    assert facts.registered == 8 and facts.relief < 0.02
-    stored = read_colmap_model(tmp_path / "out" / "sparse")
-    assert len(stored.points) == facts.points > 200
-    assert np.median([c.centre[2] for c in stored.cameras]) == pytest.approx(1, abs=1e-9)
 
 
 def test_of_several_reconstructions_the_largest_is_taken_and_a_reference_makes_it_metric(photos, tmp_path, caplog):
@@ -271,16 +225,6 @@ def test_a_model_without_a_place_gets_metres_from_positions_that_agree(photos, t
 
 def read_transforms(values, photos):
     return import_nerfstudio(Path("t.json"), values, PhotoFolder(photos).stored_size)
-
-
-def test_frames_may_have_intrinsics_of_their_own_and_a_field_of_view_instead(photos):
-    values = transforms()
-    angle = 2 * np.arctan(0.5 * WIDTH / 310.0)
-    values["frames"][3] |= {"camera_angle_x": angle, "fl_y": 311.0, "cx": 150.0, "k1": 0.0, "camera_model": "OPENCV"}
-    given = read_transforms(values, photos)
-    own = [310, 311, 150, *NUMBERS[3:4], 0, *NUMBERS[5:]]
-    assert given.images[3].lens.params == pytest.approx(np.array(own))
-    assert given.images[2].lens.params == pytest.approx(np.array(NUMBERS))
 
 
 def test_a_file_without_sizes_takes_those_of_the_photos(photos):

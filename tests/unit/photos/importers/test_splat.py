@@ -1,16 +1,24 @@
-"""Finished fields: found upright, scaled, cleaned."""
+"""Finished fields and splats of other programs: read as described, found upright, scaled, cleaned."""
 
+import gzip
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from fixtures import photos as synth
+from fixtures.random_field import random_field
+from fixtures.splat_files import read_spz
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.errors import InputError
+from dav_gswt.export.axes import Y_UP, turn_field
+from dav_gswt.export.splat_files import write_spz
+from dav_gswt.export.spool import Spool
 from dav_gswt.field import GaussianField, write_field
 from dav_gswt.photos.importers import splat
 from dav_gswt.photos.importers.splat import fit_field_frame
+from dav_gswt.photos.importers.splat_files import read_splat
 from dav_gswt.photos.photo_set import import_field
 
 
@@ -29,11 +37,6 @@ def ground_field(rng, n=6000):
         np.zeros(n, np.float32),
         np.zeros(n, bool),
     )
-
-
-def covariances(field):
-    turn = Rotation.from_quat(field.quats[:, [1, 2, 3, 0]]).as_matrix()
-    return np.einsum("nij,nj,nkj->nik", turn, np.exp(2.0 * field.log_scales.astype(float)), turn)
 
 
 @pytest.fixture
@@ -62,29 +65,6 @@ def test_a_field_enters_its_ground_frame_upright_scaled_and_cleaned(rng):
     assert len(lying) - len(field) == facts.removed and facts.gaussians == len(field)
     assert 15 <= facts.removed <= 20  # a floater may lie within the scene by chance
     assert np.abs(field.means).max() < 2
-
-
-def test_a_large_haze_is_no_part_of_the_scene(rng):
-    field = ground_field(rng)
-    field.log_scales[:7] = np.log(5.0)
-    assert fit_field_frame(field, rng, (0, 0, 1))[1].removed in range(22, 28)
-
-
-def test_covariances_turn_and_grow_with_the_field(rng):
-    field = ground_field(rng, n=50)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    turn *= np.sign(np.linalg.det(turn))
-    moved = splat._transform_field(field, turn, 3.0, np.ones(3))
-    # Through float32 quaternions and logarithms.
-    assert covariances(moved) == pytest.approx(9 * turn @ covariances(field) @ turn.T, rel=1e-4, abs=1e-8)
-    assert moved.means == pytest.approx(3 * field.means @ turn.T + 1, rel=1e-5, abs=1e-5)
-
-
-def test_up_says_which_side_is_up(rng):
-    field = ground_field(rng)
-    above, _ = fit_field_frame(field, np.random.default_rng(0), (0, 0, 1))
-    below, _ = fit_field_frame(field, np.random.default_rng(0), (0, 0, -1))
-    assert above.means[:, 2].max() > 0.05 and below.means[:, 2].min() < -0.05
 
 
 @pytest.mark.parametrize(
@@ -126,16 +106,6 @@ def test_ground_on_which_nothing_stands_is_turned_as_usual_and_the_key_is_named(
     assert frame.source is not None and frame.source.axes[2] == pytest.approx([0, 1, 0], abs=0.01)
 
 
-def test_a_street_between_walls_lies_level(rng):
-    """The walls have more Gaussians than the street, which is level by the usual axes."""
-    street = ground_field(rng)[1000:5900]
-    walls = [replace(street, means=street.means[:, [2, 1, 0]] + np.float32([side, 0, 0.9])) for side in (-0.3, 0.3)]
-    street = replace(street, means=street.means * np.float32([0.3, 1, 1]))
-    whole = GaussianField.concatenate([street, *(wall[::2] for wall in walls)])
-    _, frame = fit_field_frame(whole, rng, usual=(0, 0, 1))
-    assert frame.source is not None and frame.source.axes[2] == pytest.approx([0, 0, 1], abs=0.1)
-
-
 def sky(rng, count, radius):
     """A hemisphere of opaque Gaussians above ground that has z up."""
     rays = rng.normal(size=(count, 3))
@@ -157,17 +127,6 @@ def test_a_shell_of_sky_is_dropped_and_said(rng, caplog, share, radius):
     side, wanted = (f.exemplar.side * f.source.unit for f in (frame, alone))
     assert side == pytest.approx(wanted, rel=0.02)
     assert f"{len(around)} of {len(field) + len(around)} Gaussians" in caplog.text and "crop" in caplog.text
-
-
-def test_details_and_sparse_ground_are_no_reason_to_drop_the_rest(rng):
-    field = ground_field(rng)[:-20]
-    middle = rng.normal(0, 0.05, (20, 3))
-    bushes = [replace(field, means=(field.means * np.float32(0.05) + at).astype(np.float32))[::4] for at in middle]
-    bushes = [replace(bush, log_scales=bush.log_scales - np.float32(2)) for bush in bushes[:2]]
-    detailed = GaussianField.concatenate([field, *bushes])
-    assert fit_field_frame(detailed, rng, (0, 0, 1))[1].removed == 0
-    sparse = np.arange(len(field)) % 3 == 0
-    assert fit_field_frame(field[sparse | (field.means[:, 0] < 0)], rng, (0, 0, 1))[1].removed == 0
 
 
 def test_a_crop_is_the_scene_whatever_lies_around(rng):
@@ -199,3 +158,69 @@ def test_positions_coarser_than_the_gaussians_are_refused(rng):
     far = replace(field, means=field.means + np.float32([0, 5234567, 0]))
     with pytest.raises(InputError, match="0.5 apart.*double"):
         fit_field_frame(far, rng)
+
+
+@pytest.fixture
+def field():
+    given = random_field(300, seed=3)
+    return replace(given, log_scales=given.log_scales - 3, sh=0.5 * given.sh)
+
+
+@pytest.fixture(params=[2, 3])
+def spz(request, field, tmp_path):
+    with Spool(tmp_path / "spool") as spool:
+        spool.append(field)
+    write_spz(spool, tmp_path / "a.spz", request.param)
+    return tmp_path / "a.spz"
+
+
+def test_an_spz_is_read_as_a_second_reader_does(spz, field):
+    splats, other = read_splat(spz), read_spz(spz)
+    read = splats.field
+    np.testing.assert_allclose(read.means, other.means, atol=1e-6)
+    np.testing.assert_allclose(read.means, turn_field(field, Y_UP).means, atol=1e-3)
+    np.testing.assert_allclose(read.log_scales, other.log_scales, atol=1e-6)
+    np.testing.assert_allclose(read.sh, other.sh, atol=1e-5)
+    np.testing.assert_allclose(np.abs((read.quats * other.quats).sum(1)), 1, atol=1e-2)  # 3 bytes a rotation
+    seen = np.abs(read.opacity_logits) < 16
+    np.testing.assert_allclose(read.opacity_logits[seen], other.opacity_logits[seen], atol=1e-4)
+    assert splats.sh_degree == 0 and not splats.origin.any()
+
+
+def test_an_spz_of_version_1_has_half_precision_places(tmp_path):
+    places = np.array([[1.5, -2, 0.25], [7, 0, -8]], "<f2")
+    header = np.array([0x5053474E, 1, 2], "<u4").tobytes() + bytes([1, 0, 0, 0])
+    columns = places.tobytes() + bytes([255, 0]) + bytes(6) + bytes([160] * 6) + bytes([128] * 6) + bytes(18)
+    (tmp_path / "a.spz").write_bytes(gzip.compress(header + columns))
+    splats = read_splat(tmp_path / "a.spz")
+    assert splats.field.means.tolist() == places.tolist() and splats.sh_degree == 1
+    assert splats.field.opacity_logits.tolist() == [16, -16] and not splats.field.log_scales.any()
+
+
+def test_what_is_cut_short_or_announces_too_much_is_refused(spz, tmp_path):
+    whole = gzip.decompress(spz.read_bytes())
+    more = whole[:8] + np.uint32(99_000_000).tobytes() + whole[12:]
+    files = {"a.spz": spz.read_bytes()[:-40], "b.spz": gzip.compress(whole[:-9]), "c.spz": gzip.compress(more)}
+    files |= {"d.spz": gzip.compress(b"other" * 9)}
+    for name, data in files.items():
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(InputError, match=re.escape(name)):
+            read_splat(tmp_path / name)
+    with pytest.raises(InputError, match="g.spz: there is no such file"):
+        read_splat(tmp_path / "g.spz")
+
+
+@pytest.mark.parametrize(
+    "name, data, kind",
+    [
+        ("a b.ksplat", bytes(99), "a .ksplat"),
+        ("b.splat", bytes(64), "a .splat"),
+        ("a.spz", b"NGSP" + bytes(40), "an SPZ of version 4"),
+    ],
+)
+def test_kinds_that_are_not_read_are_named_with_the_command_that_converts_them(tmp_path, name, data, kind):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(
+        InputError, match=f"is {re.escape(kind)}.*convert it: npx @playcanvas/splat-transform .*{name}'? .*ply"
+    ):
+        read_splat(tmp_path / name)

@@ -76,20 +76,6 @@ def test_without_altitudes_the_model_gives_them_and_the_rest_stays_exact(reconst
     assert np.abs(off).max() < 0.5  # metres, of 40: the plane of rough ground lies a hundredth off
 
 
-def test_positions_without_altitudes_count_from_the_ground(monkeypatch):
-    monkeypatch.setattr(gps, "read_gps_position", lambda path: (48.0 + 0.001 * int(path.name), 11.0, np.nan))
-    found = gps.read_gps_positions([Path(str(i)) for i in range(5)])
-    assert found.about.altitude == 0 and np.isnan(found.at[:, 2]).all() and np.isfinite(found.at[:, :2]).all()
-
-
-def test_a_similarity_in_the_plane_has_no_mirror():
-    rng = np.random.default_rng(1)
-    a = np.c_[rng.normal(0, 50, 20), np.zeros(20)]
-    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
-    scale, found, shift, off = gps.fit_similarity(a, 2 * a @ turn.T + [3.0, -4.0])
-    assert scale == pytest.approx(2) and found == pytest.approx(turn) and shift == pytest.approx([3, -4]) and off < 1e-9
-
-
 def test_positions_count_where_most_photos_have_one_and_they_spread(monkeypatch):
     """Photos 0.001 degrees of latitude apart, which are 111 metres."""
     places = {f"{i}": (48.0 + 0.001 * i, 11.0, 500.0) for i in range(5)}

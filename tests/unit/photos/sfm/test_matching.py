@@ -9,7 +9,7 @@ from fixtures import photos as synth
 from dav_gswt.files import write_json
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import write_colmap_model
-from dav_gswt.photos.sfm import features, localization
+from dav_gswt.photos.sfm import localization
 from dav_gswt.photos.sfm.features import (
     compare_descriptions,
     describe_photos,
@@ -34,18 +34,6 @@ def test_photos_that_overlap_are_matched_whatever_their_names():
     place = np.argsort(order)
     neighbours = {tuple(sorted((int(place[i]), int(place[i + 1])))) for i in range(29)}
     assert len(neighbours & found) >= 28
-
-
-def test_all_photos_hang_together(monkeypatch):
-    rng = np.random.default_rng(1)
-    apart = [rng.integers(0, 255, (60, 128)).astype(np.uint8) for _ in range(25)]
-    monkeypatch.setattr(features, "NEXT", 0)  # whatever their names
-    found = select_pairs(apart, 1, 0)
-    group = {0}
-    for _ in range(25):
-        group |= {k for pair in found if set(pair) & group for k in pair}
-    assert group == set(range(25))
-    assert len(select_pairs([np.zeros((0, 128), np.uint8)] * 8, 12, 0)) == 28
 
 
 def test_the_choice_repeats_and_photos_without_features_do_no_harm():

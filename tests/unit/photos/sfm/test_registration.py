@@ -12,7 +12,7 @@ from fixtures import rooms
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.geometry.scene_frame import SfmSign, SfmVerdict, read_scene_frame
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
 from dav_gswt.photos.photo_set import prepare_photos
@@ -175,16 +175,6 @@ def test_photos_with_and_without_exif_go_together(tmp_path, ground):
     assert found.focal.ratio == pytest.approx(1, abs=0.02) and found.model.names == NAMES
     assert [c.fx for c in found.model.cameras] == pytest.approx([synth.FOCAL] * 8, rel=0.02)
     assert all(lens.params[3] != 0 for lens in found.lenses)
-
-
-def test_a_refused_model_stops_before_anything_is_written(photos, solved, tmp_path, monkeypatch):
-    refused = SfmVerdict("refused", (SfmSign("placed", "refused", "placed is odd"),))
-    monkeypatch.setattr(registration, "extract_features", lambda *_: None)
-    monkeypatch.setattr(registration, "match_photos", lambda *_: None)
-    monkeypatch.setattr(registration, "find_solution", lambda *_: replace(solved[1], verdict=refused))
-    with pytest.raises(InputError, match="do not fit together to one scene: placed is odd"):
-        prepare_photos(photos, tmp_path / "out", OPTIONS)
-    assert not (tmp_path / "out").exists()
 
 
 def test_an_undistorted_picture_is_what_a_pinhole_camera_sees(tmp_path):

@@ -1,13 +1,17 @@
-"""The verdict on structure from motion: made models that are right, and wrong in one way each."""
+"""The verdict on structure from motion, of made models that are wrong in one way each, and which model is taken."""
 
-from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pycolmap
 import pytest
 from fixtures import photos as synth
 
 from dav_gswt.errors import InputError
-from dav_gswt.geometry.scene_frame import SfmSign, SfmVerdict
+from dav_gswt.geometry.scene_frame import FocalLength, SfmSign, SfmVerdict
+from dav_gswt.photos.colmap_model import select_points, write_colmap_model
+from dav_gswt.photos.sfm import mapping
+from dav_gswt.photos.sfm.mapping import Approach, SfmPhoto, SfmScene, SfmSolution
 from dav_gswt.photos.sfm.verdict import (
     THRESHOLDS,
     combine_grades,
@@ -74,20 +78,6 @@ def test_gps_alone_makes_a_model_doubtful(model):
     assert grades(drift)["GPS"] == "good"  # altitudes drift in flights that are right
 
 
-def test_a_slope_is_level_ground_by_gps_and_a_wall_is_not(model):
-    lean = 2 * positions(model, 0.0)
-    for degrees, grade in ((20, "good"), (80, "refused")):
-        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-        turned = lean @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
-        assert grades(judge(model, positions=turned))["ground"] == grade
-
-
-def test_points_that_two_photos_see_are_no_good_sign(model):
-    order = np.concatenate([np.flatnonzero(model.point_of == p)[:2] for p in range(len(model.points))])
-    short = replace(model, **{key: getattr(model, key)[order] for key in ("point_of", "image_of", "pixels")})
-    assert grades(judge(short))["track length"] == "refused"
-
-
 @pytest.mark.parametrize(("ties", "grade"), [(7, "refused"), (30, "doubtful"), (60, "good")])
 def test_photos_that_hang_on_the_others_by_a_few_points_are_named(model, ties, grade):
     (sign,) = (sign for sign in judge(synth.loosen(model, 5, ties)).signs if sign.name == "hangs together")
@@ -129,3 +119,72 @@ def test_signs_are_weighed_together(found, grade):
 def test_a_refused_model_says_what_to_photograph_or_to_mend(found, message):
     with pytest.raises(InputError, match=message):
         require_trust(SfmVerdict("refused", tuple(signs(*found))))
+
+
+def verdict(grade: str, *names: str) -> SfmVerdict:
+    return SfmVerdict(grade, tuple(SfmSign(name, grade, f"{name} is odd") for name in names))
+
+
+class Placed(pycolmap.Reconstruction):
+    """A model of which only the number of its images is known; they are the first ones."""
+
+    def __init__(self, count: int):
+        super().__init__()
+        self.count = count
+
+    def num_reg_images(self) -> int:
+        return self.count
+
+    def reg_image_ids(self) -> list[int]:
+        return list(range(1, self.count + 1))
+
+
+@pytest.fixture
+def solutions(monkeypatch):
+    """Ways of mapping that give what a test says, and no others; the ways that were asked for."""
+    asked = []
+
+    def give(*verdicts, placed=(8, 8, 8), unsure=0):
+        def solve(approach, scene, seed):
+            asked.append(approach)
+            if verdicts[len(asked) - 1] is None:
+                raise InputError(f"way {len(asked)} places nothing")
+            focal = FocalLength(300.0, 330.0, 330.0, 30.0, "freed")
+            return SfmSolution(Placed(placed[len(asked) - 1]), (), focal, verdicts[len(asked) - 1], unsure)
+
+        monkeypatch.setattr(mapping, "_solve", solve)
+        scene = SfmScene("folder", [], {1: 300.0}, {}, Path("database.db"))
+        return mapping.find_solution(scene, 0), asked
+
+    return give
+
+
+def test_the_best_of_several_ways_is_taken_and_all_are_named(solutions):
+    found, asked = solutions(verdict("refused", "tilt", "GPS"), verdict("good"), verdict("doubtful", "tilt"))
+    assert asked[1:] == [Approach("incremental", hold_focal=True), Approach("global", hold_focal=True)]
+    assert found.verdict.grade == "good" and len(found.verdict.tried) == 3
+    assert found.verdict.tried[0] == "incremental mapping: refused (tilt is odd; GPS is odd)"
+
+
+def test_photos_without_a_place_are_named_with_what_they_share():
+    photos = [SfmPhoto(Path(f"{i}.jpg"), f"{i}.png", (4, 3), 4, 3, None) for i in range(5)]
+    pairs = [(0, 1, 90), (0, 2, 40), (2, 1, 50), (2, 3, 70), (4, 0, 1)]
+    (two, three, four), unsure = mapping.explain_left_out(photos, {0, 1}, pairs)
+    assert unsure == 1
+    assert two[0] == "2.jpg" and "shares 50 points" in two[1]
+    assert three[0] == "3.jpg" and "matches no photo" in three[1] and "shares 1 points" in four[1]
+
+
+def test_photos_that_hang_on_the_others_by_a_few_points_lose_their_place(tmp_path):
+    rng = np.random.default_rng(1)
+    whole = synth.model(synth.flight(3, 4), synth.plain(800, 0.9, rng, relief=0.02))
+    for ties, lost in ((7, {8: 7, 9: 7, 10: 7, 11: 7}), (60, {})):
+        loose = synth.loosen(whole, 4, ties)
+        write_colmap_model(select_points(loose, np.bincount(loose.point_of, minlength=800) >= 2), tmp_path)
+        best = pycolmap.Reconstruction(str(tmp_path))
+        assert mapping.remove_loose_photos(best) == lost
+        assert best.num_reg_images() == 12 - len(lost)
+        assert min(point.track.length() for point in best.points3D.values()) >= 2
+    photos = [SfmPhoto(Path(f"{i}.jpg"), f"{i}.png", (4, 3), 4, 3, None) for i in range(3)]
+    ((name, reason),), _ = mapping.explain_left_out(photos, {0, 1}, [(0, 1, 90), (0, 2, 40)], {2: 7})
+    assert name == "2.jpg" and reason.startswith("only 7 points tie it to the other photos")

@@ -1,12 +1,11 @@
-"""The families of land: that they repeat, where things stand, and what all share."""
+"""Synthetic land: families, meshes and random fields follow their seed, whatever the threads."""
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
-from scipy import ndimage
 
-from dav_gswt.photos.synthetic import oasis, scene
+from dav_gswt.photos.synthetic import desert, meshes, noise, planet, plants, scene
 from dav_gswt.photos.synthetic.land import make_ground_mesh  # as it is before `small_land` replaces it
 
 every_family = pytest.mark.parametrize("name", scene.FAMILIES)
@@ -38,27 +37,6 @@ def test_a_family_follows_its_seed(name, grown, golden):
     golden(name, *parts_of(grown(name)[0]))
 
 
-@every_family
-def test_everything_is_finite_rooted_in_the_ground_and_no_reflectance_leaves_0_to_1(name, grown):
-    made, height = grown(name)
-    over = np.linspace(-3, 3, 201)
-    assert height(*np.meshgrid(over, over)).mean() == pytest.approx(0, abs=3e-3)  # another sampling of the exemplar
-    for mesh in [made.ground, *made.plants]:
-        assert np.isfinite(mesh.vertices).all()
-        assert mesh.colours is None or mesh.colours.min() > 0 and mesh.colours.max() < 1
-    assert made.albedo.min() > 0 and made.albedo.max() < 1
-    kind, x, y, z, size = made.places.T[:5]
-    assert (size > 0).all() and kind.min() >= 0 and kind.max() < len(made.plants)
-    if name == "planet":  # no rock floats, and many are half buried
-        lowest, highest = np.array([[m.vertices[:, 2].min(), m.vertices[:, 2].max()] for m in made.plants]).T
-        ground = height(x, y)
-        assert (z + size * lowest[kind.astype(int)] < ground + 5e-3).all()  # flat ones do by up to 2 mm
-        assert (z + size * highest[kind.astype(int)] > ground).all() and 0.25 < (z < ground).mean() < 0.75
-    else:
-        assert z == pytest.approx(height(x, y), abs=1e-9)
-        assert all(plant.vertices[:, 2].min() < 0 for plant in made.plants)
-
-
 def test_the_mesh_of_the_ground_is_fine_about_the_origin_and_faces_up():
     mesh = make_ground_mesh(lambda x, y: 0.1 * x - 0.2 * y)
     x, y, z = mesh.vertices.T.astype(float)
@@ -71,17 +49,47 @@ def test_the_mesh_of_the_ground_is_fine_about_the_origin_and_faces_up():
     assert (np.cross(b - a, c - a)[:, 2] > 0).all() and len(mesh.faces) == 2 * (side - 1) ** 2
 
 
-def test_materials_hold_their_share_of_the_exemplar_on_both_sides_of_a_narrow_path():
-    material = np.roll(oasis.draw_layout(np.random.default_rng(0), 512, 6.0).material, (256, 256), (0, 1))
-    material = material[160:-160, 160:-160]  # the exemplar
-    for number, share in ((oasis.MEADOW, 0.33), (oasis.BOULDERS, 0.165)):
-        assert (material == number).mean() == pytest.approx(share, abs=0.01)
-        pieces, _ = ndimage.label(material == number)
-        areas = np.sort(np.bincount(pieces.ravel())[1:])[::-1]
-        assert areas[0] > 0.5 * areas.sum() and areas[:3].sum() > 0.85 * areas.sum()
-    path = material == oasis.PATH
-    pieces, _ = ndimage.label(path, np.ones((3, 3)))
-    longest = pieces == 1 + np.argmax(np.bincount(pieces.ravel())[1:])
-    rows, columns = np.nonzero(longest)
-    assert max(np.ptp(rows), np.ptp(columns)) == len(path) - 1  # all the way through
-    assert 0.3 < 2 * ndimage.distance_transform_edt(path).max() * 16 / 512 < 0.7
+PLANTS = {
+    "shrub": plants.make_shrub,
+    "dry tuft": plants.make_dry_tuft,
+    "tuft": plants.make_tuft,
+    "seed grass": plants.make_seed_grass,
+    "clover": plants.make_clover,
+}
+PLANTS |= {f"flower {k}": partial(plants.make_flower, kind=f) for k, f in enumerate(plants.MEADOW_FLOWERS)}
+PLANTS |= {"bush": partial(plants.make_flower, kind=plants.MEADOW_FLOWERS[0], most=9)}
+STONES = {
+    "stone": partial(meshes.make_stone, subdivisions=2, palette=desert.STONES),
+    "rock": partial(meshes.make_rock, subdivisions=2, palette=planet.ROCKS),
+}
+MATS = {
+    "mat": partial(plants.make_mat, count=40, length=0.12, dry=0.2),
+    "stand": partial(plants.make_stand, count=40, length=0.9, width=0.01, tint=plants.TINTS[1]),
+    "swathe": lambda rng: plants.make_swathe(rng, [PLANTS["flower 3"](rng) for _ in range(2)], 4, (0.3, 0.4)),
+}
+EVERY = PLANTS | STONES | MATS
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_a_mesh_is_that_of_its_seed(name, golden):
+    golden(name, *(EVERY[name](np.random.default_rng(seed)) for seed in (1, 2)))
+
+
+def test_a_ripple_has_its_profile(golden):
+    phase = np.linspace(-np.pi, np.pi, 2001)
+    golden("ripple profile", noise.ripple_profile(phase))
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda rng: noise.make_noise(rng, 64, 4.0, 1.0, 0.2, 1.0),
+        lambda rng: np.stack(noise.make_ripples(rng, 64, 4.0, 0.3, 0.5)),
+    ],
+)
+def test_a_raster_is_the_same_on_any_number_of_threads(monkeypatch, draw):
+    found = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("DAV_GSWT_THREADS", threads)
+        found.append(draw(np.random.default_rng(3)))
+    assert np.array_equal(*found)

@@ -1,19 +1,18 @@
-"""Synthetic scenes: that pictures are taken where cameras say, and that they repeat."""
+"""Synthetic scenes: pictures are taken where cameras say and repeat, and what the photos/ folder holds."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures import photos as synth
 
 from dav_gswt.geometry.cameras import pinhole
-from dav_gswt.images.srgb import encode_srgb
-from dav_gswt.photos.synthetic import mitsuba_scene
+from dav_gswt.geometry.scene_frame import read_scene_frame
+from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
+from dav_gswt.photos.synthetic import mitsuba_scene, photo_set
 from dav_gswt.photos.synthetic import scene as synthetic
-from dav_gswt.photos.synthetic.land import Land, Light
-from dav_gswt.photos.synthetic.meshes import Mesh
 
 mi = pytest.importorskip("mitsuba")
-ENTRY = {"family": "desert", "seed": 0, "photo_count": 8, "test": 6, "size": 64, "candidates": 20}
 
 
 @pytest.fixture(autouse=True)
@@ -44,47 +43,6 @@ def test_points_of_light_appear_where_the_camera_projects_them():
         assert found == pytest.approx(pixel, abs=0.06)
 
 
-def box(colour, at=(0.0, 0.0, 0.0)):
-    """A cube of side 1 on the ground; each face has its own corners."""
-    square, faces, corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float), [], []
-    for axis in range(3):
-        for side in (0.0, 1.0):
-            faces += [np.array([0, 1, 2]) + 4 * len(corners), np.array([0, 2, 3]) + 4 * len(corners)]
-            corners.append(np.insert(square, axis, side, axis=1))
-    vertices = (np.concatenate(corners) - [0.5, 0.5, 0.0] + at).astype(np.float32)
-    return Mesh(vertices, np.array(faces), np.tile(np.array(colour, np.float32), (len(vertices), 1)))
-
-
-def test_a_stone_a_plant_and_shadows_are_where_the_land_says():
-    """Red ground at z = 0, a green stone at x = -1.5; a blue plant at x = 1.5 on a slope; the sun in the east."""
-    corners = np.array([[-40, -40, 0], [40, -40, 0], [40, 40, 0], [-40, 40, 0]], np.float32)
-    ground = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), None, smooth=True)
-    albedo = np.tile(np.float32([0.8, 0.1, 0.1]), (2, 2, 1))
-    light = Light(40.0, 0.0, (2.0, 2.0, 2.0), (0.05, 0.05, 0.2), (0.3, 0.1, 0.1), np.full(3, 0.1))
-    size, yaw, slope = 0.8, 0.6, np.array([0.2, -0.3])
-    places = np.array([[0, 1.5, 0.5, 0.25, size, yaw, *slope]])
-    stone = box((0.1, 0.8, 0.1), (-1.5, 0.0, 0.0))
-    world = mitsuba_scene.build_scene(Land(ground, albedo, 4.0, stone, [box((0.1, 0.1, 0.8))], places, light))
-
-    def height(x, y):
-        return 9.0 - world.ray_intersect(mi.Ray3f([x, y, 9.0], [0, 0, -1])).t
-
-    for radius, turn, hit in ((0.2, 0.3, True), (0.5, np.pi / 4, True), (0.45, 0.0, False), (0.45, np.pi / 2, False)):
-        off = radius * np.array([np.cos(yaw + turn), np.sin(yaw + turn)])
-        assert height(1.5 + off[0], 0.5 + off[1]) == pytest.approx((0.25 + size + off @ slope) * hit, abs=1e-4)
-    assert height(-1.1, 0.4) == pytest.approx(1.0, abs=1e-4) and height(-0.9, 0.4) == pytest.approx(0, abs=1e-4)
-    camera = pinhole((0.0, 0.0, 8.0), (0.0, 0.0, 0.0), 64, 64, 60.0)
-    seen = mitsuba_scene.render_light(world, camera, 16, 0)
-    at = np.array([[-1.5, 0, 1.0], [1.5, 0.5, 1.05], [0, -2, 0], [-2.4, 0, 0], [-0.6, 0, 0]])
-    column, row = camera.project(at)[0].astype(int).T
-    colours = seen[row, column]
-    assert colours[:3].argmax(axis=1).tolist() == [1, 2, 0]
-    assert colours[2:].max(axis=1) == pytest.approx([0.37, 0.05, 0.37], abs=0.1)  # lit, in the stone's shadow, lit
-    for target, colour in (((0.0, 0.0, 9.0), light.zenith), ((0.0, 9.0, 3.05), light.horizon)):
-        sky = mitsuba_scene.render_light(world, pinhole((0.0, 0.0, 3.0), target, 16, 16, 1.0), 16, 0)
-        assert sky[:7].mean(axis=(0, 1)) == pytest.approx(colour, rel=0.15)
-
-
 def test_a_picture_repeats_to_the_byte_whatever_the_threads():
     import drjit
 
@@ -103,8 +61,48 @@ def test_a_picture_repeats_to_the_byte_whatever_the_threads():
     assert one.min() >= 0 and one.max() <= 1 and one.std() > 0.02
 
 
-@pytest.mark.parametrize(
-    "light, code", [(0.0, 0.0), (1.0, 1.0), (7.0, 1.0), (-1.0, 0.0), (0.5, 0.7353570), (0.002, 0.02584)]
-)
-def test_light_is_encoded_as_srgb(light, code):
-    assert encode_srgb(np.array([light]))[0] == pytest.approx(code, abs=1e-6)
+ENTRY = {"family": "desert", "seed": 0, "photo_count": 3, "test": 2, "size": 64, "candidates": 0}
+
+
+def test_views_yield_points_on_the_ground(tmp_path, monkeypatch):
+    """Photos of flat ground from a height of 6 metres."""
+    monkeypatch.setattr(photo_set, "FEATURES", 300)
+    cameras = synth.flight(2, 3, step=0.9, height=6.0)
+    synth.shoot(tmp_path, cameras, synth.texture(np.random.default_rng(4)), 6.0)
+    shots = [(f"{i:03d}.png", camera) for i, camera in enumerate(cameras)]
+    every = photo_set.triangulate_points(tmp_path, shots, 0)
+    assert every.names == tuple(name for name, _ in shots)
+    assert len(every.points) > 100 and np.quantile(np.abs(every.points[:, 2]), 0.9) < 0.05
+    more = photo_set.add_cameras(every, [("-test.png", cameras[0])])
+    assert more.names == ("-test.png", *every.names) and more.cameras[0] == cameras[0]
+    assert np.array_equal(np.array(more.names)[more.image_of], np.array(every.names)[every.image_of])
+
+
+@pytest.fixture
+def dark(monkeypatch):
+    """Black photos, in which no point is found: only the record is looked at here."""
+
+    def nothing(folder, shots, seed):
+        names, cameras = (tuple(column) for column in zip(*shots, strict=True))
+        none = np.zeros(0, int)
+        return ColmapModel(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
+
+    monkeypatch.setattr(synthetic, "render", lambda scene, camera: np.zeros((64, 64, 3), np.float32))
+    monkeypatch.setattr(photo_set, "triangulate_points", nothing)
+
+
+def test_test_views_are_x(dark, tmp_path):
+    entry = ENTRY | {"min_elevation": 60}
+    around = synthetic.orbit_cameras([(45.0, 20.0 + turn, 6.3) for turn in (0, 120, 240)], 64)
+    cameras = {"high": synthetic.test_views(entry), "oblique": around}
+    groups = {"high": ["test_00.png", "test_01.png"], "oblique": ["test_02.png", "test_03.png", "test_04.png"]}
+    photo_set.render_set(entry, tmp_path, synthetic.start_views(entry), cameras)
+    frame = read_scene_frame(tmp_path / "ground.json")
+    assert frame.test_groups == {group: tuple(names) for group, names in groups.items()}
+    assert frame.test == tuple(name for group in groups.values() for name in group)
+    assert frame.images == frame.registered == 3
+    stored = read_colmap_model(tmp_path / "sparse")
+    for name, camera in zip(frame.test, [*cameras["high"], *around], strict=True):
+        assert stored.camera(name).centre == pytest.approx(camera.centre)
+    pictures = sorted(p.name for p in (tmp_path / "images").iterdir())
+    assert pictures == [*frame.test, "view_00.png", "view_01.png", "view_02.png"]

@@ -17,7 +17,7 @@ from fixtures.no_reads import no_reads
 from dav_gswt import raster
 from dav_gswt.field import concatenate_fields
 from dav_gswt.raster import backends
-from dav_gswt.reconstruction.fitting import densification, exposure, state, trainer
+from dav_gswt.reconstruction.fitting import exposure, state, trainer
 from dav_gswt.reconstruction.fitting.descent import Descent, TrainingState, TrainingTask
 from dav_gswt.reconstruction.fitting.plan import FitPlan, Schedule
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
@@ -113,35 +113,6 @@ def test_a_step_neither_reads_nor_copies_and_no_shape_depends_on_a_value(device,
         assert np.isfinite(float(run.loss)) and descent.check(run) is None
 
 
-READS = {
-    "a number": lambda t: float(t.sum()),
-    "a condition": lambda t: 1 if t.sum() > 0 else 2,
-    "a list": lambda t: t.tolist(),
-    "an array": lambda t: t.numpy(),
-    "an array by NumPy": np.asarray,
-    "the host": lambda t: t.cpu(),
-    "another device": lambda t: t.to("meta"),
-    "what the host has": lambda t: t + torch.tensor([1.0, 2.0, 3.0]),
-    "an array of the host": lambda t: t + torch.from_numpy(np.ones(3, np.float32)),
-    "what a mask selects": lambda t: t[t > 0],
-    "where something is": torch.nonzero,
-}
-
-
-@pytest.mark.parametrize("read", READS.values(), ids=READS)
-def test_a_read_that_is_put_into_a_step_is_noticed(device, monkeypatch, read):
-    if device.name == "cuda":
-        pytest.skip("gsplat reads how long its list of tiles is")
-    run, task, descent = begin(device, PLANS["plain"])
-    learn = exposure.ExposureTracker.learn
-    monkeypatch.setattr(
-        exposure.ExposureTracker, "learn", lambda self, *given: [learn(self, *given), read(self.gains[0])]
-    )
-    with no_reads(), pytest.raises(RuntimeError, match="a copy or a read in a step"):
-        trainer._advance(run, task, descent)
-    trainer._advance(run, task, descent)
-
-
 def test_a_whole_fit_grows_and_prunes_as_without_a_gpu(device, monkeypatch):
     field = made.field(GRID)
     plan = FitPlan(30, len(field) + 40)
@@ -157,15 +128,6 @@ def test_a_whole_fit_grows_and_prunes_as_without_a_gpu(device, monkeypatch):
     assert type(fitted[1].means) is np.ndarray
 
 
-def test_only_the_nearly_transparent_are_shaken(device):
-    run, task, descent = begin(device, PLANS["plain"], loose=True)
-    run.state.values["opacity_logits"][-1] = densification.LOOSE_LOGIT + 0.01
-    before = run.state.values["means"].clone()
-    descent.perturb(run, task)
-    moved = (run.state.values["means"] - before).norm(dim=1)
-    assert 0 < float(moved[-2]) < 0.5 and int((moved > 0).sum()) == 1
-
-
 def test_values_that_are_no_longer_finite_end_a_fit_with_their_gaussian(device):
     run, task, descent = begin(device, PLANS["plain"])
     trainer._advance(run, task, descent)
@@ -173,17 +135,3 @@ def test_values_that_are_no_longer_finite_end_a_fit_with_their_gaussian(device):
     run.state.values["log_scales"][7, 1] = torch.nan
     with pytest.raises(ValueError, match="log_scales of Gaussian 7 is not finite"):
         descent.check(run)
-
-
-def test_bytes_say_values_to_half_a_step_and_keep_what_is_unknown(device):
-    rng, cpu = np.random.default_rng(0), torch.device("cpu")
-    for low, high in ((0.0, 1.0), (-0.4, 1.0), (0.1, 1.7)):
-        values = rng.uniform(low, high, (9, 7, 3)).astype(np.float32)
-        packed = device.module.pack_image(values, cpu)
-        assert packed.bytes.dtype == torch.uint8
-        np.testing.assert_allclose(packed.unpack().numpy(), values, atol=(max(high, 1) - min(low, 0)) / 509)
-    values[2:4] = np.nan
-    found = device.module.pack_image(values, cpu).unpack().numpy()
-    np.testing.assert_array_equal(np.isnan(found), np.isnan(values))
-    np.testing.assert_allclose(found, values, atol=1.7 / 507)
-    assert np.isnan(device.module.pack_image(np.full((2, 2, 3), np.nan, np.float32), cpu).unpack().numpy()).all()

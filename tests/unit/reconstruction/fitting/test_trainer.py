@@ -10,7 +10,6 @@ from dav_gswt.field import concatenate_fields, rgb_to_sh
 from dav_gswt.reconstruction import top_view
 from dav_gswt.reconstruction.evaluation import evaluate_field
 from dav_gswt.reconstruction.fitting import trainer
-from dav_gswt.reconstruction.fitting.descent import TrainingState
 from dav_gswt.reconstruction.fitting.plan import FitPlan
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 from dav_gswt.reconstruction.objects import make_blobs
@@ -86,39 +85,3 @@ def test_photos_without_a_pixel_that_counts_change_nothing():
     field = made.field()
     found = fitted(field, FitPlan(10, 1), photos=[blind(p) for p in made.photos()]).field
     np.testing.assert_array_equal(found.base_colours[found.ground], field.base_colours[field.ground])
-
-
-def test_harmonics_come_in_the_first_half_one_degree_after_the_other_and_a_richer_start_is_cut():
-    seen = []
-    options = trainer.FitOptions("test", lambda step, now: seen.append((step, now.sh_degree)), 2)
-    arguments = made.photos(1), FitPlan(8, 1, sh_degree=2), constrain(), np.random.default_rng(0), options
-    found = trainer.fit_field(made.field(), *arguments)
-    assert seen == [(2, 0), (4, 1), (6, 2), (8, 2)] and found.field.sh_degree == 2
-    assert fitted(found.field, FitPlan(2, 1)).field.sh_degree == 0
-
-
-def test_what_hardly_shows_in_any_photo_goes_before_the_end():
-    points = np.array([[1.6, 1.6, 0.1], [1.4, 1.4, 0.1]])
-    field = concatenate_fields([made.field(), make_blobs(points, np.full((2, 3), 0.5), np.full(2, 0.05), logit=0.0)])
-    field.opacity_logits[-1] = -3.7  # an opacity of .024, above that with which a Gaussian stays
-    found = fitted(field, FitPlan(10, len(field) + 1)).field.means[len(made.field()) :]
-    firm, faint = (np.linalg.norm(found - point, axis=1).min(initial=9.0) for point in points)
-    assert firm < 0.1 < faint
-
-
-def test_errors_of_the_photos_add_up_and_pixels_that_do_not_count_say_nothing(monkeypatch):
-    noted = []
-    monkeypatch.setattr(TrainingState, "add_errors", lambda run, found: noted.append((run, found)))
-    monkeypatch.setattr(trainer, "_grow", lambda run, task: None)
-    (right,) = made.photos(1)
-    wrong, half = right.image.copy(), right.weight.copy()
-    wrong[:, :24] = 1 - wrong[:, :24]
-    half[:, :24] = 0
-    for weight in (right.weight, half):
-        fitted(made.field(), FitPlan(2, 10**4), [replace(right, image=wrong, weight=weight)])
-    (run, spoilt), (_, blind) = noted
-    assert spoilt.sum() > 100 * blind.sum()
-    monkeypatch.undo()
-    for found in (spoilt, blind):
-        run.add_errors(found)
-    np.testing.assert_array_equal(run.errors, spoilt + blind)

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from dav_gswt.bundle import direction_search, level_distances, manifest, parts, recipes
-from dav_gswt.bundle.blocks import Block, pack_block
+from dav_gswt.bundle import manifest, orders, parts, recipes
 from dav_gswt.bundle.content import BundleContent, compute_ground_colour
 from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.bundle.land_cover import LightEntry, ObjectEntry
 from dav_gswt.bundle.manifest import Manifest, MaterialEntry, Sky, TileEntry
-from dav_gswt.bundle.parts import ChunkEntry, PartEntry, write_part
+from dav_gswt.bundle.parts import Block, ChunkEntry, PartEntry, pack_block, write_part
 from dav_gswt.bundle.recipes import Composition
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, mean_scale
@@ -79,8 +78,8 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
     uncertainties = [u for same in content.tiles for u in np.clip(same.uncertainty, 0, 1).tolist()]
     # the materials in turn: of what errors are measured on each has its share
     in_turn = [each for same in zip(*(own.fields[0] for own in content.tiles), strict=True) for each in same]
-    rings = direction_search.search_directions(in_turn, content.side)
-    table = level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band)
+    rings = orders.search_directions(in_turn, content.side)
+    table = manifest.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band)
     objects = list(zip(*(content.object_fields(level) for level in range(content.levels)), strict=True))
     encoding, composition = _fit_grid(content, [field for fields in (*tiles, *objects) for field in fields])
     written, own, theirs = _write_parts(content, levels, objects, encoding, composition, part)
@@ -93,7 +92,7 @@ def _write_content(content: BundleContent, options: BundleOptions, provenance: d
     return Manifest(
         tile_side=content.side,
         salt=options.salt,
-        eye_floor=level_distances.compute_eye_floor(content.spacing, FLOOR_PIXELS),
+        eye_floor=manifest.compute_eye_floor(content.spacing, FLOOR_PIXELS),
         ground_colour=content.ground_colour(),
         directions=rings.directions().tolist(),
         levels=table,

@@ -4,6 +4,9 @@ The classes here are the JSON objects of the file, with the same keys in the sam
 says what each key means. The types hold the bounds of the values. `Manifest.from_dict` checks them and
 what belongs together, and workflow/schemas/davgswt.schema.json is generated from them. All lengths are in
 the bundle's unit, z is up, and x, y of a tile count from its south-western corner.
+
+Two things follow from a splat's size in pixels: the distances at which levels change, and the least eye height. The
+reference picture is 1920 pixels and 60 degrees wide, its focal length f = 960 / tan 30 degrees = 1663 pixels.
 """
 
 import json
@@ -12,9 +15,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, TypeAdapter
 
-from dav_gswt.bundle.blocks import PLANES
 from dav_gswt.bundle.encoding import (
     POSITION_STEPS,
     RECORD,
@@ -29,7 +32,7 @@ from dav_gswt.bundle.encoding import (
     Size,
 )
 from dav_gswt.bundle.land_cover import ClassesEntry, LightEntry, Name, ObjectEntry, Salt, ScatterEntry, WaveEntry
-from dav_gswt.bundle.parts import LEVEL, MAX_SIZE, MAX_TOTAL, PLAIN, RECIPES, RECORDS, ChunkEntry, PartEntry
+from dav_gswt.bundle.parts import LEVEL, MAX_SIZE, MAX_TOTAL, PLAIN, PLANES, RECIPES, RECORDS, ChunkEntry, PartEntry
 from dav_gswt.bundle.recipes import Composition, locate_corner
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import parse_record, read_json
@@ -45,6 +48,9 @@ FARTHEST, MAX_LOG_SCALE = 1e9, 60.0  # of lengths, whose squares single precisio
 
 
 Direction = Annotated[list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=3, max_length=3)]
+WIDTH, FOV = 1920, 60.0
+FOCAL = 0.5 * WIDTH / np.tan(np.radians(FOV / 2))  # pixels
+ASPECT = 9 / 16
 
 
 @dataclass(frozen=True)
@@ -269,3 +275,35 @@ def read_manifest(folder: Path | str) -> Manifest:
     if not isinstance(value, dict) or value.get("format") != FORMAT or value.get("version") != VERSION:
         raise InputError(f"{path}: not a bundle of format {FORMAT!r}, version {VERSION}; make the bundle again")
     return Manifest.from_dict(value, path)
+
+
+def compute_levels(scales: list[float], pixels: float, band: float) -> list[LevelEntry]:
+    """The manifest's levels from their mean scales, finest first.
+
+    Level l gives way to l + 1 at the distance D_l = scale_{l+1} f / pixels, where the coarser one's mean standard
+    deviation covers `pixels`; it fades over D_l -+ band D_l. The last level goes on without end (D null, band 0).
+    Raises: InputError: the mean scale does not strictly rise.
+    """
+    for level, (fine, coarse) in enumerate(zip(scales, scales[1:], strict=False)):
+        if not coarse > fine:
+            raise InputError(
+                f"level {level + 1}: mean scale {coarse:.6g} does not rise above level {level}'s {fine:.6g}; "
+                "ask for fewer levels"
+            )
+    distances = [float(scale * FOCAL / pixels) for scale in scales[1:]]
+    table = [
+        LevelEntry(level, scale, far, band * far)
+        for level, (scale, far) in enumerate(zip(scales, distances, strict=False))
+    ]
+    return [*table, LevelEntry(len(scales) - 1, scales[-1], None, 0.0)]
+
+
+def compute_eye_floor(spacing: float, pixels: float, pitch: float = 30.0) -> float:
+    """Lowest sensible eye height: the nearest visible ground then shows a finest disc `pixels` wide.
+
+    Looking `pitch` degrees down, the picture's lower edge looks v further, tan v = 9/16 tan 30. A disc `spacing` wide
+    covers f spacing / z pixels at the depth z, and the ground there lies at z = h cos v / sin(pitch + v).
+    """
+    v = np.arctan(ASPECT * np.tan(np.radians(FOV / 2)))
+    depth = spacing * FOCAL / pixels
+    return float(depth / np.cos(v) * np.sin(np.radians(pitch) + v))

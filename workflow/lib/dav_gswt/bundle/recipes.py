@@ -13,7 +13,8 @@ from jaxtyping import Bool, Int, Int16, UInt8
 from numpy import ndarray as Array
 from pydantic import Field
 
-from dav_gswt.bundle.blocks import (
+from dav_gswt.bundle.encoding import POSITION_STEPS, ROTATION_STEPS, Encoding, Entry
+from dav_gswt.bundle.parts import (
     PLANES,
     Block,
     join_bytes,
@@ -23,7 +24,6 @@ from dav_gswt.bundle.blocks import (
     unpack_block,
     unpack_differences,
 )
-from dav_gswt.bundle.encoding import POSITION_STEPS, ROTATION_STEPS, Encoding, Entry
 from dav_gswt.errors import InputError
 from dav_gswt.tiles.build import Recipe, TileSet
 from dav_gswt.tiles.compose import BinnedLevel, coarsen_labels, find_underlay

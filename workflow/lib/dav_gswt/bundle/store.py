@@ -8,10 +8,9 @@ import numpy as np
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import recipes
-from dav_gswt.bundle.blocks import PLANES, unpack_block
 from dav_gswt.bundle.encoding import RECORD
 from dav_gswt.bundle.manifest import Manifest, read_manifest
-from dav_gswt.bundle.parts import LEVEL, PLAIN, RECIPES, ChunkEntry, read_part
+from dav_gswt.bundle.parts import LEVEL, PLAIN, PLANES, RECIPES, ChunkEntry, read_part, unpack_block
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress

@@ -16,7 +16,6 @@ from dav_gswt.photos.lenses import undistort_scene_photo
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views import candidates as pools
-from dav_gswt.views import feasibility
 from dav_gswt.views.candidates import Candidates
 
 # Of agents that cannot take photos everywhere: called with a scene's entry, its frame and candidates.
@@ -36,7 +35,7 @@ def filter_attainable(
         return candidates
     if keep_reachable := REACHABLE.get(scene["agent"]):
         candidates = keep_reachable(scene, frame, candidates)
-    return feasibility.filter_feasible(candidates, field, grid, frame.flying_height)
+    return pools.filter_feasible(candidates, field, grid, frame.flying_height)
 
 
 def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[Pose], folder: Path) -> None:

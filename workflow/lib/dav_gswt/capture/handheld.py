@@ -23,8 +23,8 @@ from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.geometry.sun import name_direction
 from dav_gswt.images import image_files
+from dav_gswt.images.figures import render_template
 from dav_gswt.raster import render
-from dav_gswt.templates import render_template
 
 LONGER = 720  # pixels of an expected picture's longer side
 WIDE = 800  # pixels of the map's longer side; its drawing is readable at half the size

@@ -9,8 +9,8 @@ from typing import Any, get_args
 import yaml
 
 from dav_gswt.bundle.manifest import NAME as MANIFEST
-from dav_gswt.config.exports import Export, Format
 from dav_gswt.config.load import check_model
+from dav_gswt.config.settings import Export, Format
 from dav_gswt.errors import InputError
 
 GROUND = "ground"  # beside the formats of `export.formats`: the files of exports/ground,

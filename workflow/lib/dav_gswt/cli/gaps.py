@@ -24,10 +24,10 @@ from dav_gswt.photos.colmap_model import ColmapModel
 from dav_gswt.photos.gaps import CAMERA_HEIGHT, Gaps, describe_gaps, describe_ground, draw_gaps, find_gaps, plan_photos
 from dav_gswt.photos.ground_frame import fit_ground_frame
 from dav_gswt.photos.importers import import_model
+from dav_gswt.photos.photo_files import find_blurred
 from dav_gswt.photos.photo_listing import locate_source
 from dav_gswt.photos.recognition import recognize_input
 from dav_gswt.photos.sfm.registration import SfmOptions, register_photos
-from dav_gswt.photos.sharpness import find_blurred
 from dav_gswt.threads import default_threads
 
 MAP, OUTLINES, MISSION = "gaps.png", "gaps.geojson", "mission.plan"

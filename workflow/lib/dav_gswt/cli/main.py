@@ -13,7 +13,7 @@ from dav_gswt.terrain import serve
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command. Returns the exit status: 1, with a message, where the input cannot be used."""
-    pages = f"Pages whose names begin with docs/ lie in {REPOSITORY}."
+    pages = f"Files that messages name (docs/..., workflow/...) are in {REPOSITORY}."
     whole = argparse.RawDescriptionHelpFormatter  # breaks no path
     parser = argparse.ArgumentParser(prog="dav-gswt", description=__doc__, epilog=pages, formatter_class=whole)
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")

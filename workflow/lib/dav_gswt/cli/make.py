@@ -32,7 +32,7 @@ START, USUAL_ROUND = 8, 4  # photos of the first fit and of a round where a budg
 HEAD = """\
 # A terrain of {about}.
 # Change what you like and run `dav-gswt make {folder}` again.
-# Every key: docs/reference/config.md (`dav-gswt --help` says where docs is).
+# Every key: workflow/schemas/config.schema.json (`dav-gswt --help` says where that is).
 """
 
 

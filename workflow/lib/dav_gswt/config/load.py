@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 Model = TypeVar("Model", bound=BaseModel)
 
 ALIASES = {"views_per_round": "k"}  # Snakemake's --config takes no key of one letter
-REFERENCE = "docs/reference/config.md lists every key"
+REFERENCE = "workflow/schemas/config.schema.json lists every key"
 
 
 def read_config(files: list[Path], changes: Mapping | None = None) -> dict:

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key, lower_first
-from dav_gswt.config.exports import Export
 from dav_gswt.config.scenes import FieldScene, Scene
 from dav_gswt.config.settings import (
     ClassTerm,
+    Export,
     Hills,
     NoiseClasses,
     Preset,

@@ -1,4 +1,4 @@
-"""Matplotlib figures: create, save, arrange pictures; JPEGs for pages."""
+"""Matplotlib figures: create, save, arrange pictures; JPEGs for pages, and pages from Jinja2 templates."""
 
 import io
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from jinja2 import Environment, StrictUndefined
 from numpy import ndarray as Array
 
 from dav_gswt.files import atomic_file
@@ -55,3 +56,9 @@ def encode_jpeg(image: Float[Array, "h w 3"], quality: int) -> bytes:
     options = {"quality": quality, "optimize": True, "progressive": True}
     imsave(buffer, np.ascontiguousarray(pixels), format="jpeg", pil_kwargs=options)
     return buffer.getvalue()
+
+
+def render_template(template: Path | str, values: dict[str, Any]) -> str:
+    """The template filled with values, which are escaped as HTML unless they are `markupsafe.Markup`."""
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(Path(template).read_text(encoding="utf-8")).render(values) + "\n"

@@ -16,15 +16,15 @@ from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.prior import conditions
+from dav_gswt.prior import interface
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import make_rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.threads import one_thread
-from dav_gswt.views import feasibility
+from dav_gswt.views import candidates
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.prior_sampling import PriorConfig
+from dav_gswt.views.scoring import PriorConfig
 
 if TYPE_CHECKING:
     import dav_gswt.prior.terrain
@@ -79,13 +79,13 @@ def inpaint_field(
     if not cells.any():
         return InpaintingResult(field, cells, cells)
     size, height = config.model.size, frame.flying_height
-    references = conditions.prepare_photos(photos, frame, size)
+    references = interface.prepare_photos(photos, frame, size)
     seen = grid.seen.ravel() if grid.seen.any() else np.ones(cells.size, bool)
     ground_colour = np.clip(field.base_colours[: cells.size][seen], 0, 1).mean(0, dtype=float)
     coloured, left = field, cells  # the cells that no picture showed
     for target in progress(find_targets(grid, cells, height), "inpaint unseen ground"):
         for pose, camera in place_camera(target, coloured, grid, frame, size):
-            condition = conditions.build_condition(coloured, [(pose, camera)], references, height, size)
+            condition = interface.build_condition(coloured, [(pose, camera)], references, height, size)
             shows, shows_left = (
                 render_share(coloured, select_gaussians(field, grid, some), camera) for some in (cells, left)
             )
@@ -155,7 +155,7 @@ def place_camera(
     camera = camera_layouts.orbit(ELEVATION, 0.0, distance, target, size, size, FIELD_OF_VIEW)
     centre = camera.centre[None]
     below = grid.contains(centre) & (centre[:, 2] <= grid.height_at(centre))
-    if below.any() or feasibility.find_inside_objects(centre, field).any():
+    if below.any() or candidates.find_inside_objects(centre, field).any():
         return []
     return [(pose_of_camera("virtual", camera, frame), camera)]
 

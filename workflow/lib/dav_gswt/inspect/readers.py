@@ -34,9 +34,8 @@ from dav_gswt.reconstruction.ground import Ground, read_ground
 from dav_gswt.tiles import store as tiles
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import EDGES, LABELS, arrange_torus
-from dav_gswt.views import pose_maps
 from dav_gswt.views.policies import candidate_values
-from dav_gswt.views.scores import read_scores
+from dav_gswt.views.scores import apply_uncertainty, read_pose_maps, read_scores
 from dav_gswt.views.selection import read_pose_selection
 
 Reader = Callable[..., Scene]
@@ -361,17 +360,17 @@ def find_scores(poses: Path) -> Path:
 
 
 @reader("maps.npz")
-def read_pose_maps(
+def read_map_file(
     path: Path, *, most: int, colour: str | None = None, part: str | None = None, channel: str | None = None
 ) -> Scene:
     """The field by the uncertainty that its maps gave it; with --part or --channel the maps themselves."""
-    maps, uncertainty = pose_maps.read_pose_maps(path)
+    maps, uncertainty = read_pose_maps(path)
     if part is not None or channel is not None:
         known = {"opacity": maps.opacity} | ({} if maps.w2_sq is None else {"w2_sq": maps.w2_sq})
         parts = {name: {key: values[i] for key, values in known.items()} for i, name in enumerate(maps.names)}
         return _show_pictures(path, parts, part, channel)
     field = read_field(find_above(path, "field.ply", "whose Gaussians it describes", folders=2))
-    field = pose_maps.apply_uncertainty(field, uncertainty.astype(np.float32))
+    field = apply_uncertainty(field, uncertainty.astype(np.float32))
     by = choose("colour", colour or "uncertainty", COLOURS, path)
     return show_fields(path, {"": (field, np.zeros(3))}, by, most)
 

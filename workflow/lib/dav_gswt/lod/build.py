@@ -16,8 +16,8 @@ from dav_gswt.field import GaussianField, mean_scale
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
-from dav_gswt.lod.levels import AUTO, MAX_LEVELS, Levels
 from dav_gswt.lod.merge import crop_to_blocks, halve_resolution
+from dav_gswt.lod.store import AUTO, MAX_LEVELS, Levels
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import to_raster_arrays
 from dav_gswt.reconstruction import discs

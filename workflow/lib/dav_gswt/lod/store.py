@@ -1,15 +1,36 @@
-"""Levels on disk, in one folder: level{l}.ply, the grid level{l}.exr of each, and levels.json.
+"""The levels of detail of a field, how many a tile set may have, and their files in one folder.
 
-The levels of further materials are in the folders material1, material2, ... of the first one's.
+level{l}.ply, the grid level{l}.exr of each, and levels.json; the levels of further materials are in the folders
+material1, material2, ... of the first one's.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import mean_scale, read_field, write_field
+from dav_gswt.field import GaussianField, mean_scale, read_field, write_field
 from dav_gswt.files import atomic_folder, read_json, write_json
-from dav_gswt.lod.levels import Levels
 from dav_gswt.reconstruction import ground
+from dav_gswt.reconstruction.ground import Ground
+
+AUTO = "auto"  # as many levels as save enough Gaussians
+MAX_LEVELS = 6  # with AUTO
+
+
+@dataclass(frozen=True)
+class Levels:
+    """A field at several levels of detail, finest first.
+
+    Attributes:
+        fields, grids: the Gaussians of each level and its ground grid.
+        wanted: how many levels the tiles are to have: a number or AUTO.
+        stopped: why no coarser level was fitted, as a message.
+    """
+
+    fields: list[GaussianField]
+    grids: list[Ground]
+    wanted: int | str
+    stopped: str
 
 
 def material_folder(folder: Path | str, number: int) -> Path:

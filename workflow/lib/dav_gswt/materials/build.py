@@ -16,7 +16,7 @@ from dav_gswt.logs import progress
 from dav_gswt.materials import extraction, left_out, outlines, segmentation
 from dav_gswt.materials.borders import measure_share, measure_strays
 from dav_gswt.materials.classes import GroundClasses, classify_ground
-from dav_gswt.materials.filling import fill_cells
+from dav_gswt.materials.extraction import fill_cells
 from dav_gswt.materials.left_out import LeftOut
 from dav_gswt.materials.maps import HALF, GroundMaps, measure_ground, read_masks, resample, unite
 from dav_gswt.materials.model import MaterialInfo

@@ -1,23 +1,30 @@
-"""The files of photos: what their EXIF says (focal length, position, time), and names for the pictures made of them."""
+"""The files of photos: what EXIF says (focal length, place, time, sun), and names of the pictures made of them."""
 
 import logging
 import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from io import BytesIO
 from pathlib import Path, PurePosixPath
+from typing import get_args
 
 import exifread
 import numpy as np
 from exifread.utils import Ratio
+from jaxtyping import Bool, Float, Float32
+from numpy import ndarray as Array
 
-from dav_gswt.geometry.sun import Clock
+from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.geometry.sun import LOWEST, CapturedSun, Clock, locate_sun
 from dav_gswt.images import image_files
 from dav_gswt.images.camera_formats import read_heif_exif
 from dav_gswt.images.file_kinds import HEIF_SUFFIXES, RAW_SUFFIXES, SUFFIXES, detect_kind
+from dav_gswt.logs import progress
+from dav_gswt.threads import map_ahead
 
 logging.getLogger("exifread").setLevel(logging.ERROR)  # it warns of every picture without EXIF
 
@@ -29,6 +36,12 @@ YEARS = range(1990, 2101)  # in which photos are taken: cameras whose clock was 
 UNSAFE = re.compile(
     r"[\s#{}<>]+"
 )  # COLMAP's lists end a name at a blank and skip lines with #; Snakemake has {} and <>
+_log = logging.getLogger(__name__)
+SIDE = 2000  # pixels along the longer side at which photos are compared
+FAR = 8  # pixels
+BLUR = 0.6  # a picture with less than this share of the usual fine detail is blurred
+USUAL = 80  # percentile of all pictures that is usual
+GREY = np.array([0.299, 0.587, 0.114], np.float32)  # Rec. 601
 
 
 def read_focal_length(path: Path | str) -> float | None:
@@ -189,3 +202,59 @@ def name_pictures(names: Sequence[str]) -> list[str]:
         used.add(free)
         out.append(f"{free}.png")
     return out
+
+
+def find_sun(paths: Iterable[Path], place: Georeference) -> CapturedSun | None:
+    """Find the sun at the median time of the photos. If it is not known, return None and log the reason.
+
+    If the photos know their times in different ways (`Clock`), only the most frequent way is used, and among equally
+    frequent ones the most reliable.
+    """
+    times = [time for path in paths if (time := read_utc_time(path, place.longitude))]
+    if not times:
+        _log.info("light: no photo says when it was taken: the sun is not known")
+        return None
+    counts = Counter(time.clock for time in times)
+    clock: Clock = max(get_args(Clock), key=lambda each: counts[each])
+    times = sorted((time for time in times if time.clock == clock), key=lambda time: time.utc)
+    middle = times[len(times) // 2]
+    hours = (times[-1].utc - times[0].utc).total_seconds() / 3600
+    elevation, azimuth = locate_sun(middle.utc, place.latitude, place.longitude)
+    stamp = f"{middle.utc:%Y-%m-%dT%H:%M:%SZ}"
+    if elevation < LOWEST:
+        _log.warning("light: at %s the sun stood %.0f degrees high: it is not known where it stood", stamp, elevation)
+        return None
+    sun = CapturedSun(round(elevation, 2), round(azimuth, 2) % 360, stamp, clock, middle.zone, round(hours, 2))
+    _log.info("light: %s", sun.describe())
+    return sun
+
+
+def find_blurred(paths: Sequence[Path], threads: int) -> Bool[Array, "n"]:
+    """Which of the photos are blurred, by their detail at SIDE pixels. threads: change no result."""
+    grey = partial(image_files.read_shrunk_photo, longest=SIDE)
+    detail = [*map_ahead(lambda path: measure_detail(grey(path) @ GREY), progress(paths, "look for blur"), threads)]
+    return np.array(detail) < find_threshold(np.array(detail))
+
+
+def measure_detail(grey: Float32[Array, "h w"]) -> float:
+    """The least share, over four directions, of the contrast between neighbouring pixels in that of pixels FAR apart.
+
+    Motion blurs along one direction, and a lens out of focus along all; the ratio hardly depends on what is shown.
+    """
+    shares = []
+    for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        near, far = (_contrast(grey, dy * step, dx * step) for step in (1, FAR))
+        shares.append(near / far if far > 0 else 0.0)
+    return min(shares)
+
+
+def find_threshold(detail: Float[Array, "n"], blur: float = BLUR) -> float:
+    """The detail below which a picture of a set is blurred. blur: that share of the usual detail."""
+    return blur * float(np.percentile(detail, USUAL))
+
+
+def _contrast(grey: Float32[Array, "h w"], dy: int, dx: int) -> float:
+    h, w = grey.shape
+    first = grey[: h - dy, max(0, -dx) : w - max(0, dx)]
+    second = grey[dy:, max(0, dx) : w + min(0, dx)]
+    return float(np.abs(second - first).mean())

@@ -14,12 +14,12 @@ import numpy as np
 from dav_gswt.files import atomic_file
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import figures, image_files
+from dav_gswt.images.figures import render_template
 from dav_gswt.logs import progress
 from dav_gswt.photos import gaps
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model, reprojection_errors
+from dav_gswt.photos.photo_files import find_blurred
 from dav_gswt.photos.sfm.verdict import describe_error
-from dav_gswt.photos.sharpness import find_blurred
-from dav_gswt.templates import render_template
 
 LEAST_SIDE = 0.5  # flying heights: side of an exemplar with room for tiles that differ
 THUMBNAIL = 200  # pixels of the longer side

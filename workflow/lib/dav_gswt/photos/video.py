@@ -26,9 +26,9 @@ from skimage.registration import phase_cross_correlation
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder
 from dav_gswt.images import image_files
-from dav_gswt.images.hdr import Curve, convert_hdr
+from dav_gswt.images.srgb import Curve, convert_hdr
 from dav_gswt.logs import progress
-from dav_gswt.photos.sharpness import find_threshold
+from dav_gswt.photos.photo_files import find_threshold
 
 _log = logging.getLogger(__name__)
 

@@ -30,7 +30,7 @@ class EndlessTerrain:
     """Tiles, level distances and the surface that they cover.
 
     tiles: by (level, tile number), positions in [0, side], in no order. switches, bands: distance at which a level
-    gives way to the next (`bundle.level_distances`), and half the width of that (see `draw_order.level_weights`); the
+    gives way to the next (`manifest.compute_levels`), and half the width of that (see `draw_order.level_weights`); the
     last switch is infinite.
     directions: of the pre-sorted orders; tile_orders: indices of the directions that each tile keeps. z: range of
     heights of all Gaussians. overhang: largest extent of a Gaussian beyond the edge of its tile. variants: centres of a

@@ -18,9 +18,9 @@ from dav_gswt.errors import InputError
 from dav_gswt.materials.borders import WIDTHS, measure_strays
 from dav_gswt.materials.store import read_objects, read_report
 from dav_gswt.terrain.classes import CONTRAST, LATTICE, Classes
-from dav_gswt.terrain.fit_variation import fit_variation
 from dav_gswt.terrain.heights import GAIN
 from dav_gswt.terrain.scatter import Scatter
+from dav_gswt.terrain.variation import fit_variation
 from dav_gswt.tiles.build import TileSet
 
 SHORTEST, WIDEST = 4.0, 4096.0  # lattice steps: wavelengths of noise that the lattice shows

@@ -1,9 +1,12 @@
-"""Light of the place: hills in the sun, their shadows, and the colours of the sky, as the sun moves.
+"""Light of the place: hills in the sun, their shadows, and the colours of the sky, as the sun moves over the day.
 
 The colours of Gaussians contain the light of level ground below the captured sun. Ground that slopes, or lies below
 another sun, is multiplied by the ratio of its own light to that light, in linear light. What is smaller than the
 surface stays as it was photographed: ripples, and the shading of objects, which are lit like the ground below them.
-The viewer's `terrain/light.js` and its shader compute the same; tests/golden/light.json holds both to it.
+
+Elevations are in degrees above the horizon, azimuths in degrees clockwise from the terrain's +y. `north` is the azimuth
+of +y itself, clockwise from true north. The viewer's `terrain/light.js` and its shader compute the
+same; tests/golden/light.json holds all to it.
 """
 
 from dataclasses import dataclass, replace
@@ -18,10 +21,15 @@ from scipy.ndimage import map_coordinates
 from dav_gswt.bundle.land_cover import ASSUMED_SUN, LightEntry
 from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.field import GaussianField, rgb_to_sh
+from dav_gswt.geometry.sun import LOWEST  # below, the light no longer changes, and the day leaves such hours out
 from dav_gswt.terrain.choice import Floats, Vector
 from dav_gswt.terrain.heights import FlatSurface, HeightField, Sphere
-from dav_gswt.terrain.sun import LUMINANCE, Sun, level_light, measure_light, sun_at
 
+RAYLEIGH = np.array([0.0496, 0.0987, 0.2267])  # optical depths of air at 0.65, 0.55 and 0.45 micrometres
+AEROSOL = np.array([0.0805, 0.1, 0.1298])  # optical depths of clear, dry haze
+FORWARD = 0.756  # share of the light scattered by haze that reaches the ground
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+SUNRISE, SUNSET = 6.0, 18.0  # hours
 GAMMA = 2.2  # exponent that stands for the curve of sRGB
 MOST = 4.0  # times the captured light, of any ground
 SIZE, CELL = 256, 0.375  # points along a side of the horizon's grid, and their distance in tile sides
@@ -34,6 +42,60 @@ STEEPEST = 80.0  # elevation, of which the tangent is taken: above, MOST_MARGIN 
 EXPOSED = 0.7  # share of a change of brightness, in stops, that the exposure makes up for
 GLOW, GLOW_WIDTH = 0.35, 6  # brightness of the sky about a sun at the horizon, and the exponent of its cosine
 HAZE = 0.1  # share of the sun's beam in the light of the horizon
+
+
+@dataclass(frozen=True)
+class Sun:
+    """A position of the sun. elevation: 0 to 90. azimuth: 0 to 360."""
+
+    elevation: float
+    azimuth: float
+
+    @property
+    def direction(self) -> Float[Array, "3"]:
+        """Unit vector towards the sun."""
+        e, a = np.radians(self.elevation), np.radians(self.azimuth)
+        return np.array([np.cos(e) * np.sin(a), np.cos(e) * np.cos(a), np.sin(e)])
+
+
+def measure_light(elevation: float) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
+    """Irradiance across the sun's beam, and irradiance of level ground by the sky, over that outside the atmosphere.
+
+    A clear sky after Bird and Hulstrom (1981), with the air mass of Kasten and Young (1989).
+    """
+    elevation = max(elevation, LOWEST)
+    rise = np.sin(np.radians(elevation))
+    mass = 1 / (rise + 0.50572 * (elevation + 6.07995) ** -1.6364)
+    air, haze = np.exp(-mass * RAYLEIGH), np.exp(-mass * AEROSOL)
+    return air * haze, rise * (0.5 * (1 - air) + FORWARD * (1 - haze))
+
+
+def level_light(elevation: float) -> Float[Array, "3"]:
+    """Irradiance of level ground by sun and sky."""
+    direct, sky = measure_light(elevation)
+    return direct * np.sin(np.radians(max(elevation, LOWEST))) + sky
+
+
+def find_hour(captured: Sun, north: float = 0.0) -> float:
+    """Solar time of the captured sun on the path of `sun_at`."""
+    x, y, z = Sun(captured.elevation, captured.azimuth + north).direction
+    return float(SUNRISE + np.arctan2(np.hypot(y, z), x) / np.pi * (SUNSET - SUNRISE))
+
+
+def sun_at(captured: Sun, hour: float, north: float = 0.0) -> Sun:
+    """The sun at a solar time, on the path through the captured sun that begins due east and ends due west.
+
+    It is the path of an equinox at the latitude where the captured sun lies on it. Hours at which the sun would be
+    lower than LOWEST give the nearest one at which it is not.
+    """
+    _, y, z = Sun(captured.elevation, captured.azimuth + north).direction
+    noon = np.array([0.0, y, z]) / np.hypot(y, z)
+    rise = min(np.sin(np.radians(LOWEST)) / noon[2], 1.0)
+    first = np.arcsin(rise)
+    angle = np.clip((hour - SUNRISE) / (SUNSET - SUNRISE) * np.pi, first, np.pi - first)
+    x, y, z = np.cos(angle) * np.array([1.0, 0.0, 0.0]) + np.sin(angle) * noon
+    azimuth = (np.degrees(np.arctan2(x, y)) - north) % 360.0
+    return Sun(float(np.degrees(np.arctan2(z, np.hypot(x, y)))), float(azimuth))
 
 
 def apply_light(manifest: Manifest, sun: Any, wind: float, surface: HeightField) -> Manifest:

@@ -12,7 +12,7 @@ from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
-from dav_gswt.lod.levels import AUTO, Levels
+from dav_gswt.lod.store import AUTO, Levels
 from dav_gswt.logs import progress
 from dav_gswt.reconstruction import top_view
 from dav_gswt.tiles import compose, energy, layout, patches, periods, poisson_blending, search, semantics, texture

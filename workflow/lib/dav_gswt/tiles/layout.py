@@ -20,7 +20,7 @@ from jaxtyping import Bool, Int, Integer, UInt8
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.lod.levels import AUTO, MAX_LEVELS
+from dav_gswt.lod.store import AUTO, MAX_LEVELS
 from dav_gswt.reconstruction.ground import Ground
 
 _log = logging.getLogger(__name__)

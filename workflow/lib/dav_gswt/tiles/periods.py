@@ -19,7 +19,7 @@ from numpy import ndarray as Array
 from scipy.ndimage import map_coordinates, maximum_filter, uniform_filter
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
-from dav_gswt.lod.levels import Levels
+from dav_gswt.lod.store import Levels
 from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
 

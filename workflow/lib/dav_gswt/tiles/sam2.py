@@ -20,7 +20,7 @@ from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import read_json
 
 EXTRA = "transformers==5.23.0"
-HELP = "docs/reference/config.md says what it must hold"
+HELP = "workflow/schemas/config.schema.json says what it must hold"
 MODEL_TYPES = "sam2", "sam2_video"  # the published folders are of the second: the same network, and one for videos
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of the pictures that the network was trained on
 GRID_POINTS = 32  # along a side of the grid

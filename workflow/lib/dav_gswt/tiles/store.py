@@ -17,8 +17,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.field import GaussianField, read_field, write_field
 from dav_gswt.files import UNREADABLE, atomic_folder, read_json, write_json
-from dav_gswt.lod.levels import Levels
-from dav_gswt.lod.store import material_folder, read_levels, read_material_levels
+from dav_gswt.lod.store import Levels, material_folder, read_levels, read_material_levels
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import Recipe, TileSet, compose_tiles
 from dav_gswt.tiles.compose import bin_gaussians

@@ -15,11 +15,10 @@ from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import pose_maps
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.coverage import ERROR_WIDTH, DirectionalCoverage, GroundCells, measure_cell_errors
 from dav_gswt.views.policies import NEEDS_FIELD, NEEDS_PHOTOS, POLICIES, PRIOR_POLICIES, SelectionInput
-from dav_gswt.views.scores import Scores
+from dav_gswt.views.scores import Scores, apply_uncertainty, read_pose_maps
 from dav_gswt.views.scoring import scoring_camera
 
 _log = logging.getLogger(__name__)
@@ -65,7 +64,7 @@ def build_information_gain(
         return None
     cells = GroundCells(read_field(files["field"]), ground.read_ground(files["ground"]))
     importance = _measure_importance(policy, cells, split, files)
-    seen, at = pose_maps.read_pose_maps(files["maps"])[0], {pose.name: camera for pose, camera in candidates}
+    seen, at = read_pose_maps(files["maps"])[0], {pose.name: camera for pose, camera in candidates}
     pixels = dict(zip(seen.names, seen.cells, strict=True))
     offered = cells.gather_views([at[name] for name in scores.names], [pixels[name] for name in scores.names])
     return DirectionalCoverage(cells, cells.view([scoring_camera(c) for c in taken]), offered, importance)
@@ -80,8 +79,8 @@ def _measure_importance(
         corrected = read_scene_frame(files["frame"]).kind == "photos"  # photos differ in exposure
         return measure_cell_errors(cells, views, corrected)
     if policy in PRIOR_POLICIES:
-        gaussians = pose_maps.read_pose_maps(files["maps"])[1]
-        return cells.average(pose_maps.apply_uncertainty(cells.field, gaussians).uncertainty)
+        gaussians = read_pose_maps(files["maps"])[1]
+        return cells.average(apply_uncertainty(cells.field, gaussians).uncertainty)
     return None
 
 

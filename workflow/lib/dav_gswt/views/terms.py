@@ -116,7 +116,7 @@ def texture(given: Samples) -> Float64[Array, "n"]:
 @term(
     "single",
     requires="a prior without dropout (p_drop 0), and the config's `lpips` as `installed` or a path "
-    "(docs/reference/config.md)",
+    "(workflow/schemas/config.schema.json)",
 )
 def single(given: Samples) -> Float64[Array, "n"] | None:
     """LPIPS between the only sample and the render; None with dropout."""

@@ -140,7 +140,7 @@ def combine_terms(
     if lam > 0:
         _log.warning(
             "the scores lack LPIPS, its term is left out: the uncertainty is %s alone; "
-            "set the config's `lpips` to `installed` or to a path (docs/reference/config.md)",
+            "set the config's `lpips` to `installed` or to a path (workflow/schemas/config.schema.json)",
             name,
         )
     return total
