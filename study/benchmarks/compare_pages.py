@@ -69,6 +69,11 @@ FINISH = """
   };
   window.shown = new Promise((done) => window.firstFrame = () => done(finish()));
 """
+WHOLE = """async () => {
+  const { viewer } = await import("./main.js");
+  while (!viewer.resting.whole) await new Promise((done) => setTimeout(done, 50));
+  return [finish(), viewer.scene.frame.count];
+}"""
 PROGRAMS = {
     "DAV-GSWT": "page/",
     "Spark": "spark/",
@@ -91,7 +96,7 @@ def main() -> None:
     write_table(Path(__file__).resolve().parents[1] / "docs/data/comparison_pages.csv", rows)
     for line, program in ((line, program) for line in LINES for program in PROGRAMS):
         own = [row for row in rows if (row["line"], row["program"]) == (line, program)]
-        print(line, program, statistics.median(row["full"] for row in own))
+        print(line, program, {name: statistics.median(row[name] for row in own) for name in ("drawn", "full")})
 
 
 @cache
@@ -136,18 +141,23 @@ def write_site(bundle: Path, peers: Path, site: Path) -> None:
 def visit_page(program: str, address: str, sent: dict) -> dict:
     """Bytes and seconds of one visit.
 
-    still: our still picture is shown. loaded: Spark has decoded its file. full: all Gaussians of the view are drawn.
+    still: our still picture is shown. loaded: Spark has decoded its file. drawn: all of the view is drawn, by our page
+    with a share of the Gaussians. full: with all of them.
     """
     with chromium() as browser:
         tab = browser.new_page(viewport=SIZE)
         tab.add_init_script(WATCH + FINISH)
         sent.clear()
         tab.goto(address + PROGRAMS[program], wait_until="commit")
-        drawn = tab.evaluate(LIVE if program == "DAV-GSWT" else "shown")
-        full = tab.evaluate("finish()") if program == "DAV-GSWT" else drawn
+        if program == "DAV-GSWT":
+            drawn, (full, count) = tab.evaluate(LIVE)[1], tab.evaluate(WHOLE)
+            print(f"{count} Gaussians")
+        else:
+            drawn = full = tab.evaluate("shown")
         still, loaded = tab.evaluate("[seen.sharp || null, window.loaded ?? null]")
     data = sum(size for name, size in sent.items() if Path(name).suffix in DATA)
-    return {"data": data, "code": sum(sent.values()) - data, "still": still, "loaded": loaded, "full": full}
+    seconds = {"still": still, "loaded": loaded, "drawn": drawn, "full": full}
+    return {"data": data, "code": sum(sent.values()) - data} | seconds
 
 
 @contextmanager
