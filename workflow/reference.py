@@ -23,9 +23,8 @@ each `config/scenes/<name>.yaml` is one scene. Lay single keys over them on the 
 without a default may be left out."""
 POLICIES_HEAD = """# Policies
 
-A policy chooses the poses from which the next k photos are taken. The config's `policy` names the
-policy and its `k` the number. The default policy, `auto`, stands for `farthest` if a scene chooses
-from given photos (`agent: replay`), and for `coverage-error` if new photos are taken
+A policy chooses the poses from which the next k photos are taken. The default, `policy: auto`, is
+`farthest` if a scene chooses from given photos (`agent: replay`), otherwise `coverage-error`
 ([why](../active-views.md)).
 
 The column "reads" lists what a policy uses:
@@ -34,12 +33,12 @@ The column "reads" lists what a policy uses:
 - `field`: the Gaussians that were fitted to the photos so far
 - `photos`: the photos so far
 - `prior`: samples of a [diffusion prior](../prior.md), a network that paints guesses of what a
-  candidate would show. Only these policies use the config's `prior`, `p_drop` and `lam`, except the
-  keys after "not".
+  candidate would show. Only these policies use the config's `prior`, `p_drop` and `lam`, apart from
+  the keys after "not".
 
-A cell is a square of the ground, which is 28 cells long. W2 is the 2-Wasserstein distance between
-samples. [Terms](../prior.md#terms) defines `w2_sq`, `lpips` and `gradient`. In a sum, each term is
-divided by its scale, a number that the first round fixes.
+A cell is a square of the ground, which is 28 cells long. [Terms](../prior.md#terms) defines `w2_sq`
+(W2, the 2-Wasserstein distance, squared), `lpips` and `gradient`. In a sum, each term is divided by
+its scale, a number that the first round fixes.
 
 [Architecture](../architecture.md#a-policy) shows how to add a policy.
 """

@@ -219,3 +219,12 @@ def test_a_manifest_that_contradicts_itself_or_its_schema_is_refused(bundle, key
     change(value)
     with pytest.raises(InputError, match=f"(?i){key}"):
         manifest.Manifest.from_dict(value)
+
+
+def test_the_schema_describes_every_key():
+    schema = json.loads(manifest.make_schema())
+    entries = {"Manifest": schema} | schema["$defs"]
+    keys = {f"{name}.{key}": about for name, entry in entries.items() for key, about in entry["properties"].items()}
+    assert not [key for key, about in keys.items() if not about.get("description")]
+    assert keys["LevelEntry.band"]["description"].startswith("Half the length over which")
+    assert not [name for name, entry in entries.items() if "Attributes:" in entry["description"]]

@@ -62,9 +62,10 @@ class Encoding(Entry):
         colour    = byte / 255, opacity = byte / 255
 
     Attributes:
-        origin, step: of the grid, along x, y, z.
-        log_scale: smallest natural logarithm of a standard deviation, and its step.
-        sh_degree: of the colours; always 0.
+        origin: place of step 0 of positions, along x, y and z.
+        step: width of a step of positions, along x, y and z.
+        log_scale: smallest natural logarithm of a standard deviation, and the step of logarithms.
+        sh_degree: degree of the spherical harmonics of colours; always 0.
     """
 
     origin: Point

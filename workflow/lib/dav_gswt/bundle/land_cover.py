@@ -1,8 +1,7 @@
 """Entries of the manifest that say which material lies where, where objects stand, how colours vary, and where the sun
 stood.
 
-`terrain.classes`, `terrain.scatter` and `terrain.variation` compute from them; docs/formats.md says what each key means
-and has the formulas.
+`terrain.classes`, `terrain.scatter` and `terrain.variation` compute from them; docs/formats.md has the formulas.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,7 +27,12 @@ Change = Annotated[list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=
 class NoiseTerm:
     """A term of the rule of classes: gradient noise whose classes have the materials' shares.
 
-    A material's noise has its wavelength and gains of its octaves, the widest first.
+    Attributes:
+        kind: always `noise`.
+        weight: factor of the value.
+        wavelengths: for each material, the width of the cells of its noise, in tile sides.
+        gains: for each material, the weights of the octaves of its noise, the widest first; not all 0.
+        biases: for each material, the number that is added to its noise.
     """
 
     kind: Literal["noise"]
@@ -40,7 +44,16 @@ class NoiseTerm:
 
 @dataclass(frozen=True)
 class RangeTerm:
-    """A term of the rule of classes: a material is found where the surface's height or slope lies in a range."""
+    """A term of the rule of classes: a material is found where the surface's height or slope lies in a range.
+
+    Attributes:
+        kind: the quantity that must lie in the range.
+        weight: factor of the value.
+        material: number of the material.
+        low: lower bound of the range; null: none.
+        high: upper bound of the range; null: none.
+        soft: how far beyond a bound the value falls by 1.
+    """
 
     kind: Literal["height", "slope"]
     weight: Size
@@ -52,8 +65,12 @@ class RangeTerm:
 
 @dataclass(frozen=True)
 class JitterEntry(Entry):
-    """Fine noise that frays the borders of classes: its widest octave has `cells` cells along a tile's side, each next
-    one twice as many, and they count by their gains; scores change by `amplitude` at most.
+    """Fine noise that frays the borders between materials.
+
+    Attributes:
+        cells: number of noise cells of the widest octave along a tile's side. Each further octave has twice as many.
+        gains: weights of the octaves, the widest first; not all 0.
+        amplitude: largest change of a score, either way.
     """
 
     cells: Pixels
@@ -63,7 +80,14 @@ class JitterEntry(Entry):
 
 @dataclass(frozen=True)
 class RiseEntry(Entry):
-    """How far what rises above the ground reaches over a border of classes."""
+    """How far things that rise above the ground reach over a border between materials.
+
+    Attributes:
+        slope: increase of the score per unit of height beyond the clearance.
+        most: largest increase of the score.
+        ground: for each material, z of the ground in its tiles.
+        clearance: for each material, the distance from its ground, up or down, from which heights count.
+    """
 
     slope: Size
     most: Size
@@ -76,7 +100,16 @@ RuleTerm = Annotated[NoiseTerm | RangeTerm, Field(discriminator="kind")]
 
 @dataclass(frozen=True)
 class ClassesEntry(Entry):
-    """Which material lies where: a sum of terms, and the transition between two materials."""
+    """Which material lies where: at each place, the one with the highest score.
+
+    Attributes:
+        salt: salt of all hashes that the scores use.
+        rule: terms whose sum is the score.
+        jitter: noise that frays the borders.
+        rise: how far things that rise above the ground reach over a border.
+        painted: runs [I, J, n, m] of painted points, from (I, J) to (I + n - 1, J), with material m. Only in the
+            manifest of a page.
+    """
 
     salt: Salt
     rule: Annotated[list[RuleTerm], Field(min_length=1, max_length=64)]
@@ -117,7 +150,19 @@ def find_run_fault(runs: Sequence[Sequence[int]], materials: int) -> str | None:
 
 @dataclass(frozen=True)
 class ObjectEntry(Entry):
-    """An object on the terrain. orders: the directions in whose orders it is drawn."""
+    """A kind of object that stands on the terrain in many copies.
+
+    Attributes:
+        name: name of the object.
+        radius: radius of the disc on which it stands, its footprint.
+        z: lowest and highest z of its Gaussians at any level, out to three standard deviations, measured from the foot.
+        ground: height (z) of the foot in a tile.
+        material: number of the material on which it stands.
+        density: wanted number of objects per unit of area of that material.
+        probability: probability that a candidate place on that material has this object.
+        orders: the draw orders to use, as different indices into `directions`.
+        chunks: one chunk for each level, finest first. All are stored.
+    """
 
     name: Name
     radius: Length
@@ -132,7 +177,14 @@ class ObjectEntry(Entry):
 
 @dataclass(frozen=True)
 class ScatterEntry(Entry):
-    """Where objects stand."""
+    """Where objects stand.
+
+    Attributes:
+        cells: squares along a tile's side, each with one candidate place.
+        turn: largest turn of an object about the vertical, either way, in degrees.
+        size: largest change of an object's size, either way, as a share of the size.
+        salt: salt of the hashes that place objects.
+    """
 
     cells: Annotated[int, Field(ge=1, le=64)]
     turn: Annotated[float, Field(ge=0, le=180)]
@@ -142,8 +194,11 @@ class ScatterEntry(Entry):
 
 @dataclass(frozen=True)
 class WaveEntry(Entry):
-    """A wave of the variation: noise whose cells are `wavelength` tile sides wide, and of each material what noise of 1
-    adds to its red, green and blue.
+    """A wave of the variation: noise that adds large-scale light and dark to the tiles.
+
+    Attributes:
+        wavelength: width of the noise's cells, in tile sides.
+        colours: for each material, the change of red, green and blue where the noise is 1.
     """
 
     wavelength: Annotated[float, Field(ge=0.01, le=1e4)]
@@ -152,10 +207,14 @@ class WaveEntry(Entry):
 
 @dataclass(frozen=True)
 class LightEntry(Entry):
-    """The captured sun, whose light the colours contain: degrees above the horizon and clockwise from the tiles' +y.
+    """The captured sun, whose light the colours contain.
 
-    source: the config, the photos' EXIF, the shading of the relief, or nothing (a guess). north: azimuth of +y itself,
-    clockwise from true north; 0 if north is not known.
+    Attributes:
+        elevation: degrees above the horizon.
+        azimuth: degrees, clockwise from the +y axis.
+        source: how the position is known: from the config, the photos' EXIF or the shading of the relief; `assumed`
+            is a guess.
+        north: azimuth of the +y axis, clockwise from true north; 0 if unknown.
     """
 
     elevation: Annotated[float, Field(ge=3, le=90)]

@@ -1,15 +1,16 @@
 """davgswt.json: the manifest of a bundle, the only contract between the pipeline and a viewer.
 
-The classes here are the JSON objects of the file, with the same keys in the same order; docs/formats.md
-says what each key means. The types hold the bounds of the values. `Manifest.from_dict` checks them and
-what belongs together, and workflow/schemas/davgswt.schema.json is generated from them. All lengths are in
-the bundle's unit, z is up, and x, y of a tile count from its south-western corner.
+The classes here are the JSON objects of the file, with the same keys in the same order; their docstrings
+say what each key means, and docs/formats.md how the keys work together. The types hold the bounds of the values.
+`Manifest.from_dict` checks them and what belongs together, and workflow/schemas/davgswt.schema.json is generated from
+them. All lengths are in the bundle's unit, z is up, and x, y of a tile count from its south-western corner.
 
 Two things follow from a splat's size in pixels: the distances at which levels change, and the least eye height. The
 reference picture is 1920 pixels and 60 degrees wide, its focal length f = 960 / tan 30 degrees = 1663 pixels.
 """
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -55,7 +56,12 @@ ASPECT = 9 / 16
 
 @dataclass(frozen=True)
 class Sky(Entry):
-    """sRGB colours, in [0, 1], of the sky straight up and at the horizon."""
+    """The colours of the sky, sRGB from 0 to 1.
+
+    Attributes:
+        zenith: colour straight up.
+        horizon: colour at the horizon.
+    """
 
     zenith: Colour = field(default_factory=lambda: [0.36, 0.55, 0.8])
     horizon: Colour = field(default_factory=lambda: [0.78, 0.84, 0.88])
@@ -63,7 +69,15 @@ class Sky(Entry):
 
 @dataclass(frozen=True)
 class LevelEntry(Entry):
-    """One level of detail."""
+    """One level of detail.
+
+    Attributes:
+        level: index, from 0, the finest level.
+        mean_scale: mean standard deviation of the level's Gaussians. It rises from level to level.
+        distance: distance from the eye at which the next level takes over. It rises from level to level and is null for
+            the last one.
+        band: half the length over which this level fades into the next; 0 for the last level.
+    """
 
     level: Natural
     mean_scale: Length
@@ -73,9 +87,14 @@ class LevelEntry(Entry):
 
 @dataclass(frozen=True)
 class TileEntry(Entry):
-    """One tile: its number 16 c + 8 W + 4 N + 2 E + S of variant c and the colours of its edges, its mean uncertainty
-    in [0, 1], the lowest and highest z of its Gaussians, the directions (indices into `directions`) in whose orders it
-    is drawn, and its chunks, one a level.
+    """One tile of a material.
+
+    Attributes:
+        tile: index, from 0.
+        uncertainty: mean uncertainty of the ground that the tile shows, from 0 (certain) to 1.
+        z: lowest and highest z of the tile's Gaussians at any level, out to three standard deviations.
+        orders: the draw orders to use, as different indices into `directions`.
+        chunks: one chunk for each level, finest first.
     """
 
     tile: Natural
@@ -87,9 +106,14 @@ class TileEntry(Entry):
 
 @dataclass(frozen=True)
 class MaterialEntry(Entry):
-    """A material: its name, its share of the ground, the number of its first tile and its mean sRGB colour.
+    """A kind of ground. All materials have the same number of tiles.
 
-    Its tile T has the number first_tile + T, with T = 16 c + 8 W + 4 N + 2 E + S; all materials have as many tiles.
+    Attributes:
+        name: name of the material.
+        share: share of the ground that it covers.
+        first_tile: index of its first tile. Its tile with variant c and edge colours W, N, E and S has the index
+            first_tile + 16 c + 8 W + 4 N + 2 E + S.
+        ground_colour: mean colour of its ground.
     """
 
     name: Name
@@ -100,7 +124,33 @@ class MaterialEntry(Entry):
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest(Entry):
-    """davgswt.json."""
+    """davgswt.json, the manifest of a bundle.
+
+    Attributes:
+        tile_side: length of a tile's side.
+        salt: input of all hashes that choose tiles.
+        eye_floor: lowest height of the eye above the ground at which the ground looks sharp.
+        ground_colour: mean colour of the ground, which a viewer draws beyond the last tile.
+        directions: unit vectors from the eye into the scene, for which tiles are sorted. The last is straight down.
+        levels: levels of detail, finest first.
+        tiles: the tiles of all materials, one material after the other.
+        materials: kinds of ground.
+        classes: which material lies where. Present if and only if there are several materials.
+        objects: things that stand on the tiles.
+        scatter: where objects stand. Present if and only if there are objects.
+        variation: waves that add large-scale light and dark to the ground.
+        light: position of the captured sun, whose light the colours contain.
+        wind: how far plants sway on a page.
+        format: always `davgswt`.
+        version: version of the format. A reader must refuse other versions.
+        unit: name of the unit of length, for display.
+        sky: colours of the sky.
+        encoding: how to decode records.
+        parts: the files, in the order in which a viewer should fetch them.
+        provenance: version, settings and digests of all inputs.
+        composition: numbers that all composed tiles share. Missing if no level is composed.
+        heights: the surface on which the tiles lie. Only in the manifest of a page.
+    """
 
     tile_side: Length
     salt: Salt
@@ -152,7 +202,19 @@ class Manifest(Entry):
 
 def make_schema() -> str:
     """The JSON schema of a manifest: workflow/schemas/davgswt.schema.json."""
-    return json.dumps(TypeAdapter(Manifest).json_schema(), indent=1) + "\n"
+    schema = TypeAdapter(Manifest).json_schema()
+    for entry in (schema, *schema["$defs"].values()):
+        _describe_keys(entry)
+    return json.dumps(schema, indent=1) + "\n"
+
+
+def _describe_keys(entry: dict[str, Any]) -> None:
+    """Give each key of an object the description that the object has of it under `Attributes:`."""
+    entry["description"], _, attributes = entry["description"].partition("\n\nAttributes:\n")
+    for names, text in re.findall(r"^ {4}(\w+(?:, \w+)*): (.*(?:\n {5,}.*)*)", attributes, re.M):
+        text = " ".join(text.split())
+        for name in names.split(", "):
+            entry["properties"][name]["description"] = text[:1].upper() + text[1:]
 
 
 def _find_faults(manifest: Manifest) -> Iterator[str]:

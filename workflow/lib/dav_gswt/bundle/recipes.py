@@ -37,13 +37,13 @@ GROUND, UNDERLAY, REST = range(3)  # layers of a level
 
 @dataclass(frozen=True)
 class Composition(Entry):
-    """What composed tiles have in common.
+    """What composed tiles have in common. Finest cells are ground cells of level 0.
 
     Attributes:
-        side: finest cells along a tile's side.
-        cell: steps of position along a finest cell.
-        levels: that are composed, from the finest on; stored are the coarser ones.
-        exemplars: finest cells along the side of each material's exemplar.
+        side: number of finest cells along a tile's side, a multiple of 2^(levels - 1).
+        cell: width of a finest cell in steps of the encoding.
+        levels: number of composed levels, from the finest one. The coarser levels are stored.
+        exemplars: for each material, number of finest cells along the side of its exemplar.
     """
 
     side: Annotated[int, Field(ge=1, le=MAX_CELLS)]

@@ -45,7 +45,20 @@ DEFAULT_NAME, DEFAULT_LINE = "Endless terrain", "An endless terrain made from a 
 
 @dataclass(frozen=True)
 class Story:
-    """value: what story.json holds. sheet: photos.jpg."""
+    """How a terrain was made.
+
+    Attributes:
+        value: content of story.json, with these keys.
+            unit: name of the unit of length.
+            half: half the side of the ground.
+            photos: for each photo, its `round`, the place of its camera from the middle of the ground (`at`), its
+                viewing direction to the east and north (`look`), and its number in the sheet (`picture`), if any.
+            rounds: for each round, the number of its `photos` and the `psnr` of the test photos. The PSNR is null if
+                another preset fitted the round or no photos were set aside for testing.
+            thumb, columns, pictures: side of a picture of the sheet in pixels, pictures in a row, number of pictures.
+            grade: verdict on the photos; null: unknown.
+        sheet: content of photos.jpg.
+    """
 
     value: dict[str, Any]
     sheet: bytes
