@@ -23,9 +23,9 @@ each `config/scenes/<name>.yaml` is one scene. Lay single keys over them on the 
 without a default may be left out."""
 POLICIES_HEAD = """# Policies
 
-A policy chooses the poses from which the next k photos are taken. The default, `policy: auto`, is
-`farthest` if a scene chooses from given photos (`agent: replay`), otherwise `coverage-error`
-([why](../active-views.md)).
+A policy chooses the poses from which the k photos of the next [round](../glossary.md) are taken.
+The default, `policy: auto`, is `farthest` if a scene chooses from existing photos (`agent:
+replay`), otherwise `coverage-error` ([why](../active-views.md)).
 
 The column "reads" lists what a policy uses:
 

@@ -102,14 +102,16 @@ ALL = (
         error_pattern="at least 3 overlapping photos are needed",
     ),
     Extreme(
-        "all-start", "start views ask for all photos: no pool", override_desert(agent="replay", photo_count=5, start=6)
+        "all-start",
+        "all photos are start photos: no candidates",
+        override_desert(agent="replay", photo_count=5, start=6),
     ),
-    Extreme("k-pool", "k = pool", {"k": 6} | override_desert(candidates=6)),
-    Extreme("k-over-pool", "k far above the pool", {"k": 1000} | override_desert(candidates=6)),
+    Extreme("k-pool", "k is the number of candidates", {"k": 6} | override_desert(candidates=6)),
+    Extreme("k-over-pool", "k is far above the number of candidates", {"k": 1000} | override_desert(candidates=6)),
     Extreme("lam-0", "lambda 0", override_views(lam=0)),
     Extreme("lam-1e6", "lambda 1e6", override_views(lam=1_000_000)),
     Extreme("tau-0", "tau 0: every tile keeps all orders", {"tau": 0}),
-    Extreme("tau-1", "tau 1: none does", {"tau": 1}),
+    Extreme("tau-1", "tau 1: no tile keeps all orders", {"tau": 1}),
     Extreme("pdrop-0", "no dropout: all samples are equal", override_views(p_drop=0)),
     Extreme("pdrop-0.95", "19 of 20 of the attention dropped", override_views(p_drop=0.95)),
     Extreme(
@@ -119,17 +121,21 @@ ALL = (
         write_single_gaussian,
         error_pattern="1 opaque Gaussians",
     ),
-    Extreme("world-1", "a world of usual size, to compare with", FIELD_SCENE, write_world(COUNT, SIDE)),
+    Extreme("world-1", "a finished field of usual size, to compare with", FIELD_SCENE, write_world(COUNT, SIDE)),
     Extreme(
-        "world-1e-3", "the same, a thousandth as large", FIELD_SCENE, write_world(COUNT, 1e-3 * SIDE), same_as="world-1"
+        "world-1e-3",
+        "that field, a thousandth as large",
+        FIELD_SCENE,
+        write_world(COUNT, 1e-3 * SIDE),
+        same_as="world-1",
     ),
     Extreme(
         "world-1e6",
-        "the same, a million times as large",
+        "that field, a million times as large",
         FIELD_SCENE,
         write_world(COUNT, 1e6 * SIDE),
         same_as="world-1",
     ),
-    Extreme("million", "a million Gaussians", FIELD_SCENE | MILLION_SCENE, write_world(1000, SIDE)),
+    Extreme("million", "a finished field of a million Gaussians", FIELD_SCENE | MILLION_SCENE, write_world(1000, SIDE)),
 )
 EXTREMES = {extreme.name: extreme for extreme in ALL}
