@@ -86,6 +86,8 @@ FOLDER_SCENE |= {"preset": "draft", "tiling": "semantic"}
 MILLION = {"fit_size": 128, "spacing": 1.5, "max_gaussians": 2_000_000, "steps": 60, "steps_per_photo": 10}
 MILLION |= {"level_steps": 4}
 MILLION_SCENE = {"scenes": {"finished": {"preset": "million"}}, "presets": {"million": MILLION}}
+FEW = {"fit_size": "native", "spacing": 1.2, "max_gaussians": 1000, "steps": 30, "steps_per_photo": 5}
+FOCUS = override_desert(preset="few") | {"presets": {"few": FEW | {"choose_with": "draft", "level_steps": 4}}}
 
 ALL = (
     Extreme(
@@ -114,6 +116,9 @@ ALL = (
     Extreme("tau-1", "tau 1: no tile keeps all orders", {"tau": 1}),
     Extreme("pdrop-0", "no dropout: all samples are equal", override_views(p_drop=0)),
     Extreme("pdrop-0.95", "19 of 20 of the attention dropped", override_views(p_drop=0.95)),
+    Extreme("low-sun", "the captured sun 3 degrees above the horizon", {"sun": {"elevation": 3, "azimuth": 90}}),
+    Extreme("variation-4", "four times the variation of the exemplar, the most that is allowed", {"variation": 4}),
+    Extreme("focus", "only windows are fitted, with 1000 Gaussians", FOCUS),
     Extreme(
         "one-gaussian",
         "a field of one Gaussian",
