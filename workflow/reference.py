@@ -33,12 +33,12 @@ The column "reads" lists what a policy uses:
 - `field`: the Gaussians that were fitted to the photos so far
 - `photos`: the photos so far
 - `prior`: samples of a [diffusion prior](../prior.md), a network that paints guesses of what a
-  candidate would show. Only these policies use the config's `prior`, `p_drop` and `lam`, apart from
-  the keys after "not".
+  candidate would show. Only these policies use the config's `prior`, `p_drop` and `lam`. A key in
+  brackets after "not" is not used.
 
 A cell is a square of the ground, which is 28 cells long. [Terms](../prior.md#terms) defines `w2_sq`
 (W2, the 2-Wasserstein distance, squared), `lpips` and `gradient`. In a sum, each term is divided by
-its scale, a number that the first round fixes.
+its scale.
 
 [Architecture](../architecture.md#a-policy) shows how to add a policy.
 """
