@@ -86,7 +86,7 @@ FOLDER_SCENE |= {"preset": "draft", "tiling": "semantic"}
 MILLION = {"fit_size": 128, "spacing": 1.5, "max_gaussians": 2_000_000, "steps": 60, "steps_per_photo": 10}
 MILLION |= {"level_steps": 4}
 MILLION_SCENE = {"scenes": {"finished": {"preset": "million"}}, "presets": {"million": MILLION}}
-FEW = {"fit_size": "native", "spacing": 1.2, "max_gaussians": 1000, "steps": 30, "steps_per_photo": 5}
+FEW = {"fit_size": "native", "spacing": 1.2, "max_gaussians": 5000, "steps": 30, "steps_per_photo": 5}
 FOCUS = override_desert(preset="few") | {"presets": {"few": FEW | {"choose_with": "draft", "level_steps": 4}}}
 
 ALL = (
@@ -118,7 +118,7 @@ ALL = (
     Extreme("pdrop-0.95", "19 of 20 of the attention dropped", override_views(p_drop=0.95)),
     Extreme("low-sun", "the captured sun 3 degrees above the horizon", {"sun": {"elevation": 3, "azimuth": 90}}),
     Extreme("variation-4", "four times the variation of the exemplar, the most that is allowed", {"variation": 4}),
-    Extreme("focus", "only windows are fitted, with 1000 Gaussians", FOCUS),
+    Extreme("focus", "only windows are fitted, with 5000 Gaussians", FOCUS),
     Extreme(
         "one-gaussian",
         "a field of one Gaussian",
