@@ -9,7 +9,7 @@ SHOWN = {  # figures of a scene in the page of results
     "evolution": "two test views after the first rounds",
     "estimators": "test views after the same number of photos, chosen by each estimator",
     "cuts": "cuts by colour, and semantic cuts",
-    "uncertainty": "uncertainty of tiles, and a walk over them",
+    "uncertainty": "uncertainty of tiles, and a path over them",
 }
 FRAMES = "study/results/tables/viewer.csv"
 FLAT = config | STUDY  # the study's tables beside the product's
