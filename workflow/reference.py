@@ -23,9 +23,9 @@ each `config/scenes/<name>.yaml` is one scene. Lay single keys over them on the 
 without a default may be left out."""
 POLICIES_HEAD = """# Policies
 
-A policy chooses the poses from which the next k photos are taken. The default, `policy: auto`, is
-`farthest` if a scene chooses from given photos (`agent: replay`), otherwise `coverage-error`
-([why](../active-views.md)).
+A policy chooses the poses from which the k photos of the next [round](../glossary.md) are taken.
+The default, `policy: auto`, is `farthest` if a scene chooses from existing photos (`agent:
+replay`), otherwise `coverage-error` ([why](../active-views.md)).
 
 The column "reads" lists what a policy uses:
 
@@ -33,12 +33,12 @@ The column "reads" lists what a policy uses:
 - `field`: the Gaussians that were fitted to the photos so far
 - `photos`: the photos so far
 - `prior`: samples of a [diffusion prior](../prior.md), a network that paints guesses of what a
-  candidate would show. Only these policies use the config's `prior`, `p_drop` and `lam`, apart from
-  the keys after "not".
+  candidate would show. A policy without `prior` in the column ignores the config's keys `prior`,
+  `p_drop` and `lam`. A policy with "prior (not `lam`)" ignores `lam`.
 
-A cell is a square of the ground, which is 28 cells long. [Terms](../prior.md#terms) defines `w2_sq`
-(W2, the 2-Wasserstein distance, squared), `lpips` and `gradient`. In a sum, each term is divided by
-its scale, a number that the first round fixes.
+A *cell* is a square of the ground. The longer side of the ground has 28 cells.
+[Terms](../prior.md#terms) defines `w2_sq` (W2, the 2-Wasserstein distance, squared), `lpips` and
+`gradient`. In a sum, each term is divided by the median of its non-zero values in the first round.
 
 [Architecture](../architecture.md#a-policy) shows how to add a policy.
 """

@@ -5,11 +5,11 @@ from itertools import product
 from dav_gswt_study import experiments
 
 SHOWN = {  # figures of a scene in the page of results
-    "sphere": "candidates by what scores said of them, and what was chosen",
+    "sphere": "scores of the candidates, and the chosen candidates",
     "evolution": "two test views after the first rounds",
-    "estimators": "test views after as many photos, chosen by each estimator",
-    "cuts": "cuts by colours and by what the ground is",
-    "uncertainty": "uncertainty of tiles, and a walk over them",
+    "estimators": "test views after the same number of photos, chosen by each estimator",
+    "cuts": "cuts by colour, and semantic cuts",
+    "uncertainty": "uncertainty of tiles, and a path over them",
 }
 FRAMES = "study/results/tables/viewer.csv"
 FLAT = config | STUDY  # the study's tables beside the product's
@@ -277,7 +277,7 @@ def kept_suffix(name):
 def captions():
     """What the figures of the study show, in their order."""
     return [f"{scene}: {SHOWN[name]}" for name, _, scene in (n.partition("_") for n in figure_files()) if scene] + [
-        "quality against photos"
+        "quality against the number of photos"
     ]
 
 

@@ -12,10 +12,10 @@ from dav_gswt_study.figures import OKABE_ITO
 from dav_gswt_study.markdown import format_number, format_table
 
 NAMED = {  # measures, and decimals
-    "psnr": ("PSNR, dB", 2),
-    "worst_psnr": ("worst tenth of views, dB", 2),
-    "walker_psnr": ("views at eye level, dB", 2),
-    "lpips": ("LPIPS, lower by", 4),
+    "psnr": ("gain in PSNR (dB)", 2),
+    "worst_psnr": ("gain in PSNR of the worst tenth of the views (dB)", 2),
+    "walker_psnr": ("gain in PSNR at eye level (dB)", 2),
+    "lpips": ("decrease of LPIPS", 4),
 }
 ALL_SCENES = "all scenes"
 PANEL = 3.3, 3.4  # inches
@@ -38,7 +38,7 @@ def describe_comparison(
         "version": curves[0]["version"],
         "renderer": curves[0]["renderer"],
         "groups": format_groups(grouped + overall),
-        "scenes": format_scenes(compared, baseline),
+        "scenes": format_scenes(compared),
         "ends": format_ends(results),
     }
 
@@ -54,21 +54,21 @@ def format_groups(rows: list[dict]) -> str:
         psnr = found[group, policy, "psnr"]
         cells = [_format_cell(found.get((group, policy, measure)), places) for measure, (_, places) in NAMED.items()]
         lines.append([group, f"`{policy}`", psnr["units"], *cells, f"{psnr['wins']}, {psnr['ties']}, {psnr['losses']}"])
-    heads = ["", "policy", "pairs", *(name for name, _ in NAMED.values()), "wins, ties, losses"]
+    heads = ["", "policy", "pairs", *(name for name, _ in NAMED.values()), "wins, ties, losses (PSNR)"]
     return format_table(heads, lines)
 
 
-def format_scenes(compared: list[dict], baseline: str) -> str:
+def format_scenes(compared: list[dict]) -> str:
     """PSNR less the baseline's, a row a scene and k, a column a policy, the best over all scenes first."""
     psnr = [row for row in compared if row["measure"] == "psnr"]
     best = _rank_policies(psnr)
     found = {(row["policy"], row["scene"], row["k"]): row for row in psnr}
     places = sorted({(row["scene"], row["k"]) for row in psnr} - {(EVERY, "")})
     lines = [
-        [f"{scene}, {k} a round", *(_format_cell(found.get((row["policy"], scene, k))) for row in best)]
+        [f"{scene}, {k} photos at a time", *(_format_cell(found.get((row["policy"], scene, k))) for row in best)]
         for scene, k in places
     ]
-    return format_table([f"less `{baseline}`, dB", *(f"`{row['policy']}`" for row in best)], lines)
+    return format_table(["scene", *(f"`{row['policy']}`" for row in best)], lines)
 
 
 def format_ends(results: list[dict]) -> str:
@@ -80,7 +80,8 @@ def format_ends(results: list[dict]) -> str:
             _average(mine, key, digits) for key, digits in (("psnr", 2), ("walker_psnr", 2), ("lpips", 3), ("gap", 2))
         ]
         lines.append([scene, f"`{policy}`", len(mine), mine[0]["photos"], *means])
-    heads = ["scene", "policy", "starts", "photos", "PSNR, dB", "at eye level", "LPIPS", "under all photos, dB"]
+    heads = ["scene", "policy", "sets of start photos", "photos", "PSNR (dB)", "PSNR at eye level (dB)", "LPIPS"]
+    heads.append("PSNR of the fit to all photos, minus PSNR (dB)")
     return format_table(heads, lines)
 
 

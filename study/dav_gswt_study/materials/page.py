@@ -33,9 +33,9 @@ def describe_materials(tables: Mapping[str, Path | str]) -> dict[str, str]:
     heads = {
         "materials": ["scene", "sand", "meadow", "boulders", "path", "**mean IoU**", "true objects", "found", "wrong"]
         + ["precision", "recall", "**F1**"],
-        "lattice": ["scene", "materials", "objects", "excess of brightness", "of landmarks", "busyness", "mean tile"]
-        + ["next"],
-        "verdicts": ["scene", "of", "share", "objects", "verdict"],
+        "lattice": ["scene", "materials", "objects", "excess of brightness", "excess of landmarks", "busyness"]
+        + ["mean tile", "next tile"],
+        "verdicts": ["scene", "material", "share of the ground", "objects", "verdict"],
     }
     return {name: format_table(heads[name], map(describe, read_table(tables[name]))) for name, describe in made.items()}
 

@@ -15,7 +15,7 @@ from dav_gswt_study.markdown import format_table
 from dav_gswt_study.seams.summary import EVERY, MEASURES
 
 DIGITS = {"seam_lpips": 4, "psnr": 2, "jump": 2}
-HEADS = {"seam_lpips": "Seam-LPIPS over the floor", "psnr": "PSNR (dB)", "jump": "jump"}
+HEADS = {"seam_lpips": "Seam-LPIPS over its floor", "psnr": "PSNR (dB)", "jump": "jump"}
 TILES_SHOWN = 4  # tiles of the figure of cuts
 NAMES = {"seam_lpips": "Seam-LPIPS of cuts over their floor", "psnr": "PSNR of cuts (dB)", "jump": "jump across cuts"}
 
@@ -31,8 +31,9 @@ def describe_seams(summary: list[dict], ablation: list[dict], own: dict[str, str
 
 
 def _format_scenes(summary: list[dict], own: dict[str, str]) -> str:
-    head = ["scene", "tiling", "sets", "borders over floor", "cuts over floor", "ceiling over floor", "share"]
-    head += ["jump: border", "cut", "floor"]
+    head = ["scene", "tiling", "sets"]
+    head += [f"Seam-LPIPS over its floor: {place}" for place in ("borders", "cuts", "ceiling")]
+    head += ["share", "jump at borders", "jump at cuts", "jump without a seam"]
     lines = []
     for row in summary:
         if (row["view"], row["ground"]) == (EVERY, EVERY) and own.get(row["scene"]) == row["variant"]:

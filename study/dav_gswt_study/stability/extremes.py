@@ -86,6 +86,8 @@ FOLDER_SCENE |= {"preset": "draft", "tiling": "semantic"}
 MILLION = {"fit_size": 128, "spacing": 1.5, "max_gaussians": 2_000_000, "steps": 60, "steps_per_photo": 10}
 MILLION |= {"level_steps": 4}
 MILLION_SCENE = {"scenes": {"finished": {"preset": "million"}}, "presets": {"million": MILLION}}
+FEW = {"fit_size": "native", "spacing": 1.2, "max_gaussians": 5000, "steps": 30, "steps_per_photo": 5}
+FOCUS = override_desert(preset="few") | {"presets": {"few": FEW | {"choose_with": "draft", "level_steps": 4}}}
 
 ALL = (
     Extreme(
@@ -102,16 +104,21 @@ ALL = (
         error_pattern="at least 3 overlapping photos are needed",
     ),
     Extreme(
-        "all-start", "start views ask for all photos: no pool", override_desert(agent="replay", photo_count=5, start=6)
+        "all-start",
+        "all photos are start photos: no candidates",
+        override_desert(agent="replay", photo_count=5, start=6),
     ),
-    Extreme("k-pool", "k = pool", {"k": 6} | override_desert(candidates=6)),
-    Extreme("k-over-pool", "k far above the pool", {"k": 1000} | override_desert(candidates=6)),
+    Extreme("k-pool", "k is the number of candidates", {"k": 6} | override_desert(candidates=6)),
+    Extreme("k-over-pool", "k is far above the number of candidates", {"k": 1000} | override_desert(candidates=6)),
     Extreme("lam-0", "lambda 0", override_views(lam=0)),
     Extreme("lam-1e6", "lambda 1e6", override_views(lam=1_000_000)),
     Extreme("tau-0", "tau 0: every tile keeps all orders", {"tau": 0}),
-    Extreme("tau-1", "tau 1: none does", {"tau": 1}),
+    Extreme("tau-1", "tau 1: no tile keeps all orders", {"tau": 1}),
     Extreme("pdrop-0", "no dropout: all samples are equal", override_views(p_drop=0)),
     Extreme("pdrop-0.95", "19 of 20 of the attention dropped", override_views(p_drop=0.95)),
+    Extreme("low-sun", "the captured sun 3 degrees above the horizon", {"sun": {"elevation": 3, "azimuth": 90}}),
+    Extreme("variation-4", "four times the variation of the exemplar, the most that is allowed", {"variation": 4}),
+    Extreme("focus", "only windows are fitted, with 5000 Gaussians", FOCUS),
     Extreme(
         "one-gaussian",
         "a field of one Gaussian",
@@ -119,17 +126,21 @@ ALL = (
         write_single_gaussian,
         error_pattern="1 opaque Gaussians",
     ),
-    Extreme("world-1", "a world of usual size, to compare with", FIELD_SCENE, write_world(COUNT, SIDE)),
+    Extreme("world-1", "a finished field of usual size, to compare with", FIELD_SCENE, write_world(COUNT, SIDE)),
     Extreme(
-        "world-1e-3", "the same, a thousandth as large", FIELD_SCENE, write_world(COUNT, 1e-3 * SIDE), same_as="world-1"
+        "world-1e-3",
+        "that field, a thousandth as large",
+        FIELD_SCENE,
+        write_world(COUNT, 1e-3 * SIDE),
+        same_as="world-1",
     ),
     Extreme(
         "world-1e6",
-        "the same, a million times as large",
+        "that field, a million times as large",
         FIELD_SCENE,
         write_world(COUNT, 1e6 * SIDE),
         same_as="world-1",
     ),
-    Extreme("million", "a million Gaussians", FIELD_SCENE | MILLION_SCENE, write_world(1000, SIDE)),
+    Extreme("million", "a finished field of a million Gaussians", FIELD_SCENE | MILLION_SCENE, write_world(1000, SIDE)),
 )
 EXTREMES = {extreme.name: extreme for extreme in ALL}

@@ -27,7 +27,8 @@ def describe_stability(formulas: list[dict], runs: list[dict], facts: dict) -> d
 
 def format_formulas(rows: list[dict]) -> str:
     """A table for each group of formulas."""
-    header = ("formula", "range", "type", "worst error", "relative", "where", "of its tolerance")
+    header = ("formula", "range", "type", "largest error", "largest relative error", "inputs nearest to the tolerance")
+    header += ("share of the tolerance there",)
     parts = []
     for group in dict.fromkeys(row["group"] for row in rows):
         lines = [_format_formula(row) for row in rows if row["group"] == group]
@@ -50,7 +51,8 @@ def format_printed_forms(rows: list[dict]) -> str:
         if row["printed_share_of_tolerance"]:
             numbers = (row["printed_gives"], row["printed_right"], row["absolute_error"])
             lines.append((row["formula"], row["printed_at"], *map(shorten_number, numbers)))
-    return format_table(("formula", "at", "gives", "expected", "our largest error"), lines)
+    head = ("formula", "input", "printed form gives", "right result", "largest error of our form")
+    return format_table(head, lines)
 
 
 def format_runs(rows: list[dict]) -> str:
@@ -60,7 +62,7 @@ def format_runs(rows: list[dict]) -> str:
         expected = "yes" if row["as_expected"] == "True" else "**no**"
         seconds = f"{float(row['seconds']):.0f}"
         lines.append((row["about"], _format_outcome(row), expected, row["gaussians"], seconds, row["peak_mb"]))
-    return format_table(("run", "outcome", "as expected", "Gaussians", "seconds", "MB"), lines)
+    return format_table(("run", "outcome", "as expected", "Gaussians", "seconds", "peak memory (MB)"), lines)
 
 
 def _format_outcome(row: dict) -> str:
@@ -68,7 +70,7 @@ def _format_outcome(row: dict) -> str:
         return f'stopped: "{row["message"]}"' + (" and a traceback" if row["traceback"] == "True" else "")
     text = f"finished; {row['files_checked']} files checked, {row['not_finite']} with numbers that are not finite"
     if row["stills_psnr"]:
-        text += f"; stills equal those of {row['like']} to {float(row['stills_psnr']):.0f} dB"
+        text += f"; its stills agree with the stills of the usual size to {float(row['stills_psnr']):.0f} dB"
     return text + (f"; warned: {row['warnings']}" if row["warnings"] else "")
 
 

@@ -3,11 +3,13 @@
 from pathlib import Path
 
 from dav_gswt_study import csv_tables
-from dav_gswt_study.stability import rasterizer, scores, terrain
+from dav_gswt_study.stability import ground, rasterizer, scores, terrain
 from dav_gswt_study.stability.formula import Check, measure_error
 
 DESCRIPTIONS = Path(__file__).with_name("formulas.csv")  # group, formula, source, range, type, tolerance_from
-CHECKS: dict[str, Check] = {check.name: check for module in (scores, terrain, rasterizer) for check in module.CHECKS}
+CHECKS: dict[str, Check] = {
+    check.name: check for module in (scores, terrain, ground, rasterizer) for check in module.CHECKS
+}
 
 
 def read_descriptions() -> list[dict[str, str]]:

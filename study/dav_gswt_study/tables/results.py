@@ -99,8 +99,9 @@ def _tested(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
     for row in rows:
         for name, (key, digits) in TESTED.items():
             if row[f"{key}_difference"]:
-                found.append([f"`{row['variant']}` less `{row['less']}`", name, *_test(row, key, digits)])
-    return ["", "measure", "pairs", "difference", "95 %", "t (df)", "p", "Holm", "paper's p"], found
+                found.append([f"`{row['variant']}` minus `{row['less']}`", name, *_test(row, key, digits)])
+    head = ["compared", "measure", "pairs", "difference", "95 % interval", "t (df)", "p", "corrected p", "paper's p"]
+    return head, found
 
 
 def _test(row: dict, key: str, digits: int) -> list[str]:

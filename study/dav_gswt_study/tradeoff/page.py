@@ -22,19 +22,20 @@ def describe_tradeoff(rows: list[dict], pareto: list[dict]) -> dict:
 
 
 def describe_preset(row: dict) -> str:
-    """Whether no setting is as fast and better than a preset, and else by how much one is. row: of pareto.csv."""
+    """Whether nothing is as fast and better than a preset, and else what is, and by how much. row: of pareto.csv."""
     if row["front"]:
-        return f"`{row['setting']}` is the best for its time: no other setting is as fast and better in PSNR."
+        return f"`{row['setting']}` has the best PSNR for its time: nothing else is as fast and better in PSNR."
+    worse = f"`{row['setting']}` does not have the best PSNR for its time"
     if row["behind"] > 0:
-        rival = f"{row['rival_knob']} {row['rival_setting']}"
-        return f"`{row['setting']}` is not the best for its time: {rival} is as fast and {row['behind']:.2f} dB better."
-    return f"`{row['setting']}` is not the best for its time: another setting is as good and faster."
+        rival = f"`{row['rival_knob']}` {row['rival_setting']}"
+        return f"{worse}: {rival} is as fast and {row['behind']:.2f} dB better."
+    return f"{worse}: something else is as good and faster."
 
 
 def _tabulate_presets(pareto: list[dict]) -> tuple[list[str], list[list[str]]]:
     form = {"seconds": 0, "psnr": 2, "ssim": 3, "lpips": 3, "peak_mb": 0, "bundle_mb": 1}
-    head = ["preset", "seconds", "PSNR (dB)", "SSIM", "LPIPS", "memory (MB)", "bundle (MB)"]
-    head += ["best for its time", "in LPIPS"]
+    head = ["preset", "seconds", "PSNR (dB)", "SSIM", "LPIPS", "peak memory (MB)", "bundle (MB)"]
+    head += ["best PSNR for its time", "best LPIPS for its time"]
     said = {1: "yes", 0: "no", None: ""}
     found = []
     for row in (row for row in pareto if row["knob"] == PRESET):
@@ -46,7 +47,7 @@ def _tabulate_presets(pareto: list[dict]) -> tuple[list[str], list[list[str]]]:
 def _describe_knob(knob: str, rows: list[dict]) -> dict:
     mine = [row for row in rows if row["knob"] == knob]
     unit = UNITS[mine[0]["measure"]]
-    head = ["setting", "seconds", "PSNR (dB)", "LPIPS", f"loss ({unit})", "memory (MB)", "bundle (MB)"]
+    head = ["value", "seconds", "PSNR (dB)", "LPIPS", f"loss ({unit})", "peak memory (MB)", "bundle (MB)"]
     form = {"own_seconds": 1, "psnr": 2, "lpips": 3, "loss": DIGITS[unit], "peak_mb": 0, "bundle_mb": 1}
     bold = {0: "{}", 1: "**{}**"}
     shown = [

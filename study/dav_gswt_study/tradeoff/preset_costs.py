@@ -66,7 +66,8 @@ def summarise_preset(rows: list[dict], preset: str) -> dict:
 
 
 def _tabulate_means(rows: list[dict], presets: list[str]) -> tuple[list[str], list[list[str]]]:
-    head = ["preset", "seconds", "loss of PSNR (dB)", "at most", "of LPIPS", "at most"]
+    head = ["preset", "seconds / seconds of `standard`", "mean loss of PSNR (dB)", "largest loss of PSNR (dB)"]
+    head += ["mean loss of LPIPS", "largest loss of LPIPS"]
     found = []
     for preset in presets:
         mean = summarise_preset(rows, preset)
@@ -78,8 +79,8 @@ def _tabulate_means(rows: list[dict], presets: list[str]) -> tuple[list[str], li
 def _tabulate_scene(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
     form = {"seconds": 0, **{f"{part}_s": 0 for part in PARTS}, "psnr": 2, "ssim": 3, "lpips": 3, "photos": 0}
     form |= {"gaussians": 0, "peak_mb": 0, "bundle_mb": 1}
-    head = ["preset", "seconds", *PARTS.values(), "PSNR (dB)", "SSIM", "LPIPS", "photos", "Gaussians"]
-    head += ["memory (MB)", "bundle (MB)"]
+    head = ["preset", "seconds of all jobs", *(f"seconds of {part}" for part in PARTS.values())]
+    head += ["PSNR (dB)", "SSIM", "LPIPS", "photos", "Gaussians", "peak memory (MB)", "bundle (MB)"]
     return head, [
         [f"`{row['preset']}`", *(format_number(row[key], digits) for key, digits in form.items())] for row in rows
     ]

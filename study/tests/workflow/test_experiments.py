@@ -68,7 +68,7 @@ def test_a_finished_run_is_traded_off(snakemake, copied, tmp_path):
     rows = read_rows(copied / "study/results/tradeoff/tradeoff.csv")
     assert [row["setting"] for row in rows] == ["draft", "0", "0.6", "1"]
     assert all(float(row[key]) > 0 for row in rows for key in ("seconds", "own_seconds", "psnr", "bundle_mb"))
-    assert "`draft` is the best for its time" in (copied / page).read_text()
+    assert "`draft` has the best PSNR for its time" in (copied / page).read_text()
     assert image_files.read_size(copied / "study/docs/figures/tradeoff_knobs.png")[0] > 300
 
 

@@ -44,8 +44,8 @@ def run(tmp_path, monkeypatch):
 def test_a_hole_gives_a_map_outlines_and_a_mission_that_goes_when_it_is_filled(run, tmp_path, capsys):
     assert run(placed(True)) == 1
     said = capsys.readouterr().out
-    assert "56 of 57 photos found their place" in said
-    assert "lost.jpg found no place: it matches no photo" in said and "soft.jpg is blurred" in said
+    assert "56 of 57 photos could be placed" in said
+    assert "lost.jpg could not be placed: it matches no photo" in said and "soft.jpg is blurred" in said
     assert "is missing" in said and "seen by no photo" in said and ", at 51.99999" in said
     (feature,) = json.loads((tmp_path / "out/gaps.geojson").read_text())["features"]
     assert np.allclose(np.mean(feature["geometry"]["coordinates"][0], 0), [13, 52], atol=1e-4)

@@ -135,12 +135,12 @@ def test_the_judgement_says_what_was_found_how_good_it_is_and_what_would_help(tm
         path.write_text(json.dumps(value))
     said = judgement.judge_terrain(*paths)
     assert said == [
-        "Found 2 kinds of ground (60%, 40%). 7% of it is shown nowhere (dark in materials.png).",
+        "Found 2 kinds of ground (60%, 40%). 7% of it is not in the terrain (dark in materials.png).",
         "Left out: 1 thing cut off at a border (2%).",
         "1 thing on it is scattered over the terrain (to leave it out: `materials: {exclude: MASK.png}` in scene.yaml, "
         "see docs/photos.md).",
         "4 of 5 photos are used; not a.jpg.",
-        "Beside test photos (2), the terrain is good (26.0 dB PSNR; good from 25, very good from 30).",
+        "Compared with 2 test photos, the terrain is good (26.0 dB PSNR; good from 25, very good from 30).",
         "The camera poses are doubtful, since photos look aside.",
         "The kind that covers 40% was photographed on a small area: photograph 2.0 times as much of it.",
     ]

@@ -87,7 +87,7 @@ def test_the_verdict_on_a_set_is_that_of_the_material_that_covers_most_and_names
     judged = {name: build.judge_material(name, areas, 0.3) for name, areas in (("sand", 8.0), ("rock", 0.5))}
     whole = build.judge_set(judged, {"sand": 0.7, "rock": 0.3}, 0.2)
     assert whole.grade == "good"
-    assert whole.reason == "2 materials, 20% of the ground is shown nowhere; of rock there is too little"
+    assert whole.reason == "2 materials, 20% of the ground is not in the terrain; of rock there is too little"
     assert build.judge_set(judged, {"sand": 0.4, "rock": 0.6}, 0.2).grade == "no"
     assert build.judge_set(judged, {"sand": 0.7, "rock": 0.3}, 0.6).grade == "marginal"
     assert build.judge_set({"sand": judged["sand"]}, {"sand": 1.0}, 0.2).reason.startswith("1 material, 20%")

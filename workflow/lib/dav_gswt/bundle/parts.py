@@ -34,7 +34,8 @@ FOLDER = "parts"
 LEVEL, RECIPES, RECORDS, PLAIN = "level", "recipes", "records", "plain"  # kinds
 MAX_SIZE = 1 << 29  # bytes that all parts may inflate to
 MAX_COUNT, MAX_TOTAL = 1 << 24, 1 << 26  # Gaussians of a tile at a level, and of all
-EFFORT = 9  # of zlib; its strategy for noise saves 4 %
+# of zlib, for planes of noise: 0.4 to 1.4 % smaller in 0.6 of the time of effort 9 with its usual memory
+EFFORT, MEMORY = 8, 6
 PLANES = 19  # bytes of a Gaussian
 
 
@@ -78,7 +79,7 @@ class ChunkEntry(Entry):
 
 def write_part(data: bytes, folder: Path, kind: str, name: str, level: int | None = None) -> PartEntry:
     """Compress data to parts/{name}.bin in a bundle's folder; returns its entry in the manifest."""
-    stream, file = zlib.compressobj(EFFORT, strategy=zlib.Z_FILTERED), f"{FOLDER}/{name}.bin"
+    stream, file = zlib.compressobj(EFFORT, memLevel=MEMORY, strategy=zlib.Z_FILTERED), f"{FOLDER}/{name}.bin"
     packed = stream.compress(data) + stream.flush()
     (folder / file).write_bytes(packed)
     return PartEntry(kind, file, len(packed), len(data), hashlib.sha256(packed).hexdigest(), level)

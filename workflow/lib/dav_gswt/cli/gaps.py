@@ -131,8 +131,8 @@ def plan_mission(path: Path, placed: PlacedPhotos, found: Gaps) -> str:
 def describe_photos(placed: PlacedPhotos, found: Gaps) -> str:
     """How many photos were placed, and which do not count, in words."""
     total, frame = len(placed.model.names) + len(placed.left_out), placed.frame
-    lines = [f"{len(placed.model.names)} of {total} photos found their place."]
-    lines += [f"  {name} found no place: {reason}" for name, reason in placed.left_out]
+    lines = [f"{len(placed.model.names)} of {total} photos could be placed."]
+    lines += [f"  {name} could not be placed: {reason}" for name, reason in placed.left_out]
     lines += [f"  {name} is blurred and does not count" for name in placed.blurred]
     lines += [f"  {name} shows the horizon more than the ground and does not count" for name in found.horizon]
     if frame.georeference is None:

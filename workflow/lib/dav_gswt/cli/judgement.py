@@ -78,7 +78,7 @@ def describe_ground(found: Mapping[str, Any] | None) -> list[str]:
     kinds = f"{len(shares)} kinds of ground ({', '.join(f'{share:.0%}' for share in shares)})"
     said, left_out = ["Found one kind of ground." if len(shares) == 1 else f"Found {kinds}."], found["excluded"]
     if left_out >= 0.01:
-        said[0] += f" {left_out:.0%} of it is shown nowhere (dark in materials.png)."
+        said[0] += f" {left_out:.0%} of it is not in the terrain (dark in materials.png)."
     if phrases := describe_left_out(found["left_out"]):
         said.append(f"Left out: {', '.join(phrases)}.")
     if things := len(found["objects"]):
@@ -106,8 +106,8 @@ def describe_quality(ground: SceneFrame, metrics: Path | None) -> list[str]:
     said = ["No photo was set aside, so the quality was not measured (--test 2 sets two aside)."] if metrics else []
     if isinstance(psnr, int | float) and math.isfinite(psnr):
         grade = next((grade for least, grade in GRADES if psnr >= least), POOR)
-        tests = f"test photos ({len(values['test_views'])})"
-        said = [f"Beside {tests}, the terrain is {grade} ({psnr:.1f} dB PSNR; good from 25, very good from 30)."]
+        tests = "1 test photo" if (count := len(values["test_views"])) == 1 else f"{count} test photos"
+        said = [f"Compared with {tests}, the terrain is {grade} ({psnr:.1f} dB PSNR; good from 25, very good from 30)."]
         if grade == POOR:
             return said + explain_poor_quality(values, doubts)
     return said + ([f"The {doubts}."] if doubts else [])

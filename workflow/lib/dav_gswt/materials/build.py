@@ -431,9 +431,9 @@ def judge_set(verdicts: dict[str, MaterialVerdict], shares: dict[str, float], ex
     """
     grade = verdicts[max(shares, key=lambda name: shares[name])].grade
     if excluded > 0.5 and grade == "good":
-        reason = f"{excluded:.0%} of the ground is shade, rare or cut off, and shown nowhere"
+        reason = f"{excluded:.0%} of the ground is shade, rare or cut off, and not in the terrain"
         return MaterialVerdict("marginal", reason)
     many = "1 material" if len(verdicts) == 1 else f"{len(verdicts)} materials"
     scarce = [name for name, verdict in verdicts.items() if verdict.grade == "no"]
     lacking = f"; of {' and '.join(scarce)} there is too little" if scarce else ""
-    return MaterialVerdict(grade, f"{many}, {excluded:.0%} of the ground is shown nowhere{lacking}")
+    return MaterialVerdict(grade, f"{many}, {excluded:.0%} of the ground is not in the terrain{lacking}")

@@ -117,7 +117,7 @@ def fit_ground(
     if cells < block:
         raise InputError(
             f"the well-seen square of ground is {side / spacing:.0f} discs wide and the levels need {block}: "
-            "take more photos, or ask for fewer levels (tiles: levels) or a finer preset"
+            "take more photos, or set fewer `levels` or a finer preset"
         )
     inset = 0.5 * (side - cells * spacing)
     left = max(0, int((west + inset - around[0]) / spacing))

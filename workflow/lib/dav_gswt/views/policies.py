@@ -107,8 +107,8 @@ def farthest(scores: Scores, inputs: SelectionInput) -> list[int]:
 )
 @policy(
     "coverage",
-    "one by one, the candidate with the largest gain in directional coverage. It is high if photos show every cell of "
-    "the ground large and from many sides",
+    "one by one, the candidate that adds most to directional coverage. Coverage is high if photos show every cell of "
+    "the ground at a high resolution and from many sides",
     needs=("field",),
 )
 def cover(scores: Scores, inputs: SelectionInput) -> list[int]:
