@@ -17,6 +17,7 @@ Reader = Callable[[str], list[Row]]
 FEW = 2  # pairs, of which an interval is no more than their range
 LEVEL = 0.05
 CHOSEN = {"p_drop": 0.15, "lam": 0.1}  # by the paper
+VERSIONED = ("sweep_k", "sweep_estimators", "seam_summary", "view_curves", "hundred_curves")  # tables with a column
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def _describe_views(rows: Reader) -> dict:
     psnr = {variant: float(row["psnr"]) for variant, row in budget.items()}
     hundred = {r["policy"]: -float(r["gap"]) for r in rows("hundred_benchmark") if r["scene"] == "desert_100"}
     return {
-        "version": ", ".join(sorted({row["version"] for row in rows("view_curves") + rows("hundred_curves")})),
+        "version": ", ".join(sorted({row["version"] for table in VERSIONED for row in rows(table)})),
         "chosen": {variant: _compare(compared[variant], "psnr") for variant in ("w2", "grad-lpips", "single")},
         "photos": int(float(budget["w2-lpips"]["photos"])),
         "all_photos": int(float(budget["all"]["photos"])),
