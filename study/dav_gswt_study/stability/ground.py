@@ -70,7 +70,7 @@ def _noise_at(x: Fraction, y: Fraction) -> float:
     value = 0.0
     for b in (0, 1):
         for a in (0, 1):
-            bits = int(hash_cell(np.array([i + a]), np.array([j + b]), VARIATION + 1, SALT)[0])
+            bits = int(hash_cell(i + a, j + b, VARIATION + 1, SALT))
             plane = ((bits & 0xFFFF) / 32767.5 - 1) * (u - a) + ((bits >> 16) / 32767.5 - 1) * (v - b)
             value += (fade_x if a else 1 - fade_x) * (fade_y if b else 1 - fade_y) * plane
     return value
