@@ -135,9 +135,17 @@ def check_a_page_at_rest(seen: Visit, address: str) -> None:
     seen.page.emulate_media(reduced_motion="no-preference")
     calm = seen.page.evaluate("davgswt.grab()")
     count = seen.page.evaluate("glCounts.draws")
-    seen.until(f"glCounts.draws > {count + 10}")
+    toggle = "document.getElementById('windButton').click()"
+    for trial in range(4):  # on a busy machine frames may be late, and then the wind waits for the button
+        try:
+            seen.until(f"glCounts.draws > {count + 10}", 10.0)
+            break
+        except AssertionError:
+            if trial == 3:
+                raise
+            seen.page.evaluate(f"{toggle}; {toggle}")
     assert seen.page.evaluate("davgswt.grab()") == calm, "saved without wind"
     assert not seen.page.evaluate("windButton.hidden")
-    seen.page.evaluate("document.getElementById('windButton').click()")
+    seen.page.evaluate(toggle)
     seen.until("location.hash.includes('&wind=0')")
     assert draws() == 0

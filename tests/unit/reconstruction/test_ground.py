@@ -45,7 +45,7 @@ def test_the_exemplar_is_whole_cells_inside_the_well_seen_square_and_the_margin_
 def test_the_cap_widens_the_spacing_and_an_exemplar_too_small_for_the_levels_is_refused():
     grid = place(spacing=0.01, max_cells=10_000)
     assert grid.heights.size <= 10_000 and grid.spacing > 0.01
-    with pytest.raises(InputError, match="fewer levels"):
+    with pytest.raises(InputError, match="fewer `levels`"):
         place(spacing=1.0)
 
 
