@@ -5,8 +5,8 @@ build yourself (github.com/pierotofy/OpenSplat, AGPL, `-DGPU_RUNTIME=CPU`), and 
 results/copr_dunes/photos. Writes data/comparison_fits.csv and figures/comparison_fits.png of study/docs.
 
 Both programs see photos of SIZE pixels from the first step on. OpenSplat renders the test photo itself: its pictures
-are nearer to the photo than renders of its files by other programs. Processor seconds are those of all threads: other
-jobs of the machine change them much less than seconds.
+are nearer to the photo than renders of its files by other programs. Processor seconds are summed over all threads:
+other jobs of the machine change them much less than seconds.
 """
 
 import os
